@@ -1,0 +1,30 @@
+// Write aside, then rename: a reader sees the old file or the whole new one, never half of it.
+#pragma once
+
+#include <filesystem>
+
+namespace hermesh {
+
+/// Reserves a temporary path beside `target`. The destructor removes the temporary file unless commit() renamed it.
+/// Temporary files of a process that is being cancelled are removed by remove_unfinished_files().
+class AtomicFile {
+ public:
+  /// @throws Error if the folder does not exist or cannot be written.
+  explicit AtomicFile(std::filesystem::path target);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  const std::filesystem::path& path() const { return temporary_; }
+  /// @throws Error if the rename fails.
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+  bool committed_ = false;
+};
+
+/// Removes the temporary files of every AtomicFile that is still open. For the moment before a process ends itself.
+void remove_unfinished_files() noexcept;
+
+}  // namespace hermesh

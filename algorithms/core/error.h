@@ -1,0 +1,21 @@
+// The two ways in which work ends early.
+#pragma once
+
+#include <exception>
+#include <stdexcept>
+
+namespace hermesh {
+
+/// Bad input, or a failure that the user can do something about. what() is one sentence that names the file or the
+/// option and says what to do; the command line prints it and exits with 1.
+class Error : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Thrown from RunContext::check() once the user has asked to stop. The command line exits with 130.
+class Cancelled : public std::exception {
+ public:
+  const char* what() const noexcept override { return "cancelled"; }
+};
+
+}  // namespace hermesh

@@ -1,0 +1,32 @@
+#include "algorithms/core/level_set.h"
+
+#include <cmath>
+#include <mutex>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/hermite/hermite_grid.h"
+
+namespace hermesh {
+
+double LevelSet::voxel_size() const { return std::cbrt(std::abs(grid_->grid->transform().voxelVolume())); }
+
+double LevelSet::background() const { return grid_->grid->background(); }
+
+std::size_t LevelSet::active_voxels() const { return grid_->grid->activeVoxelCount(); }
+
+std::size_t LevelSet::memory_bytes() const { return grid_->grid->memUsage(); }
+
+std::array<int, 3> LevelSet::dimensions() const {
+  const openvdb::Coord size = grid_->grid->evalActiveVoxelDim();
+  return {size.x(), size.y(), size.z()};
+}
+
+void initialize_openvdb() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    openvdb::initialize();
+    register_hermite_grid();
+  });
+}
+
+}  // namespace hermesh

@@ -1,0 +1,21 @@
+// The OpenVDB grid inside a LevelSet. Heavy (seconds a translation unit): include it from .cpp files that need it.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include "algorithms/core/level_set.h"
+
+namespace hermesh {
+
+struct LevelSetGrid {
+  openvdb::FloatGrid::ConstPtr grid;
+};
+
+inline LevelSet make_level_set(openvdb::FloatGrid::ConstPtr grid) {
+  return LevelSet(std::make_shared<const LevelSetGrid>(LevelSetGrid{std::move(grid)}));
+}
+
+/// Registers OpenVDB's types and ours, once; call it before a grid is made, read or written.
+void initialize_openvdb();
+
+}  // namespace hermesh

@@ -1,0 +1,38 @@
+// What a voxelization would cost, found before anything is allocated, so that a voxel size with a few zeros
+// too many is refused with a sentence instead of ending in the machine's out-of-memory killer.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "algorithms/core/polygon_mesh.h"
+
+namespace hermesh {
+
+/// Estimated size of a narrow band. Right within a factor of two for surfaces that are smooth at the scale of
+/// a voxel; a surface that is rough below that scale is overestimated, never beyond its filled bounding box.
+struct BandEstimate {
+  double active_voxels = 0.0;
+  double leaves = 0.0;      ///< 8³ blocks
+  double grid_bytes = 0.0;  ///< of the finished float grid
+  double peak_bytes = 0.0;  ///< while it is made
+};
+
+/// Voxel size in world units, bands in voxels. The estimate rests on the surface's area, on the number of 8³
+/// blocks that hold a corner of a polygon (for scattered small pieces), and on the bounding box (as the upper
+/// limit).
+BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
+                           double interior_band);
+
+/// Bytes that this process could still take: the machine's available memory or what its control group has
+/// left, whichever is less. Nothing when the system does not say.
+std::optional<std::uint64_t> available_memory();
+
+/// Refuses what cannot be voxelized.
+/// @throws Error for a voxel size that is not finite, not positive or below what OpenVDB's transforms take; a
+/// band that is not finite or below one voxel; a mesh without polygons or with a coordinate that is not
+/// finite; voxel coordinates beyond 30 bits; or an estimate above the available memory.
+void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,
+                             double interior_band);
+
+}  // namespace hermesh

@@ -1,0 +1,47 @@
+// Mesh files: PLY (ascii, binary of both endians), OBJ, OFF, STL, each also gzipped, in; PLY, OBJ, OFF, STL out.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+/// A mesh exactly as a file holds it: points in world units and double precision. Judges work on this. Polygons with
+/// more than four corners are cut into a fan about their first corner; STL's points are shared where all three
+/// coordinates are equal.
+struct MeshFile {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Triangle> triangles;
+  std::vector<Quad> quads;
+  /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading back
+  /// gives the same points.
+  std::optional<Eigen::Vector3d> origin;
+
+  std::size_t triangle_count() const { return triangles.size() + 2 * quads.size(); }
+};
+
+/// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, or holds an index out of
+/// range, a coordinate that is not finite, or no polygon; the sentence names the file.
+MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context);
+
+/// Single precision relative to the file's own origin, or to choose_origin() of its bounds.
+PolygonMesh to_polygon_mesh(const MeshFile& file);
+/// Double precision world coordinates of a mesh, what write_mesh() would put into a file.
+MeshFile to_mesh_file(const PolygonMesh& mesh);
+
+inline PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context) {
+  return to_polygon_mesh(read_mesh_file(path, context));
+}
+
+/// Writes beside the path and renames, so that no half-written file stands there. Coordinates are single precision
+/// where that loses nothing and double otherwise; STL has single precision only, and a note says what that cost.
+/// @throws Error for an unknown extension or a path that cannot be written.
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
+
+/// True for .ply .obj .off .stl, also with .gz behind.
+bool is_mesh_path(const std::filesystem::path& path);
+
+}  // namespace hermesh

@@ -1,0 +1,42 @@
+// Options of a variant: declared in its table entry, given by the user as key=value, checked before the work starts.
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hermesh {
+
+/// One option. `choices` empty means a number from `minimum` to `maximum`.
+struct OptionSpec {
+  std::string name;
+  std::string fallback;  ///< value when the user gives none
+  std::string help;      ///< meaning, unit, and what a larger value does
+  std::vector<std::string> choices = {};
+  double minimum = 0.0;
+  double maximum = 1e300;
+};
+
+class Options {
+ public:
+  Options() = default;
+  /// Checks `given` against the declarations and fills in what is missing.
+  /// @throws Error naming the variant, the option and what would be allowed.
+  Options(std::string_view variant, std::span<const OptionSpec> declared,
+          const std::map<std::string, std::string>& given);
+
+  double number(std::string_view name) const;
+  const std::string& text(std::string_view name) const;
+  /// "key=value key=value" of all options in alphabetical order, the defaults included.
+  std::string canonical() const;
+
+ private:
+  std::map<std::string, std::string, std::less<>> values_;
+};
+
+/// Splits "key=value". @throws Error if there is no '=' or no key.
+std::pair<std::string, std::string> parse_option(std::string_view text);
+
+}  // namespace hermesh

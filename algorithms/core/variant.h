@@ -1,0 +1,61 @@
+// What a variant is: a name with a function, its options, and what it promises. The tables of variants
+// (algorithms/variants.cpp, reference/variants.cpp) are arrays of these; nothing registers itself.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/options.h"
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+/// What a variant guarantees for every finite input. A broken promise is an error of the run; a defect that nobody
+/// promised away is a plain figure.
+struct Promises {
+  bool closed = false;                ///< no boundary edge
+  bool manifold = false;              ///< no non-manifold edge or vertex
+  bool oriented = false;              ///< no inconsistently oriented edge
+  bool no_self_intersection = false;  ///< no pair of polygons meets except along a shared corner or edge
+};
+
+/// Volume in, mesh out.
+struct ExtractionInput {
+  const LevelSet& level_set;
+  double isovalue = 0.0;                ///< in the units of the grid's values
+  const PolygonMesh* source = nullptr;  ///< the polygons that the volume was made from, where they are at hand
+  const Options& options;
+  RunContext& context;
+};
+
+struct Extractor {
+  std::string name;
+  std::string summary;  ///< one line
+  Promises promises;
+  std::vector<OptionSpec> options;
+  PolygonMesh (*extract)(const ExtractionInput&);
+};
+
+/// Polygons in, level set out.
+struct VoxelizationInput {
+  const PolygonMesh& mesh;
+  double voxel_size;           ///< world units
+  double exterior_band = 3.0;  ///< voxels
+  double interior_band = 3.0;  ///< voxels
+  RunContext& context;
+};
+
+struct Voxelizer {
+  std::string name;
+  std::string summary;
+  LevelSet (*voxelize)(const VoxelizationInput&);
+};
+
+/// Entry of that name. @throws Error that lists the names there are.
+const Extractor& find_variant(std::span<const Extractor> table, const std::string& name);
+const Voxelizer& find_variant(std::span<const Voxelizer> table, const std::string& name);
+
+}  // namespace hermesh

@@ -1,0 +1,36 @@
+// .vdb files.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+/// Reads one scalar grid. An empty name takes the grid `sdf`, or the only scalar grid there is; half precision and
+/// double grids are converted to float.
+/// @throws Error for a file that is missing, truncated or no .vdb, for a grid that is not there (the sentence lists
+/// those that are) or not scalar, and for a value that is not finite.
+LevelSet read_level_set(const std::filesystem::path& path, const std::string& grid_name, RunContext& context);
+
+/// Writes the grid under the name `sdf`, aside and then renamed. @throws Error if the path cannot be written.
+void write_level_set(const std::filesystem::path& path, const LevelSet& level_set, RunContext& context);
+
+struct GridSummary {
+  std::string name, value_type, grid_class;
+  std::uint64_t active_voxels = 0, memory_bytes = 0;
+  std::array<int, 3> lower{}, upper{};  ///< active box, index space, inclusive
+  double voxel_size = 0.0;              ///< world units
+  double background = 0.0;              ///< of scalar grids
+  bool readable = true;                 ///< false for a grid type that this program does not know
+};
+
+/// What a .vdb holds. Grids of unknown types are listed by name and type without failing the file.
+std::vector<GridSummary> describe_vdb(const std::filesystem::path& path);
+
+}  // namespace hermesh

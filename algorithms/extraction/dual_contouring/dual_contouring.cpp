@@ -1,0 +1,235 @@
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/core/blocks.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/dual_contouring/qef.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+/// How far a confined vertex stays off its cell's faces, in voxels, so that no two cells place theirs at one point.
+constexpr double kCellMargin = 1.0 / 1024.0;
+
+/// What one block adds to the mesh, and where in it.
+struct BlockOutput {
+  BlockMask active{};
+  std::array<std::uint32_t, 8> rank{};  ///< points of this block before each word
+  std::uint32_t first_point = 0, first_quad = 0;
+
+  std::uint32_t point_in(int cell) const {
+    const std::uint64_t before = active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
+    return first_point + rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
+  }
+};
+
+class Contourer {
+ public:
+  Contourer(const HermiteGrid& grid, const DualContouringOptions& options)
+      : grid_(grid), options_(options), outputs_(grid.blocks().size()) {}
+
+  PolygonMesh run(RunContext& context) {
+    const std::size_t blocks = outputs_.size();
+    std::vector<std::uint64_t> points(blocks), quads(blocks);
+    PolygonMesh mesh;
+    mesh.origin = grid_.placement().origin;
+    {
+      Stage stage(context, "count");
+      parallel_blocks(blocks, context, [&](std::size_t b) {
+        points[b] = find_active_cells(static_cast<std::int32_t>(b));
+        for (const BlockMask& axis : grid_.blocks()[b].crossing) quads[b] += static_cast<std::uint64_t>(count(axis));
+      });
+    }
+    mesh.points.resize(exclusive_scan(points, "points"));
+    mesh.quads.resize(exclusive_scan(quads, "quads"));
+    positions_.resize(mesh.points.size());
+    for (std::size_t b = 0; b < blocks; ++b) {
+      outputs_[b].first_point = static_cast<std::uint32_t>(points[b]);
+      outputs_[b].first_quad = static_cast<std::uint32_t>(quads[b]);
+    }
+    {
+      Stage stage(context, "place points");
+      parallel_blocks(blocks, context, [&](std::size_t b) { place_points(static_cast<std::int32_t>(b), mesh); });
+    }
+    Stage stage(context, "connect");
+    parallel_blocks(blocks, context, [&](std::size_t b) { connect(static_cast<std::int32_t>(b), mesh); });
+    return mesh;
+  }
+
+ private:
+  struct Location {
+    std::int32_t block;
+    int sample;
+  };
+  Location locate(std::int32_t block, int x, int y, int z) const {
+    const std::int32_t there = grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
+    return {there, sample_index(x & 7, y & 7, z & 7)};
+  }
+
+  /// A cell is active if any of its twelve edges is crossed.
+  std::uint64_t find_active_cells(std::int32_t b) {
+    static constexpr BlockMask kNone{};
+    const HermiteBlock& block = grid_.blocks()[b];
+    BlockOutput& output = outputs_[b];
+    for (int axis = 0; axis < 3; ++axis)
+      for (int step = 0; step < 4; ++step) {
+        int d[3] = {0, 0, 0};
+        d[(axis + 1) % 3] = step & 1;
+        d[(axis + 2) % 3] = step >> 1;
+        const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
+          const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
+          return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
+        });
+        for (int word = 0; word < 8; ++word) output.active[word] |= shifted[word];
+      }
+    std::uint32_t before = 0;
+    for (int word = 0; word < 8; ++word) {
+      output.rank[word] = before;
+      before += static_cast<std::uint32_t>(std::popcount(output.active[word]));
+    }
+    return before;
+  }
+
+  Qef gather(std::int32_t b, const int (&cell)[3], const Eigen::Vector3d& corner) const {
+    Qef qef(corner + Eigen::Vector3d::Constant(0.5));
+    for (int axis = 0; axis < 3; ++axis)
+      for (int step = 0; step < 4; ++step) {
+        int d[3] = {0, 0, 0};
+        d[(axis + 1) % 3] = step & 1;
+        d[(axis + 2) % 3] = step >> 1;
+        const Location at = locate(b, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
+        if (at.block < 0) continue;
+        const HermiteVoxel& voxel = grid_.blocks()[at.block].voxels[at.sample];
+        if (!voxel.crosses(axis)) continue;
+        Eigen::Vector3d point = corner + Eigen::Vector3d(d[0], d[1], d[2]);
+        point[axis] += voxel.offset[axis];
+        const auto& n = voxel.normal[axis];
+        qef.add_plane(point, Eigen::Vector3d(n[0], n[1], n[2]));
+      }
+    return qef;
+  }
+
+  void place_points(std::int32_t b, PolygonMesh& mesh) {
+    const HermiteBlock& block = grid_.blocks()[b];
+    const IndexToWorld& placement = grid_.placement();
+    const Eigen::Vector3d lower(block.lower[0] - placement.base[0], block.lower[1] - placement.base[1],
+                                block.lower[2] - placement.base[2]);
+    for_each_bit(outputs_[b].active, [&](int sample) {
+      const int cell[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+      const Eigen::Vector3d corner = lower + Eigen::Vector3d(cell[0], cell[1], cell[2]);
+      const Qef qef = gather(b, cell, corner);
+      const std::uint32_t point = outputs_[b].point_in(sample);
+      positions_[point] = place(qef, corner);
+      mesh.points[point] = placement.local(positions_[point]).cast<float>();
+    });
+  }
+
+  Eigen::Vector3d place(const Qef& qef, const Eigen::Vector3d& corner) const {
+    if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
+    if (!options_.confine) return qef.minimiser(options_.truncation);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
+    return qef.minimiser_within(corner + margin, corner + Eigen::Vector3d::Ones() - margin, options_.truncation);
+  }
+
+  void connect(std::int32_t b, PolygonMesh& mesh) const {
+    const HermiteBlock& block = grid_.blocks()[b];
+    const IndexToWorld& placement = grid_.placement();
+    Quad* next = mesh.quads.data() + outputs_[b].first_quad;
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(block.crossing[axis], [&](int sample) {
+        const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise seen along the axis
+        Quad quad;
+        for (int i = 0; i < 4; ++i) {
+          int cell[3] = {at[0], at[1], at[2]};
+          cell[u] += kAround[i][0];
+          cell[v] += kAround[i][1];
+          const Location there = locate(b, cell[0], cell[1], cell[2]);
+          quad[i] = outputs_[there.block].point_in(there.sample);
+        }
+        const HermiteVoxel& voxel = block.voxels[sample];
+        Eigen::Vector3d hit;
+        for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
+        hit[axis] += voxel.offset[axis];
+        if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
+        if (voxel.inside == placement.mirrors()) std::swap(quad[1], quad[3]);
+        *next++ = quad;
+      });
+  }
+
+  /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.
+  double height(const Quad& quad, std::array<int, 3> corners, const Eigen::Vector3d& hit, int axis) const {
+    const Eigen::Vector3d a = positions_[quad[corners[0]]] - hit;
+    const Eigen::Vector3d normal = (positions_[quad[corners[1]]] - hit - a).cross(positions_[quad[corners[2]]] - hit - a);
+    return normal.dot(a) / normal[axis];
+  }
+
+  /// The split must follow a crease. The crossing itself lies on the true surface, so the diagonal is right whose surface
+  /// passes nearer to it; where both do, the shorter one makes the better triangles.
+  bool second_diagonal_is_better(const Quad& quad, const Eigen::Vector3d& hit, int axis) const {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto left_of = [&](int i, int j) {
+      const Eigen::Vector3d a = positions_[quad[i]] - hit, c = positions_[quad[j]] - hit;
+      return a[u] * c[v] - a[v] * c[u] > 0;
+    };
+    const double first = height(quad, left_of(0, 2) ? std::array{0, 2, 3} : std::array{0, 1, 2}, hit, axis);
+    const double second = height(quad, left_of(1, 3) ? std::array{1, 3, 0} : std::array{1, 2, 3}, hit, axis);
+    constexpr double kAlike = 1e-4;  // voxels
+    const double difference = std::abs(first) - std::abs(second);
+    if (std::abs(difference) > kAlike) return difference > 0;
+    const double d02 = (positions_[quad[0]] - positions_[quad[2]]).squaredNorm();
+    const double d13 = (positions_[quad[1]] - positions_[quad[3]]).squaredNorm();
+    return d13 < d02;
+  }
+
+  const HermiteGrid& grid_;
+  const DualContouringOptions options_;
+  std::vector<BlockOutput> outputs_;
+  std::vector<Eigen::Vector3d> positions_;  ///< index space, relative to the placement's base
+};
+
+}  // namespace
+
+PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options, RunContext& context) {
+  return Contourer(grid, options).run(context);
+}
+
+PolygonMesh dual_contouring(const ExtractionInput& input) {
+  RunContext& context = input.context;
+  const BlockGrid grid = [&] {
+    Stage stage(context, "read signs");
+    return BlockGrid(input.level_set, input.isovalue, context);
+  }();
+  DualContouringOptions options;
+  if (input.options.text("placement") == "average") options.placement = DualContouringOptions::Placement::average;
+  options.truncation = input.options.number("truncation");
+  options.confine = input.options.text("confine") == "yes";
+
+  const std::string& source = input.options.text("hermite");
+  const bool exact = source == "exact" || (source == "auto" && input.source);
+  if (exact && !input.source)
+    throw Error("dual-contouring was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
+                "-o hermite=level-set");
+  if (!exact) return dual_contouring(sample_level_set(grid, context), options, context);
+  PolygonSampling sampling;
+  const HermiteGrid hermite = sample_polygons(grid, *input.source, context, &sampling);
+  if (sampling.fallback > 0)
+    context.note(std::to_string(sampling.fallback) + " of " + std::to_string(sampling.exact + sampling.fallback) +
+                 " crossing edges hit no polygon; there the level set gave the Hermite data");
+  return dual_contouring(hermite, options, context);
+}
+
+std::vector<OptionSpec> dual_contouring_options() {
+  return {
+      {"placement", "optimal", "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the mean of its crossings", {"optimal", "average"}},
+      {"hermite", "auto", "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the polygons are at hand", {"auto", "exact", "level-set"}},
+      {"truncation", "0.1", "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features", {}, 0.0, 1.0},
+      {"confine", "yes", "'yes' keeps each point inside its cell; 'no' lets the minimiser leave it, which may fold the surface", {"yes", "no"}}};
+}
+
+}  // namespace hermesh

@@ -1,0 +1,76 @@
+#include "algorithms/extraction/dual_contouring/qef.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace hermesh {
+
+void Qef::add_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& unit_normal) {
+  const Eigen::Vector3d local = point - anchor_;
+  const double distance = unit_normal.dot(local);
+  ata_ += unit_normal * unit_normal.transpose();
+  atb_ += distance * unit_normal;
+  btb_ += distance * distance;
+  sum_ += local;
+  ++planes_;
+}
+
+double Qef::error(const Eigen::Vector3d& x) const {
+  const Eigen::Vector3d local = x - anchor_;
+  return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
+}
+
+Eigen::Vector3d Qef::minimiser(double truncation) const {
+  const Eigen::Vector3d mass = sum_ / planes_;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
+  const Eigen::Vector3d& values = solver.eigenvalues();  // squares of the singular values of A, ascending
+  const Eigen::Vector3d residual = solver.eigenvectors().transpose() * (atb_ - ata_ * mass);
+  Eigen::Vector3d step = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (values[i] > truncation * truncation * values[2] && values[i] > 0)
+      step += (residual[i] / values[i]) * solver.eigenvectors().col(i);
+  return anchor_ + mass + step;
+}
+
+Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
+                                      double truncation) const {
+  const Eigen::Vector3d free = minimiser(truncation);
+  if ((free.array() >= lower.array()).all() && (free.array() <= upper.array()).all()) return free;
+
+  // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved for.
+  const Eigen::Vector3d low = lower - anchor_, high = upper - anchor_;
+  const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
+  Eigen::Vector3d best = mass;
+  double best_error = error(anchor_ + mass);
+  for (int choice = 1; choice < 27; ++choice) {
+    const int held[3] = {choice % 3, choice / 3 % 3, choice / 9};  // 0 free, 1 at lower, 2 at upper
+    Eigen::Vector3d x = mass;
+    int axes[3], count = 0;
+    for (int a = 0; a < 3; ++a) {
+      if (held[a] == 0) axes[count++] = a;
+      if (held[a] != 0) x[a] = held[a] == 1 ? low[a] : high[a];
+    }
+    if (count > 0) {
+      Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 2, 2> reduced(count, count);
+      Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 2, 1> residual(count);
+      const Eigen::Vector3d slope = atb_ - ata_ * x;
+      for (int i = 0; i < count; ++i) {
+        residual[i] = slope[axes[i]];
+        for (int j = 0; j < count; ++j) reduced(i, j) = ata_(axes[i], axes[j]);
+      }
+      const Eigen::SelfAdjointEigenSolver<decltype(reduced)> solver(reduced);
+      const double largest = solver.eigenvalues()[count - 1];
+      for (int k = 0; k < count; ++k) {
+        if (!(solver.eigenvalues()[k] > truncation * truncation * largest) || !(solver.eigenvalues()[k] > 0)) continue;
+        const double along = solver.eigenvectors().col(k).dot(residual) / solver.eigenvalues()[k];
+        for (int i = 0; i < count; ++i) x[axes[i]] += along * solver.eigenvectors()(i, k);
+      }
+    }
+    if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) continue;
+    const double candidate = error(anchor_ + x);
+    if (candidate < best_error) best = x, best_error = candidate;
+  }
+  return anchor_ + best;
+}
+
+}  // namespace hermesh

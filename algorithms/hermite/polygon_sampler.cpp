@@ -1,0 +1,225 @@
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <unordered_map>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+/// A point this close to a triangle's border or to an edge's end, in voxels, counts as on it, so that no line slips
+/// through between two triangles and no hit between two edges.
+constexpr double kTolerance = 1e-7;
+
+struct IndexTriangle {
+  Eigen::Vector3d corner[3];  ///< index coordinates relative to the placement's base
+  Eigen::Vector3d normal;     ///< unit length
+};
+
+using Key = std::array<std::int32_t, 3>;
+struct KeyHash {
+  std::size_t operator()(const Key& k) const {
+    const auto mix = [](std::uint64_t v) { return (v ^ (v >> 31)) * 0x9e3779b97f4a7c15u; };
+    return mix(mix(mix(static_cast<std::uint32_t>(k[0])) + static_cast<std::uint32_t>(k[1])) +
+               static_cast<std::uint32_t>(k[2]));
+  }
+};
+
+std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexToWorld& placement) {
+  const Eigen::Matrix3d inverse = placement.linear.inverse();
+  const Eigen::Vector3d shift = mesh.origin - placement.origin - placement.offset;
+  const std::vector<Triangle> triangles = triangulated(mesh);
+  std::vector<IndexTriangle> result(triangles.size());
+  double volume = 0.0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    IndexTriangle& t = result[i];
+    for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
+    t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
+    volume += t.corner[0].dot(t.normal);
+    const double length = t.normal.norm();
+    if (length > 0) t.normal /= length;
+  }
+  // An object wound inside out has its normals turned, so that they can tell an entry from an exit.
+  if (volume < 0)
+    for (IndexTriangle& t : result) t.normal = -t.normal;
+  return result;
+}
+
+/// For each block the triangles whose box touches the edges that it owns: block b's are list[first[b]] … .
+struct TriangleBins {
+  std::vector<std::uint64_t> first;
+  std::vector<std::uint32_t> list;
+};
+
+TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const HermiteGrid& grid, RunContext& context) {
+  const std::vector<HermiteBlock>& blocks = grid.blocks();
+  const auto& base = grid.placement().base;
+  std::unordered_map<Key, std::uint32_t, KeyHash> index;
+  index.reserve(blocks.size());
+  Key lowest{}, highest{};
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    Key key;
+    for (int a = 0; a < 3; ++a) {
+      key[a] = (blocks[b].lower[a] - base[a]) >> 3;
+      lowest[a] = b == 0 ? key[a] : std::min(lowest[a], key[a]);
+      highest[a] = b == 0 ? key[a] : std::max(highest[a], key[a]);
+    }
+    index.emplace(key, static_cast<std::uint32_t>(b));
+  }
+  constexpr std::size_t kChunk = 4096;
+  const std::size_t chunks = (triangles.size() + kChunk - 1) / kChunk;
+  std::vector<std::vector<std::array<std::uint32_t, 2>>> found(chunks);
+  parallel_blocks(chunks, context, [&](std::size_t chunk) {
+    const std::size_t end = std::min(triangles.size(), (chunk + 1) * kChunk);
+    for (std::size_t t = chunk * kChunk; t < end; ++t) {
+      const auto& c = triangles[t].corner;
+      Key from, to;
+      for (int a = 0; a < 3; ++a) {
+        const double lower = std::min({c[0][a], c[1][a], c[2][a]}) - kTolerance;
+        const double upper = std::max({c[0][a], c[1][a], c[2][a]}) + kTolerance;
+        from[a] = static_cast<std::int32_t>(std::clamp(std::floor(lower / 8 - 1), -1e9, 1e9));
+        to[a] = static_cast<std::int32_t>(std::clamp(std::floor(upper / 8), -1e9, 1e9));
+        from[a] = std::max(from[a], lowest[a]);
+        to[a] = std::min(to[a], highest[a]);
+      }
+      const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kTolerance);
+      for (int x = from[0]; x <= to[0]; ++x)
+        for (int y = from[1]; y <= to[1]; ++y)
+          for (int z = from[2]; z <= to[2]; ++z) {
+            const Eigen::Vector3d centre = Eigen::Vector3d(x, y, z) * 8.0 + Eigen::Vector3d::Constant(4.0);
+            if (std::abs(triangles[t].normal.dot(centre - c[0])) > extent) continue;
+            const auto at = index.find({x, y, z});
+            if (at != index.end()) found[chunk].push_back({at->second, static_cast<std::uint32_t>(t)});
+          }
+    }
+  });
+  TriangleBins bins;
+  bins.first.assign(blocks.size() + 1, 0);
+  for (const auto& pairs : found)
+    for (const auto& pair : pairs) ++bins.first[pair[0]];
+  std::uint64_t total = 0;
+  for (std::uint64_t& count : bins.first) total += std::exchange(count, total);
+  bins.list.resize(total);
+  std::vector<std::uint64_t> next = bins.first;
+  for (const auto& pairs : found)
+    for (const auto& pair : pairs) bins.list[next[pair[0]]++] = pair[1];
+  return bins;
+}
+
+/// Chooses among the hits of one block's crossing edges.
+class BlockHits {
+ public:
+  BlockHits(const HermiteBlock& block, const std::array<std::int32_t, 3>& base) : block_(block) {
+    for (int a = 0; a < 3; ++a) lower_[a] = block.lower[a] - base[a];
+  }
+
+  /// Intersects one triangle with the block's edges along one axis.
+  void add(const IndexTriangle& triangle, int axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto& c = triangle.corner;
+    const auto range = [&](int a, int limit) {
+      const double low = std::min({c[0][a], c[1][a], c[2][a]}) - lower_[a] - kTolerance;
+      const double high = std::max({c[0][a], c[1][a], c[2][a]}) - lower_[a] + kTolerance;
+      return std::array<int, 2>{static_cast<int>(std::ceil(std::clamp(low, 0.0, 100.0))),
+                                static_cast<int>(std::floor(std::clamp(high, -1.0, double(limit))))};
+    };
+    const auto [u0, u1] = range(u, 7);
+    const auto [v0, v1] = range(v, 7);
+    const auto side = [&](int i, int j, double pu, double pv) {
+      return (c[i][u] - pu) * (c[j][v] - pv) - (c[i][v] - pv) * (c[j][u] - pu);
+    };
+    for (int pu = u0; pu <= u1; ++pu)
+      for (int pv = v0; pv <= v1; ++pv) {
+        const double x = lower_[u] + pu, y = lower_[v] + pv;
+        const double w[3] = {side(1, 2, x, y), side(2, 0, x, y), side(0, 1, x, y)};
+        const double area = w[0] + w[1] + w[2];
+        if (area == 0) continue;
+        if (std::min({w[0] / area, w[1] / area, w[2] / area}) < -kTolerance) continue;
+        const double hit = (w[0] * c[0][axis] + w[1] * c[1][axis] + w[2] * c[2][axis]) / area - lower_[axis];
+        offer(axis, u, v, pu, pv, hit, triangle.normal);
+      }
+  }
+
+  void write(PolygonSampling& sampling) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(block_.crossing[axis], [&](int sample) {
+        const Best& best = best_[axis][sample];
+        if (best.hits == 0) {
+          ++sampling.fallback;
+          return;
+        }
+        ++sampling.exact;
+        if (best.hits > 1) ++sampling.ambiguous;
+        HermiteVoxel& voxel = block_.voxels[sample];
+        const double turn = best.consistent ? 1.0 : -1.0;
+        voxel.offset[axis] = static_cast<float>(best.offset);
+        for (int a = 0; a < 3; ++a) voxel.normal[axis][a] = static_cast<float>(turn * best.normal[a]);
+      });
+  }
+
+ private:
+  struct Best {
+    double offset = 0.0, away = 0.0;
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    bool consistent = false;
+    int hits = 0;  ///< at different places
+  };
+
+  void offer(int axis, int u, int v, int pu, int pv, double hit, const Eigen::Vector3d& normal) {
+    if (!(hit >= -kTolerance && hit <= 8.0 + kTolerance)) return;
+    const int middle = static_cast<int>(std::floor(hit));
+    for (int k = std::max(0, middle - 1); k <= std::min(7, middle + 1); ++k) {
+      const double offset = hit - k;
+      if (offset < -kTolerance || offset > 1.0 + kTolerance) continue;
+      int local[3];
+      local[axis] = k, local[u] = pu, local[v] = pv;
+      const int sample = sample_index(local[0], local[1], local[2]);
+      if (!test(block_.crossing[axis], sample)) continue;
+      const HermiteVoxel& voxel = block_.voxels[sample];
+      Best& best = best_[axis][sample];
+      const bool consistent = (normal[axis] > 0) == voxel.inside;
+      const double away = std::abs(offset - voxel.offset[axis]);
+      const bool first = best.hits == 0;
+      if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
+      const bool better = consistent != best.consistent ? consistent : away < best.away;
+      if (first || better) best = {std::clamp(offset, 0.0, 1.0), away, normal, consistent, best.hits};
+    }
+  }
+
+  const HermiteBlock& block_;
+  std::array<double, 3> lower_{};
+  std::array<std::array<Best, 512>, 3> best_{};
+};
+
+}  // namespace
+
+HermiteGrid sample_polygons(const BlockGrid& grid, const PolygonMesh& mesh, RunContext& context,
+                            PolygonSampling* sampling) {
+  HermiteGrid result = sample_level_set(grid, context);
+  Stage stage(context, "Hermite data from the polygons");
+  const std::vector<IndexTriangle> triangles = to_index_space(mesh, result.placement());
+  const TriangleBins bins = bin_triangles(triangles, result, context);
+  const std::vector<HermiteBlock>& blocks = result.blocks();
+  std::vector<PolygonSampling> counts(blocks.size());
+  parallel_blocks(blocks.size(), context, [&](std::size_t b) {
+    const auto hits = std::make_unique<BlockHits>(blocks[b], result.placement().base);
+    for (std::uint64_t i = bins.first[b]; i < bins.first[b + 1]; ++i)
+      for (int axis = 0; axis < 3; ++axis) hits->add(triangles[bins.list[i]], axis);
+    hits->write(counts[b]);
+  });
+  if (sampling) {
+    *sampling = {};
+    for (const PolygonSampling& c : counts) {
+      sampling->exact += c.exact;
+      sampling->fallback += c.fallback;
+      sampling->ambiguous += c.ambiguous;
+    }
+  }
+  return result;
+}
+
+}  // namespace hermesh
