@@ -1,0 +1,102 @@
+#include "algorithms/core/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+#include <set>
+#include <string>
+#include <system_error>
+
+#include "algorithms/core/error.h"
+
+namespace hermesh {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The open temporary files of this process. Held for instants only, so that a thread that is about to end
+/// the process gets it even while another one is deep in its work.
+struct Unfinished {
+  std::timed_mutex mutex;
+  std::set<std::string> paths;
+};
+
+/// Never destroyed: the thread that ends the process may run while static objects are being taken down.
+Unfinished& unfinished() {
+  static Unfinished* const files = new Unfinished;
+  return *files;
+}
+
+/// Hidden, in the same folder (a rename does not cross file systems), and with the same ending, which some
+/// libraries choose their format by.
+fs::path temporary_name(const fs::path& target) {
+  static std::atomic<unsigned> counter = 0;
+  const std::string name = target.filename().string();
+  const std::string tail = name.substr(name.size() - std::min<std::size_t>(name.size(), 100));
+  return target.parent_path() /
+         (".hermesh-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + tail);
+}
+
+/// What to write instead of `target`: through a link to the file itself, which a rename would otherwise leave
+/// behind.
+fs::path checked_target(const fs::path& target) {
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (!target.has_filename() || fs::is_directory(status))
+    throw Error("cannot write '" + target.string() + "': it is a folder; name a file in it");
+  if (!fs::exists(status)) return target;
+  // Renaming over a device would replace the device.
+  if (!fs::is_regular_file(status))
+    throw Error("cannot write '" + target.string() + "': it is not a regular file");
+  const fs::path real = fs::canonical(target, error);
+  return error ? target : real;
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(fs::path target)
+    : target_(checked_target(target)), temporary_(temporary_name(target_)) {
+  const std::lock_guard lock(unfinished().mutex);
+  unfinished().paths.insert(temporary_.string());
+  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file >= 0) {
+    ::close(file);
+    return;
+  }
+  const std::string reason = std::strerror(errno);
+  unfinished().paths.erase(temporary_.string());
+  throw Error("cannot write '" + target.string() + "': " + reason);
+}
+
+AtomicFile::~AtomicFile() {
+  if (committed_) return;
+  const std::lock_guard lock(unfinished().mutex);
+  ::unlink(temporary_.c_str());
+  unfinished().paths.erase(temporary_.string());
+}
+
+void AtomicFile::commit() {
+  const std::lock_guard lock(unfinished().mutex);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0)
+    throw Error("cannot write '" + target_.string() + "': " + std::strerror(errno));
+  unfinished().paths.erase(temporary_.string());
+  committed_ = true;
+}
+
+void remove_unfinished_files() noexcept {
+  // The exceptions of a lock that cannot be had are of no use to a process that is ending.
+  try {
+    const std::unique_lock lock(unfinished().mutex, std::chrono::seconds(1));
+    if (!lock.owns_lock()) return;
+    for (const std::string& path : unfinished().paths) ::unlink(path.c_str());
+  } catch (...) {
+  }
+}
+
+}  // namespace hermesh

@@ -1,0 +1,231 @@
+#include "algorithms/core/mesh_file.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "algorithms/core/mesh_file_formats.h"
+
+namespace hermesh {
+
+namespace mesh_formats {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> extensions = {".ply", ".obj", ".off", ".stl"};
+constexpr std::array<std::string_view, 4> names = {"PLY", "OBJ", "OFF", "STL"};
+
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// First word that is not in a comment.
+std::string_view first_word(std::string_view bytes) {
+  TextCursor cursor(bytes, "");
+  for (cursor.skip_space(); cursor.peek() == '#'; cursor.skip_space()) cursor.rest_of_line();
+  return cursor.word();
+}
+
+/// The format that the content shows for certain, whatever the file is called.
+std::optional<Format> format_of_content(std::string_view bytes) {
+  if (is_binary_stl(bytes)) return Format::stl;
+  if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return Format::ply;
+  const std::string_view word = first_word(bytes);
+  if (is_off_keyword(word)) return Format::off;
+  if (lower(std::string(word)) == "solid") return Format::stl;
+  for (const char* keyword : {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"})
+    if (word == keyword) return Format::obj;
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view name_of(Format format) { return names[static_cast<std::size_t>(format)]; }
+
+std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
+  std::filesystem::path name = path.filename();
+  const bool gzipped = lower(name.extension().string()) == ".gz";
+  if (gzipped) name = name.stem();
+  const auto found = std::ranges::find(extensions, lower(name.extension().string()));
+  if (found == extensions.end()) return std::nullopt;
+  return MeshPath{static_cast<Format>(found - extensions.begin()), gzipped};
+}
+
+void throw_unknown_extension(const std::filesystem::path& path) {
+  throw Error(in_quotes(path.string()) +
+              " is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
+}
+
+void TextCursor::fail(const std::string& what) const {
+  const std::string line = std::to_string(1 + std::count(begin_, at_, '\n'));
+  throw Error(in_quotes(file_) + ", line " + line + ": " + what);
+}
+
+void TextCursor::fail_number(const char* what) {
+  if (at_end()) fail(std::string("the file is truncated: it ends where ") + what + " should be");
+  if (at_line_end()) fail(std::string("the line ends where ") + what + " should be");
+  const TextCursor here = *this;
+  std::string found(word().substr(0, 40));
+  for (char& c : found)
+    if (c < ' ' || c > '~') c = '?';
+  here.fail(in_quotes(found) + " is not " + what);
+}
+
+std::size_t PointMerger::slot_of(const Eigen::Vector3d& point) const {
+  std::uint64_t hash = 0;
+  for (const double x : point) {
+    // The finaliser of splitmix64 (Steele, Lea & Flood 2014): every bit of a coordinate reaches every bit of
+    // the hash.
+    hash += std::bit_cast<std::uint64_t>(x) + 0x9e3779b97f4a7c15u;
+    hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
+    hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
+    hash ^= hash >> 31;
+  }
+  std::size_t slot = hash & (slots_.size() - 1);
+  while (slots_[slot] != 0 && points_[slots_[slot] - 1] != point) slot = (slot + 1) & (slots_.size() - 1);
+  return slot;
+}
+
+void PointMerger::grow() {
+  slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    slots_[slot_of(points_[i])] = static_cast<std::uint32_t>(i + 1);
+}
+
+std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
+  if (2 * points_.size() >= slots_.size()) grow();
+  const Eigen::Vector3d canonical = point.array() + 0.0;  // makes -0 to 0
+  const std::size_t slot = slot_of(canonical);
+  if (slots_[slot] == 0) {
+    points_.push_back(canonical);
+    slots_[slot] = static_cast<std::uint32_t>(points_.size());
+  }
+  return slots_[slot] - 1;
+}
+
+void MeshBuilder::fail_index(std::size_t polygon, std::int64_t corner) const {
+  fail("polygon " + std::to_string(polygon) + " refers to point " + std::to_string(corner) +
+       ", but there are " + std::to_string(mesh.points.size()) + " points (both count from 0)");
+}
+
+void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
+  const std::size_t polygon = polygons_++;
+  for (const std::int64_t corner : corners) {
+    if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
+    if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
+  }
+  const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(corners[i]); };
+  if (corners.size() < 3) {
+    ++dropped_;
+  } else if (corners.size() == 4) {
+    mesh.quads.push_back({at(0), at(1), at(2), at(3)});
+  } else {
+    for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
+  }
+}
+
+void MeshBuilder::add_comment(std::string_view text) {
+  TextCursor cursor(text, file_);
+  cursor.skip_space();
+  if (cursor.word() != "origin") return;
+  Eigen::Vector3d origin;
+  try {
+    for (double& x : origin) {
+      cursor.skip_space();
+      x = cursor.number<double>("a number");
+    }
+  } catch (const Error&) {
+    return;  // somebody else's comment that happens to begin with the same word
+  }
+  cursor.skip_space();
+  if (cursor.at_end() && origin.allFinite()) mesh.origin = origin;
+}
+
+MeshFile MeshBuilder::finish() {
+  if (mesh.points.size() > 0xffffffff) fail("it has more than 2^32 points");
+  if (largest_ >= static_cast<std::int64_t>(mesh.points.size())) fail_index(polygon_of_largest_, largest_);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    if (!mesh.points[i].allFinite())
+      fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
+  if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
+  if (dropped_ > 0)
+    context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
+                  " polygons with fewer than three corners were dropped");
+  return std::move(mesh);
+}
+
+MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context) {
+  const std::optional<Format> content = format_of_content(bytes);
+  const std::string is_named =
+      in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
+  if (content && *content != named) throw Error(is_named + " but holds " + std::string(name_of(*content)));
+  // An OBJ file may begin with any of dozens of words, and a damaged binary STL file with any byte.
+  if (!content && (named == Format::ply || named == Format::off))
+    throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
+  MeshBuilder builder(file, context);
+  switch (named) {
+    case Format::ply:
+      read_ply(bytes, builder);
+      break;
+    case Format::obj:
+      read_obj(bytes, builder);
+      break;
+    case Format::off:
+      read_off(bytes, builder);
+      break;
+    case Format::stl:
+      read_stl(bytes, builder);
+      break;
+  }
+  return builder.finish();
+}
+
+}  // namespace mesh_formats
+
+bool is_mesh_path(const std::filesystem::path& path) {
+  return mesh_formats::parse_mesh_path(path).has_value();
+}
+
+MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context) {
+  const Stage stage(context, "read");
+  const std::optional<mesh_formats::MeshPath> named = mesh_formats::parse_mesh_path(path);
+  if (!named && std::filesystem::is_regular_file(path)) mesh_formats::throw_unknown_extension(path);
+  const std::string bytes = mesh_formats::load_bytes(path, context);
+  return mesh_formats::parse_mesh(bytes, named->format, path.string(), context);
+}
+
+PolygonMesh to_polygon_mesh(const MeshFile& file) {
+  Bounds box;
+  for (const Triangle& triangle : file.triangles)
+    for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
+  for (const Quad& quad : file.quads)
+    for (const std::uint32_t corner : quad) box.add(file.points[corner]);
+  PolygonMesh mesh;
+  mesh.origin = file.origin ? *file.origin : choose_origin(box);
+  mesh.triangles = file.triangles;
+  mesh.quads = file.quads;
+  mesh.points.reserve(file.points.size());
+  for (const Eigen::Vector3d& point : file.points) {
+    const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();
+    if (!relative.allFinite())
+      throw Error("the mesh has coordinates that are too large for single precision; scale it down");
+    mesh.points.push_back(relative);
+  }
+  return mesh;
+}
+
+MeshFile to_mesh_file(const PolygonMesh& mesh) {
+  MeshFile file;
+  file.points.reserve(mesh.points.size());
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) file.points.push_back(mesh.world(i));
+  file.triangles = mesh.triangles;
+  file.quads = mesh.quads;
+  // Left out where a reader would choose the same origin by itself.
+  if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
+    file.origin = mesh.origin;
+  return file;
+}
+
+}  // namespace hermesh

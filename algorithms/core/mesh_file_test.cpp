@@ -1,0 +1,607 @@
+#include "algorithms/core/mesh_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <clocale>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "algorithms/core/atomic_file.h"
+#include "algorithms/core/mesh_file_formats.h"
+
+namespace hermesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MeshFileTest : public testing::Test {
+ protected:
+  MeshFileTest() {
+    std::string pattern = (fs::temp_directory_path() / "hermesh-test-XXXXXX").string();
+    folder = mkdtemp(pattern.data());
+  }
+  ~MeshFileTest() override { fs::remove_all(folder); }
+
+  fs::path write(const std::string& name, const std::string& bytes) const {
+    std::ofstream(folder / name, std::ios::binary) << bytes;
+    return folder / name;
+  }
+  std::string bytes_of(const fs::path& path) const {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+  }
+  /// Without a file, unless it is gzipped.
+  MeshFile read(const std::string& name, const std::string& bytes) {
+    const std::optional<mesh_formats::MeshPath> path = mesh_formats::parse_mesh_path(name);
+    if (!path || path->gzipped || bytes.empty()) return read_mesh_file(write(name, bytes), context);
+    return mesh_formats::parse_mesh(bytes, path->format, name, context);
+  }
+  /// What the call throws, without the folder; empty if it succeeds.
+  template <class Call>
+  std::string error_in(Call call) const {
+    try {
+      call();
+    } catch (const Error& error) {
+      std::string text = error.what();
+      const std::size_t at = text.find(folder.string() + "/");
+      return at == std::string::npos ? text : text.erase(at, folder.string().size() + 1);
+    }
+    return "";
+  }
+  std::string error_of_path(const fs::path& path) {
+    return error_in([&] { read_mesh_file(path, context); });
+  }
+  std::string error_of(const std::string& name, const std::string& bytes) {
+    return error_in([&] { read(name, bytes); });
+  }
+  std::string write_error_to(const fs::path& path, const PolygonMesh& mesh) {
+    return error_in([&] { write_mesh(path, mesh, context); });
+  }
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder))
+      names.push_back(entry.path().filename().string());
+    return names;
+  }
+
+  fs::path folder;
+  RunContext context;
+};
+
+const std::vector<Eigen::Vector3d> tetrahedron_points = {{0, 0, 0}, {1, 0, 0}, {0, 1.5, 0}, {0, 0, -2.25}};
+const std::vector<Triangle> tetrahedron_triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
+
+void expect_tetrahedron(const MeshFile& mesh) {
+  EXPECT_EQ(mesh.points, tetrahedron_points);
+  EXPECT_EQ(mesh.triangles, tetrahedron_triangles);
+  EXPECT_TRUE(mesh.quads.empty());
+}
+
+const std::string ascii_ply =
+    "ply\nformat ascii 1.0\ncomment a tetrahedron\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n";
+const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1.5 0\nv 0 0 -2.25\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
+const std::string off = "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n";
+
+/// Bytes of a number, first byte first in the order asked for.
+template <class T>
+std::string raw(T value, bool big_endian) {
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);  // of a little-endian machine
+  if (big_endian) std::reverse(bytes.begin(), bytes.end());
+  return bytes;
+}
+
+/// With an element before the points, properties of other types among them, and a list behind the corners.
+std::string binary_ply(bool big) {
+  std::string ply =
+      std::string("ply\nformat binary_") + (big ? "big" : "little") +
+      "_endian 1.0\nelement camera 1\nproperty list uchar double view\nproperty short id\n"
+      "element vertex 4\nproperty uchar red\nproperty double z\nproperty float y\nproperty int16 x\n"
+      "element face 4\nproperty list ushort uint vertex_index\nproperty list uint8 int8 flags\nend_header\n";
+  ply += raw<std::uint8_t>(2, big) + raw(1.0, big) + raw(2.0, big) + raw<std::int16_t>(-7, big);
+  for (const Eigen::Vector3d& p : tetrahedron_points)
+    ply += raw<std::uint8_t>(255, big) + raw(p.z(), big) + raw(static_cast<float>(p.y()), big) +
+           raw(static_cast<std::int16_t>(p.x()), big);
+  for (const Triangle& t : tetrahedron_triangles)
+    ply += raw<std::uint16_t>(3, big) + raw(t[0], big) + raw(t[1], big) + raw(t[2], big) +
+           raw<std::uint8_t>(1, big) + "x";
+  return ply;
+}
+
+std::string text_stl(const std::string& name = "part") {
+  std::ostringstream text;
+  text << "solid " << name << "\n";
+  for (const Triangle& t : tetrahedron_triangles) {
+    text << " facet normal nan 0 0\n  outer loop\n";
+    for (const auto i : t) text << "   vertex " << tetrahedron_points[i].transpose() << "\n";
+    text << "  endloop\n endfacet\n";
+  }
+  text << "endsolid " << name << "\n";
+  return text.str();
+}
+
+std::string binary_stl(std::string header) {
+  header.resize(80, '\0');
+  std::string bytes = header + raw<std::uint32_t>(4, false);
+  for (const Triangle& t : tetrahedron_triangles) {
+    bytes += std::string(12, '\0');
+    for (const auto i : t)
+      for (const double x : tetrahedron_points[i]) bytes += raw(static_cast<float>(x), false);
+    bytes += std::string(2, '\0');
+  }
+  return bytes;
+}
+
+TEST_F(MeshFileTest, ReadsPly) {
+  expect_tetrahedron(read("a.ply", ascii_ply));
+  expect_tetrahedron(read("b.PLY", binary_ply(false)));
+  expect_tetrahedron(read("c.ply", binary_ply(true)));
+  std::string windows;
+  for (const char c : ascii_ply) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  expect_tetrahedron(read("d.ply", windows));
+  EXPECT_TRUE(context.notes.empty());
+}
+
+TEST_F(MeshFileTest, AsciiPlyFloatsAreRoundedAsDeclared) {
+  std::string text = ascii_ply;
+  text.replace(text.find("1 0 0"), 5, "0.1 0 0");
+  EXPECT_EQ(read("a.ply", text).points[1].x(), double(0.1f));
+  text.replace(text.find("float"), 5, "double");
+  EXPECT_EQ(read("a.ply", text).points[1].x(), 0.1);
+}
+
+TEST_F(MeshFileTest, BinaryPlyKeepsADataByteThatLooksLikeALineEnd) {
+  const std::string header =
+      "ply\rformat binary_little_endian 1.0\relement vertex 3\rproperty uchar x\rproperty uchar y\rproperty "
+      "uchar z\r"
+      "element face 1\rproperty list uchar uchar vertex_indices\rend_header\r";
+  const MeshFile mesh =
+      read("a.ply", header + "\n\x01\x02\x03\x04\x05\x06\x07\x08" + std::string("\x03\0\x01\x02", 4));
+  EXPECT_EQ(mesh.points[0], Eigen::Vector3d(10, 1, 2));
+}
+
+TEST_F(MeshFileTest, ReadsObj) {
+  expect_tetrahedron(read("a.obj", obj));
+  expect_tetrahedron(read(
+      "b.obj",
+      "# made by hand \\\nmtllib a.mtl\no part\nv 0 0 0 1\nv +1 0e5 0.0 0.5 0.5 0.5\r\nv 0 1.5 0\n"
+      "vt 0 \\\n 0\nvn 0 0 1\ng one two\nv 0 0 \\\n -2.25\ns off\nusemtl red\nf 1 2 3\nf -4//1 -2//1 -1//1\n"
+      "f 1/1 4/1 \\\r\n 2/1\nf 2/1/1 4/1/1 3/1/1 # last\n"));
+}
+
+TEST_F(MeshFileTest, ObjMayReferToLaterPoints) {
+  EXPECT_EQ(read("a.obj", "f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0").triangles,
+            (std::vector<Triangle>{{0, 1, 2}}));
+}
+
+TEST_F(MeshFileTest, ReadsOff) {
+  expect_tetrahedron(read("a.off", off));
+  expect_tetrahedron(read("b.off",
+                          "# comment\nOFF 4 4 6\n\n0 0 0\n1 0 0 # one\n\n0 1.5 0\n# two\n0 0 -2.25\n"
+                          "3 0 1 2 255 0 0\n3 0 2 3\n3 0 3 1\n3 1 3 2 0.5 0.5 0.5"));
+  expect_tetrahedron(read("c.off",
+                          "COFF\n4 4\n0 0 0 1 1 1 1\n1 0 0 1 1 1 1\n0 1.5 0 1 1 1 1\n0 0 -2.25 1 1 1 1\n"
+                          "3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n"));
+  expect_tetrahedron(read("d.off",
+                          "NOFF\n4 4 0\n0 0 0 9 9 9\n1 0 0 9 9 9\n0 1.5 0 9 9 9\n0 0 -2.25 9 9 9\n"
+                          "3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n"));
+}
+
+TEST_F(MeshFileTest, ReadsStlAndSharesEqualPoints) {
+  expect_tetrahedron(read("a.stl", text_stl()));
+  expect_tetrahedron(read("b.stl", binary_stl("made by hand")));
+  expect_tetrahedron(read("c.stl", binary_stl("solid facet normal, says a liar")));
+  std::string shouting = text_stl();
+  for (char& c : shouting) c = static_cast<char>(std::toupper(c));
+  expect_tetrahedron(read("d.stl", shouting));
+  const MeshFile two = read("e.stl", text_stl("one") + "\n" + text_stl("two"));
+  EXPECT_EQ(two.points, tetrahedron_points);
+  EXPECT_EQ(two.triangles.size(), 8u);
+}
+
+TEST_F(MeshFileTest, StlTreatsMinusZeroAsZeroButNotNearlyEqualPoints) {
+  const MeshFile mesh =
+      read("a.stl",
+           "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+           "facet\nouter loop\nvertex -0 0 -0.0\nvertex 0 1 0\nvertex 1.0000001 0 0\nendloop\n"
+           "endfacet\nendsolid");
+  EXPECT_EQ(mesh.points.size(), 4u);
+  EXPECT_EQ(mesh.triangles[1], (Triangle{0, 2, 3}));
+  EXPECT_FALSE(std::signbit(mesh.points[0].z()));
+}
+
+TEST_F(MeshFileTest, PolygonsBecomeFansAndSliversOfTwoCornersGo) {
+  const MeshFile mesh = read(
+      "a.off", "OFF 6 4 0\n0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 2 0\n-1 1 0\n5 0 1 2 3 4\n4 0 1 2 3\n2 0 1\n1 4\n");
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+  EXPECT_EQ(mesh.quads, (std::vector<Quad>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.triangle_count(), 5u);
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_NE(context.notes[0].find("2 polygons with fewer than three corners"), std::string::npos);
+}
+
+TEST_F(MeshFileTest, NumbersDoNotDependOnTheLocale) {
+  const char* const set = std::setlocale(LC_ALL, "de_DE.UTF-8");
+  expect_tetrahedron(read("a.obj", obj));
+  EXPECT_NE(error_of("b.obj", "v 0,5 0 0\n"), "");
+  if (set) std::setlocale(LC_ALL, "C");
+}
+
+TEST_F(MeshFileTest, TinyNumbersAreNotTakenForHugeOnes) {
+  const MeshFile mesh = read("a.obj", "v 1e-400 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(mesh.points[0], Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(error_of("b.obj", "v 1e400 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            "'b.obj': point 0 (counting from 0) has a coordinate that is not a finite number");
+}
+
+/// A mesh with triangles and quads whose points are as the argument makes them.
+PolygonMesh random_mesh(std::uint32_t seed, const Eigen::Vector3d& origin, std::size_t count = 500) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(-0.5f, 0.5f);
+  PolygonMesh mesh;
+  mesh.origin = origin;
+  for (std::size_t i = 0; i < count; ++i) mesh.points.emplace_back(unit(random), unit(random), unit(random));
+  const auto corner = [&] { return static_cast<std::uint32_t>(random() % count); };
+  for (std::size_t i = 0; i < count; ++i) mesh.triangles.push_back({corner(), corner(), corner()});
+  for (std::size_t i = 0; i < count; ++i) mesh.quads.push_back({corner(), corner(), corner(), corner()});
+  return mesh;
+}
+
+TEST_F(MeshFileTest, RoundTripsKeepEveryBit) {
+  for (const Eigen::Vector3d& origin :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1e6, -1e6, 3), Eigen::Vector3d(0.5, 0, 0)}) {
+    // The smallest coordinates of the mesh are above 2^-30, so that the sums with these origins are exact.
+    PolygonMesh mesh = random_mesh(7, origin);
+    for (Eigen::Vector3f& point : mesh.points)
+      for (float& x : point) x = std::abs(x) < 1e-3f ? 0.25f : x;
+    for (const char* name : {"a.ply", "a.obj", "a.off", "b.ply.gz", "b.obj.gz", "b.off.gz"}) {
+      write_mesh(folder / name, mesh, context);
+      const MeshFile file = read_mesh_file(folder / name, context);
+      EXPECT_EQ(file.points, to_mesh_file(mesh).points) << name;
+      EXPECT_EQ(file.triangles, mesh.triangles) << name;
+      EXPECT_EQ(file.quads, mesh.quads) << name;
+      EXPECT_TRUE(to_polygon_mesh(file) == mesh) << name;
+    }
+  }
+  EXPECT_TRUE(context.notes.empty());
+}
+
+TEST_F(MeshFileTest, AnOriginThatTheReaderWouldNotChooseIsKeptToo) {
+  PolygonMesh mesh;  // far from the origin, yet relative to zero
+  mesh.points = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  write_mesh(folder / "a.ply", mesh, context);
+  EXPECT_TRUE(read_mesh(folder / "a.ply", context) == mesh);
+}
+
+TEST_F(MeshFileTest, PlyIsSinglePrecisionWhereThatLosesNothing) {
+  const PolygonMesh near = random_mesh(1, {0, 0, 0}), far = random_mesh(1, {1e6, 1e6, 1e6});
+  write_mesh(folder / "near.ply", near, context);
+  write_mesh(folder / "far.ply", far, context);
+  EXPECT_NE(bytes_of(folder / "near.ply").find("property float x"), std::string::npos);
+  EXPECT_NE(bytes_of(folder / "far.ply").find("property double x"), std::string::npos);
+}
+
+TEST_F(MeshFileTest, FilesAreReadRelativeToAnOriginNearTheirPoints) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "v 1000000.25 1000000 1000000\nv 1000001.0000001 1000000 1000000\nv 1000000 1000000.5 1000000\nf 1 "
+          "2 3\n";
+  const fs::path path = write("a.obj", text.str());
+  const PolygonMesh mesh = read_mesh(path, context);
+  EXPECT_LE(mesh.origin.cwiseAbs().maxCoeff(), 1000001.0);
+  EXPECT_LE((mesh.world(1) - Eigen::Vector3d(1000001.0000001, 1000000, 1000000)).norm(), 1e-7);
+}
+
+TEST_F(MeshFileTest, StlRoundTripKeepsSinglePrecisionPoints) {
+  const PolygonMesh mesh = random_mesh(3, {0, 0, 0});
+  for (const char* name : {"a.stl", "a.stl.gz"}) {
+    write_mesh(folder / name, mesh, context);
+    const MeshFile file = read_mesh_file(folder / name, context);
+    const std::vector<Triangle> triangles = triangulated(mesh);
+    ASSERT_EQ(file.triangles.size(), triangles.size());
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        ASSERT_EQ(file.points[file.triangles[i][k]], mesh.world(triangles[i][k]));
+  }
+}
+
+TEST_F(MeshFileTest, StlSaysWhatItLoses) {
+  PolygonMesh mesh;
+  mesh.origin = {1e6, 0, 0};
+  mesh.points = {{0, 0, 0}, {0.001f, 0, 0}, {1, 1, 0}, {0, 1, 0}, {9, 9, 9}};
+  mesh.quads = {{0, 1, 2, 3}};
+  write_mesh(folder / "a.stl", mesh, context);
+  ASSERT_EQ(context.notes.size(), 2u) << context.notes[0];
+  EXPECT_NE(context.notes[0].find("1 points moved, by at most 0.001, and 1 became equal"), std::string::npos)
+      << context.notes[0];
+  EXPECT_NE(context.notes[1].find("1 points that no polygon uses"), std::string::npos) << context.notes[1];
+}
+
+TEST_F(MeshFileTest, GzipMayHaveSeveralMembers) {
+  PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 10);
+  write_mesh(folder / "a.obj.gz", mesh, context);
+  const std::string member = bytes_of(folder / "a.obj.gz");
+  const MeshFile two = read("b.obj.gz", member + member);
+  EXPECT_EQ(two.points.size(), 20u);
+  EXPECT_EQ(two.quads.size(), 20u);
+  EXPECT_EQ(error_of("c.obj.gz", member + "tail"),
+            "'c.obj.gz' has bytes behind its gzip data; it is damaged");
+  EXPECT_EQ(error_of("d.obj.gz", member.substr(0, member.size() - 9)),
+            "'d.obj.gz' is truncated: its gzip data breaks off");
+  std::string damaged = member;
+  damaged[damaged.size() - 6] ^= 1;  // in the checksum
+  EXPECT_EQ(error_of("e.obj.gz", damaged), "'e.obj.gz' is damaged: its gzip data does not unpack");
+  EXPECT_EQ(error_of("f.obj.gz", obj), "'f.obj.gz' is named .gz but is not compressed by gzip");
+}
+
+TEST_F(MeshFileTest, RefusesWhatIsNoMeshFile) {
+  EXPECT_EQ(error_of_path(folder / "none.ply"), "'none.ply' cannot be read: there is no such file");
+  fs::create_directory(folder / "sub.ply");
+  EXPECT_EQ(error_of_path(folder / "sub.ply"), "'sub.ply' is a folder; name a mesh file in it");
+  EXPECT_EQ(error_of("empty.ply", ""), "'empty.ply' is empty");
+  EXPECT_EQ(
+      error_of("a.fbx", "x"),
+      "'a.fbx' is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
+  EXPECT_EQ(error_of("a.ply", obj), "'a.ply' is named .ply but holds OBJ");
+  EXPECT_EQ(error_of("a.obj", ascii_ply), "'a.obj' is named .obj but holds PLY");
+  EXPECT_EQ(error_of("a.stl", off), "'a.stl' is named .stl but holds OFF");
+  EXPECT_EQ(error_of("a.off", text_stl()), "'a.off' is named .off but holds STL");
+  EXPECT_EQ(error_of("b.off", "hello"), "'b.off' is named .off but does not begin like OFF");
+  EXPECT_EQ(error_of("b.obj", "hello\nworld\n"), "'b.obj': it holds no polygon");
+  EXPECT_EQ(error_of("b.stl", "hello\nworld\n"), "'b.stl', line 1: a word that is no keyword of an STL file");
+}
+
+TEST_F(MeshFileTest, RefusesWrongNumbersAndNamesTheLine) {
+  EXPECT_EQ(error_of("a.obj", "v 0 0 0\nv 1 x 0\n"), "'a.obj', line 2: 'x' is not a number");
+  EXPECT_EQ(error_of("b.obj", "v 0 0 0\nv 1 0\nv 0 1 0\n"),
+            "'b.obj', line 2: the line ends where a number should be");
+  EXPECT_EQ(error_of("c.obj", "v 0 0 0\nf 1 2 3z\n"),
+            "'c.obj', line 2: a corner of a polygon is not a number");
+  EXPECT_EQ(error_of("d.obj", "v 0 0 0\nf 1 0 1\n"),
+            "'d.obj', line 2: the points of an OBJ file count from 1, but a polygon refers to point 0");
+  EXPECT_EQ(error_of("e.obj", "v 0 0 0\n?? 1\n"), "'e.obj', line 2: '\?\?' is no keyword of an OBJ file");
+  EXPECT_EQ(error_of("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1.5.2\n3 0 1 2\n"),
+            "'a.off', line 5: '1.5.2' is not a number");
+  EXPECT_EQ(error_of("b.off", "OFF\nthree 1 0\n"), "'b.off', line 2: 'three' is not a count");
+  EXPECT_EQ(error_of("c.off", "4OFF\n3 1 0\n"),
+            "'c.off', line 1: 4OFF files are not read; only points with three coordinates are");
+  EXPECT_EQ(error_of("a.stl", "solid\nfacet\nouter loop\nvertex 0 0 zero\n"),
+            "'a.stl', line 4: 'zero' is not a number");
+  std::string ply = ascii_ply;
+  ply.replace(ply.find("3 0 2 3"), 7, "3 0 two");
+  EXPECT_EQ(error_of("a.ply", ply), "'a.ply', line 16: 'two' is not a whole number");
+  ply = ascii_ply;
+  ply.replace(ply.find("float y"), 5, "quux");
+  EXPECT_EQ(error_of("b.ply", ply), "'b.ply', line 6: 'quux' is no type of a PLY property");
+}
+
+TEST_F(MeshFileTest, RefusesIndicesOutOfRangeAndNamesThePolygon) {
+  const std::string out_of_range = "polygon 1 refers to point 9, but there are 4 points (both count from 0)";
+  for (auto [name, text] : {std::pair("a.ply", ascii_ply), std::pair("a.off", off)}) {
+    text.replace(text.find("3 0 2 3"), 7, "3 0 9 3");
+    EXPECT_EQ(error_of(name, text), "'" + std::string(name) + "': " + out_of_range);
+  }
+  std::string text = obj;
+  text.replace(text.find("f 1 3 4"), 7, "f 1 10 4");
+  EXPECT_EQ(error_of("a.obj", text), "'a.obj': " + out_of_range);
+  text.replace(text.find("f 1 10 4"), 8, "f 1 -9 4");
+  EXPECT_EQ(error_of("b.obj", text),
+            "'b.obj', line 6: a polygon refers to point -9, but there are only 4 points before it");
+  text = off;
+  text.replace(text.find("3 0 2 3"), 7, "3 0 -1 3");
+  EXPECT_EQ(error_of("b.off", text),
+            "'b.off': polygon 1 refers to point -1, but there are 4 points (both count from 0)");
+  text.replace(text.find("3 0 -1 3"), 8, "3 0 99999999999 3");
+  EXPECT_NE(error_of("c.off", text), "");
+}
+
+TEST_F(MeshFileTest, RefusesCoordinatesThatAreNotFiniteAndNamesThePoint) {
+  const std::string complaint = "point 2 (counting from 0) has a coordinate that is not a finite number";
+  for (const char* bad : {"nan", "inf", "-inf", "1e999"}) {
+    std::string ply = ascii_ply, text = off;
+    EXPECT_EQ(error_of("a.ply", ply.replace(ply.find("1.5"), 3, bad)), "'a.ply': " + complaint);
+    EXPECT_EQ(error_of("a.off", text.replace(text.find("1.5"), 3, bad)), "'a.off': " + complaint);
+  }
+  std::string stl = binary_stl("");
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(stl.data() + 84 + 50 + 12, &nan, sizeof nan);
+  EXPECT_EQ(
+      error_of("a.stl", stl),
+      "'a.stl': point 0 of triangle 1 (both count from 0) has a coordinate that is not a finite number");
+}
+
+TEST_F(MeshFileTest, RefusesAMeshWithoutPolygons) {
+  EXPECT_EQ(error_of("a.obj", "v 0 0 0\nv 1 0 0\n"), "'a.obj': it holds no polygon");
+  EXPECT_EQ(error_of("a.off", "OFF 1 0 0\n0 0 0\n"), "'a.off': it holds no polygon");
+  EXPECT_EQ(error_of("a.stl", "solid nothing\nendsolid\n"), "'a.stl': it holds no polygon");
+  EXPECT_EQ(error_of("a.ply",
+                     "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                     "property float z\nend_header\n0 0 0\n"),
+            "'a.ply': it holds no polygon: there is no element 'face' with a list 'vertex_indices'");
+}
+
+/// The test would run out of memory or time if the counts were believed.
+TEST_F(MeshFileTest, DoesNotBelieveCountsThatTheFileIsTooShortFor) {
+  for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+    for (const char* element : {"vertex", "face", "other"}) {
+      std::string ply = "ply\nformat " + std::string(format) + " 1.0\n";
+      for (const char* name : {"vertex", "face", "other", "empty"})
+        ply += "element " + std::string(name) + (std::strcmp(name, element) ? " 0\n" : " 1000000000000\n") +
+               (*name == 'v'   ? "property float x\nproperty float y\nproperty float z\n"
+                : *name == 'f' ? "property list uchar int vertex_indices\n"
+                : *name == 'o' ? "property int i\n"
+                               : "");
+      EXPECT_NE(error_of("a.ply", ply + "end_header\n" + std::string(1000, ' ')).find("truncated"),
+                std::string::npos)
+          << ply;
+    }
+  }
+  const std::string list =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n";
+  EXPECT_NE(error_of("b.ply", list + "\xff\xff\xff\x7f").find("truncated"), std::string::npos);
+  EXPECT_NE(error_of("c.ply", list + "\xff\xff\xff\xff").find("negative"), std::string::npos);
+  EXPECT_NE(error_of("a.off", "OFF\n1000000000000 1 0\n0 0 0\n").find("truncated"), std::string::npos);
+  EXPECT_NE(error_of("b.off", "OFF\n0 1000000000000 0\n0 0 0\n").find("truncated"), std::string::npos);
+  EXPECT_NE(error_of("c.off", "OFF\n0 1 0\n1000000000000 0 0\n").find("truncated"), std::string::npos);
+  std::string stl = binary_stl("");
+  EXPECT_NE(error_of("a.stl", stl.replace(80, 4, "\xff\xff\xff\xff")).find("truncated"), std::string::npos);
+}
+
+TEST_F(MeshFileTest, TruncatedFilesAreRefusedWhereverTheyBreakOff) {
+  const std::string big = binary_ply(true), stl = binary_stl("x"), text = text_stl();
+  for (std::size_t size = 1; size < big.size(); ++size)
+    EXPECT_NE(error_of("a.ply", big.substr(0, size)), "") << size;
+  for (std::size_t size = 1; size < stl.size(); ++size)
+    EXPECT_NE(error_of("a.stl", stl.substr(0, size)), "") << size;
+  // The name behind "endsolid" may be missing, and the last digit of text may be, which nobody can tell.
+  for (std::size_t size = 1; size < text.size() - 6; ++size)
+    EXPECT_NE(error_of("b.stl", text.substr(0, size)), "") << size;
+  for (std::size_t size = 1; size < ascii_ply.size() - 2; ++size)
+    EXPECT_NE(error_of("b.ply", ascii_ply.substr(0, size)), "") << size;
+  for (std::size_t size = 1; size < off.size() - 2; ++size)
+    EXPECT_NE(error_of("a.off", off.substr(0, size)), "") << size;
+}
+
+TEST_F(MeshFileTest, DamagedFilesAreEitherRefusedOrValid) {
+  std::mt19937 random(2024);
+  write_mesh(folder / "small.ply.gz", random_mesh(5, {0, 0, 0}, 5), context);
+  const std::vector<std::pair<std::string, std::string>> valid = {
+      {"a.ply", ascii_ply},
+      {"b.ply", binary_ply(true)},
+      {"c.ply", binary_ply(false)},
+      {"a.obj", obj},
+      {"a.off", off},
+      {"a.stl", text_stl()},
+      {"b.stl", binary_stl("solid x")},
+      {"a.ply.gz", bytes_of(folder / "small.ply.gz")}};
+  std::size_t refused = 0, accepted = 0;
+  for (const auto& [name, bytes] : valid) {
+    const int trials = name.ends_with(".gz") ? 300 : 5000;  // a file each where it is packed
+    for (int trial = 0; trial < trials; ++trial) {
+      std::string damaged = bytes;
+      for (std::uint32_t flips = 1 + random() % 3; flips > 0; --flips)
+        damaged[random() % damaged.size()] = static_cast<char>(random());
+      if (random() % 4 == 0) damaged.resize(1 + random() % damaged.size());
+      try {
+        const MeshFile mesh = read(name, damaged);
+        ASSERT_GT(mesh.triangle_count(), 0u);
+        for (const Eigen::Vector3d& point : mesh.points) ASSERT_TRUE(point.allFinite());
+        for (const Triangle& triangle : mesh.triangles)
+          for (const std::uint32_t corner : triangle) ASSERT_LT(corner, mesh.points.size());
+        for (const Quad& quad : mesh.quads)
+          for (const std::uint32_t corner : quad) ASSERT_LT(corner, mesh.points.size());
+        ++accepted;
+      } catch (const Error&) {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(refused, 1000u);
+  EXPECT_GT(accepted, 1000u);
+}
+
+TEST_F(MeshFileTest, WritingFailsWithASentenceAndLeavesNothingBehind) {
+  PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 20);
+  EXPECT_NE(write_error_to(folder / "a.xyz", mesh).find("unknown type"), std::string::npos);
+  EXPECT_NE(write_error_to(folder / "none" / "a.ply", mesh).find("cannot write"), std::string::npos);
+  EXPECT_NE(write_error_to("/dev/null/a.ply", mesh).find("cannot write"), std::string::npos);
+  mesh.points[3].y() = std::numeric_limits<float>::infinity();
+  EXPECT_NE(write_error_to(folder / "a.ply", mesh).find("point 3 is not finite"), std::string::npos);
+  fs::create_directory(folder / "sub.ply");
+  EXPECT_NE(write_error_to(folder / "sub.ply", mesh), "");
+  EXPECT_EQ(files(), std::vector<std::string>{"sub.ply"});
+}
+
+/// A limit on the size of files stands in for a full disk.
+TEST_F(MeshFileTest, AFullDiskIsAnErrorAndKeepsTheOldFile) {
+  const PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 20000);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit unlimited;
+  getrlimit(RLIMIT_FSIZE, &unlimited);
+  const rlimit small = {.rlim_cur = 10000, .rlim_max = unlimited.rlim_max};
+  write("a.ply", "old");
+  write("a.off.gz", "old");
+  setrlimit(RLIMIT_FSIZE, &small);
+  const std::string plain = write_error_to(folder / "a.ply", mesh);
+  const std::string packed = write_error_to(folder / "a.off.gz", mesh);
+  setrlimit(RLIMIT_FSIZE, &unlimited);
+  EXPECT_NE(plain.find("cannot write"), std::string::npos);
+  EXPECT_NE(packed.find("cannot write"), std::string::npos);
+  EXPECT_EQ(bytes_of(folder / "a.ply"), "old");
+  EXPECT_EQ(files().size(), 2u);
+}
+
+TEST_F(MeshFileTest, CancellingLeavesNothingBehind) {
+  const std::atomic<bool> cancel = true;
+  const fs::path path = write("a.ply", ascii_ply);
+  context.cancel = &cancel;
+  EXPECT_THROW(read_mesh_file(path, context), Cancelled);
+  EXPECT_THROW(write_mesh(folder / "b.ply", random_mesh(1, {0, 0, 0}, 20), context), Cancelled);
+  EXPECT_EQ(files(), std::vector<std::string>{"a.ply"});
+}
+
+TEST_F(MeshFileTest, PathsAreRecognisedByTheirExtension) {
+  for (const char* name : {"a.ply", "a.OBJ", "x/a.b.off", "a.stl.gz", "a.Ply.GZ"})
+    EXPECT_TRUE(is_mesh_path(name)) << name;
+  for (const char* name : {"a.vdb", "ply", ".gz", "a.gz", "a.ply.zip", ""})
+    EXPECT_FALSE(is_mesh_path(name)) << name;
+}
+
+TEST_F(MeshFileTest, CoordinatesBeyondSinglePrecisionAreRefused) {
+  const fs::path path = write("a.obj", "v 1e300 0 0\nv -1e300 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_NO_THROW(read_mesh_file(path, context));
+  EXPECT_THROW(read_mesh(path, context), Error);
+}
+
+class AtomicFileTest : public MeshFileTest {};
+
+TEST_F(AtomicFileTest, TheTargetAppearsOnCommitOnly) {
+  {
+    AtomicFile file(folder / "a.txt");
+    std::ofstream(file.path()) << "new";
+    EXPECT_FALSE(fs::exists(folder / "a.txt"));
+    EXPECT_EQ(file.path().parent_path(), folder);
+    EXPECT_EQ(file.path().extension(), ".txt");
+    file.commit();
+  }
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
+  { AtomicFile file(folder / "a.txt"); }
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
+  EXPECT_EQ(files().size(), 1u);
+}
+
+TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
+  AtomicFile one(folder / "a.txt"), two(folder / "b.txt");
+  AtomicFile done(folder / "c.txt");
+  done.commit();
+  EXPECT_EQ(files().size(), 3u);
+  std::thread(remove_unfinished_files).join();
+  EXPECT_EQ(files(), std::vector<std::string>{"c.txt"});
+  EXPECT_THROW(one.commit(), Error);
+}
+
+TEST_F(AtomicFileTest, WritesThroughLinksAndNotOverDevices) {
+  write("real.txt", "old");
+  fs::create_symlink("real.txt", folder / "link.txt");
+  AtomicFile file(folder / "link.txt");
+  std::ofstream(file.path()) << "new";
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(folder / "link.txt"));
+  EXPECT_EQ(bytes_of(folder / "real.txt"), "new");
+  EXPECT_THROW(AtomicFile("/dev/null"), Error);
+  EXPECT_THROW(AtomicFile(folder / ""), Error);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,273 @@
+// The writers of mesh_file.h.
+#include <zlib.h>
+
+#include <Eigen/Geometry>
+#include <bit>
+#include <cerrno>
+
+#include "algorithms/core/atomic_file.h"
+#include "algorithms/core/mesh_file_formats.h"
+
+namespace hermesh {
+
+namespace {
+
+using namespace mesh_formats;
+
+/// Collects bytes and hands them to zlib, which passes them through where the file is not compressed. A full
+/// disk shows in any of its calls, the last one included.
+class Output {
+ public:
+  Output(const std::filesystem::path& temporary, const std::filesystem::path& target, bool gzipped,
+         RunContext& context)
+      : target_(target.string()),
+        context_(context),
+        file_(gzopen(temporary.c_str(), gzipped ? "wb6" : "wbT")) {
+    if (!file_) fail();
+    gzbuffer(file_, 1 << 18);
+    buffer_.reserve(capacity + 4096);
+  }
+  ~Output() {
+    if (file_) gzclose(file_);
+  }
+  Output(const Output&) = delete;
+  Output& operator=(const Output&) = delete;
+
+  void text(std::string_view text) {
+    buffer_.append(text);
+    if (buffer_.size() >= capacity) flush();
+  }
+  /// Little-endian, whatever the machine.
+  template <class T>
+  void binary(T value) {
+    std::array<char, sizeof(T)> bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
+    if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
+    text({bytes.data(), bytes.size()});
+  }
+  /// The shortest text that reads back as the same number.
+  template <class T>
+  void number(T value) {
+    char digits[32];
+    text({digits, std::to_chars(digits, digits + sizeof digits, value).ptr});
+  }
+  void close() {
+    flush();
+    const gzFile file = std::exchange(file_, nullptr);
+    errno = 0;
+    if (gzclose(file) != Z_OK) fail();
+  }
+
+ private:
+  static constexpr std::size_t capacity = 1 << 20;
+
+  void flush() {
+    context_.check();
+    errno = 0;
+    if (!buffer_.empty() && gzwrite(file_, buffer_.data(), static_cast<unsigned>(buffer_.size())) <= 0)
+      fail();
+    buffer_.clear();
+  }
+  [[noreturn]] void fail() const {
+    throw Error("cannot write " + in_quotes(target_) +
+                (errno ? std::string(": ") + std::strerror(errno) : ""));
+  }
+
+  std::string target_;
+  RunContext& context_;
+  gzFile file_;
+  std::string buffer_;
+};
+
+void write_numbers(Output& out, std::string_view lead, const Eigen::Vector3d& numbers) {
+  out.text(lead);
+  for (const double x : numbers) {
+    out.text(" ");
+    out.number(x);
+  }
+  out.text("\n");
+}
+
+/// The nearest float. Volatile because GCC 12 drops the rounding from a vector's
+/// `.cast<float>().cast<double>()` when it vectorises straight-line code.
+Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& point) {
+  volatile float x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
+                 z = static_cast<float>(point.z());
+  return {x, y, z};
+}
+
+bool fits_single_precision(const MeshFile& mesh) {
+  for (const Eigen::Vector3d& point : mesh.points)
+    if (point != rounded_to_single(point)) return false;
+  return true;
+}
+
+void write_ply(Output& out, const MeshFile& mesh) {
+  const bool single = fits_single_precision(mesh);
+  const std::string type = single ? "float" : "double";
+  out.text("ply\nformat binary_little_endian 1.0\n");
+  if (mesh.origin) write_numbers(out, "comment origin", *mesh.origin);
+  out.text("element vertex " + std::to_string(mesh.points.size()) + "\n");
+  for (const char* axis : {" x\n", " y\n", " z\n"}) out.text("property " + type + axis);
+  out.text("element face " + std::to_string(mesh.triangles.size() + mesh.quads.size()) + "\n");
+  // Most programs know signed indices only.
+  out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\nend_header\n"
+                                            : "property list uchar uint vertex_indices\nend_header\n");
+  for (const Eigen::Vector3d& point : mesh.points)
+    for (const double x : point) single ? out.binary(static_cast<float>(x)) : out.binary(x);
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.binary(static_cast<std::uint8_t>(polygon.size()));
+      for (const std::uint32_t corner : polygon) out.binary(corner);
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+/// Text is read in double precision, so it is written in double precision: the few digits that would identify
+/// a float among floats are another double.
+void write_obj(Output& out, const MeshFile& mesh) {
+  if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
+  for (const Eigen::Vector3d& point : mesh.points) write_numbers(out, "v", point);
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.text("f");
+      for (const std::uint32_t corner : polygon) {
+        out.text(" ");
+        out.number(std::uint64_t(corner) + 1);
+      }
+      out.text("\n");
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+void write_off(Output& out, const MeshFile& mesh) {
+  out.text("OFF\n");
+  if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
+  out.text(std::to_string(mesh.points.size()) + " " +
+           std::to_string(mesh.triangles.size() + mesh.quads.size()) + " 0\n");
+  for (const Eigen::Vector3d& point : mesh.points) {
+    for (int axis = 0; axis < 3; ++axis) {
+      out.number(point[axis]);
+      out.text(axis < 2 ? " " : "\n");
+    }
+  }
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.number(polygon.size());
+      for (const std::uint32_t corner : polygon) {
+        out.text(" ");
+        out.number(corner);
+      }
+      out.text("\n");
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+std::vector<bool> used_points(const MeshFile& mesh) {
+  std::vector<bool> used(mesh.points.size(), false);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) used[corner] = true;
+  for (const Quad& quad : mesh.quads)
+    for (const std::uint32_t corner : quad) used[corner] = true;
+  return used;
+}
+
+/// Says what STL cannot hold of this mesh.
+void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContext& context) {
+  const std::vector<bool> used = used_points(mesh);
+  std::size_t unused = 0, moved = 0;
+  double largest_shift = 0.0;
+  std::vector<Eigen::Vector3d> before, after;
+  PointMerger merge_before(before), merge_after(after);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    unused += !used[i];
+    if (!used[i]) continue;
+    const Eigen::Vector3d rounded = rounded_to_single(mesh.points[i]);
+    if (!rounded.allFinite())
+      throw Error("cannot write " + in_quotes(name) + ": a coordinate is too large for STL");
+    moved += rounded != mesh.points[i];
+    largest_shift = std::max(largest_shift, (rounded - mesh.points[i]).norm());
+    merge_before.add(mesh.points[i]);
+    merge_after.add(rounded);
+  }
+  if (moved > 0) {
+    char shift[32];
+    const std::string_view shift_text(
+        shift, std::to_chars(shift, shift + sizeof shift, largest_shift, std::chars_format::general, 3).ptr);
+    context.note(in_quotes(name) + ": STL has single precision only: " + std::to_string(moved) +
+                 " points moved, by at most " + std::string(shift_text) + ", and " +
+                 std::to_string(before.size() - after.size()) + " became equal to another");
+  }
+  if (unused > 0)
+    context.note(in_quotes(name) + ": STL holds triangles only: " + std::to_string(unused) +
+                 " points that no polygon uses were left out");
+}
+
+void write_stl_triangle(Output& out, const std::array<Eigen::Vector3d, 3>& corners) {
+  const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const double length = across.norm();
+  const bool degenerate = !(length > 0.0 && std::isfinite(length));
+  for (const double x : across) out.binary(degenerate ? 0.0f : static_cast<float>(x / length));
+  for (const Eigen::Vector3d& corner : corners)
+    for (const double x : corner) out.binary(static_cast<float>(x));
+  out.binary(std::uint16_t(0));
+}
+
+void write_stl(Output& out, const MeshFile& mesh) {
+  if (mesh.triangle_count() > 0xffffffff) throw Error("an STL file cannot hold more than 2^32 triangles");
+  std::string header = "binary STL";
+  header.resize(80, ' ');
+  out.text(header);
+  out.binary(static_cast<std::uint32_t>(mesh.triangle_count()));
+  const auto write = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    write_stl_triangle(out, {rounded_to_single(mesh.points[a]), rounded_to_single(mesh.points[b]),
+                             rounded_to_single(mesh.points[c])});
+  };
+  for (const auto& [a, b, c] : mesh.triangles) write(a, b, c);
+  for (const auto& [a, b, c, d] : mesh.quads) {
+    write(a, b, c);
+    write(a, c, d);
+  }
+}
+
+void check_mesh(const std::string& name, const MeshFile& mesh) {
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    if (!mesh.points[i].allFinite())
+      throw Error("cannot write " + in_quotes(name) + ": point " + std::to_string(i) + " is not finite");
+}
+
+}  // namespace
+
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
+  const Stage stage(context, "write");
+  const std::optional<MeshPath> named = parse_mesh_path(path);
+  if (!named) throw_unknown_extension(path);
+  const MeshFile file = to_mesh_file(mesh);
+  check_mesh(path.string(), file);
+  if (named->format == Format::stl) note_losses_of_stl(path.string(), file, context);
+  AtomicFile aside(path);
+  Output out(aside.path(), path, named->gzipped, context);
+  switch (named->format) {
+    case Format::ply:
+      write_ply(out, file);
+      break;
+    case Format::obj:
+      write_obj(out, file);
+      break;
+    case Format::off:
+      write_off(out, file);
+      break;
+    case Format::stl:
+      write_stl(out, file);
+      break;
+  }
+  out.close();
+  aside.commit();
+}
+
+}  // namespace hermesh

@@ -1,0 +1,98 @@
+#include "algorithms/core/options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "algorithms/core/error.h"
+
+namespace hermesh {
+
+namespace {
+
+std::optional<double> parse_number(std::string_view text) {
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, status] = std::from_chars(text.data(), end, value);
+  if (status != std::errc() || stop != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::string shortest(double value) {
+  char buffer[32];
+  return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string range(const OptionSpec& spec) {
+  const bool open_below = spec.minimum <= -1e300, open_above = spec.maximum >= 1e300;
+  if (open_below && open_above) return "any number";
+  if (open_above) return "a number of at least " + shortest(spec.minimum);
+  if (open_below) return "a number of at most " + shortest(spec.maximum);
+  return "a number from " + shortest(spec.minimum) + " to " + shortest(spec.maximum);
+}
+
+/// The value as it is stored: numbers in their shortest form, so that 0.10 and 0.1 are the same setting.
+std::string checked(std::string_view variant, const OptionSpec& spec, const std::string& value) {
+  const std::string complaint =
+      "option '" + spec.name + "' of " + std::string(variant) + " cannot be '" + value + "'; it takes ";
+  if (!spec.choices.empty()) {
+    if (std::ranges::find(spec.choices, value) == spec.choices.end())
+      throw Error(complaint + "one of: " + joined(spec.choices));
+    return value;
+  }
+  const std::optional<double> number = parse_number(value);
+  if (!number || *number < spec.minimum || *number > spec.maximum) throw Error(complaint + range(spec));
+  return shortest(*number);
+}
+
+}  // namespace
+
+Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
+                 const std::map<std::string, std::string>& given) {
+  for (const auto& [name, value] : given) {
+    if (std::ranges::find(declared, name, &OptionSpec::name) != declared.end()) continue;
+    std::vector<std::string> names;
+    for (const OptionSpec& spec : declared) names.push_back(spec.name);
+    throw Error(std::string(variant) + " has no option '" + name + "'; it takes " +
+                (names.empty() ? "none" : joined(names)));
+  }
+  for (const OptionSpec& spec : declared) {
+    const auto entry = given.find(spec.name);
+    values_[spec.name] = checked(variant, spec, entry == given.end() ? spec.fallback : entry->second);
+  }
+}
+
+double Options::number(std::string_view name) const {
+  const std::optional<double> value = parse_number(text(name));
+  if (!value) throw std::logic_error("option '" + std::string(name) + "' is not a number");
+  return *value;
+}
+
+const std::string& Options::text(std::string_view name) const {
+  const auto entry = values_.find(name);
+  if (entry == values_.end()) throw std::logic_error("option '" + std::string(name) + "' was not declared");
+  return entry->second;
+}
+
+std::string Options::canonical() const {
+  std::string text;
+  for (const auto& [name, value] : values_) text += (text.empty() ? "" : " ") + name + "=" + value;
+  return text;
+}
+
+std::pair<std::string, std::string> parse_option(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0)
+    throw Error("'" + std::string(text) + "' is no option; write key=value");
+  return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
+}
+
+}  // namespace hermesh

@@ -1,0 +1,107 @@
+#include "algorithms/core/vdb_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+class VdbFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("hermesh-vdb-" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string error_of(const fs::path& path, const std::string& grid = "") {
+    try {
+      read_level_set(path, grid, context_);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+
+  static LevelSet ramp() {
+    initialize_openvdb();
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+    for (int x = -3; x <= 3; ++x) grid->tree().setValue(openvdb::Coord(x, 0, 0), 0.25f * static_cast<float>(x));
+    return make_level_set(grid);
+  }
+
+  fs::path folder_;
+  RunContext context_;
+};
+
+TEST_F(VdbFile, RoundTripKeepsValuesAndPlacement) {
+  write_level_set(folder_ / "a.vdb", ramp(), context_);
+  const LevelSet back = read_level_set(folder_ / "a.vdb", "", context_);
+  EXPECT_EQ(back.active_voxels(), 7u);
+  EXPECT_DOUBLE_EQ(back.voxel_size(), 0.25);
+  EXPECT_EQ(back.background(), 3.0);
+  EXPECT_EQ(back.grid().grid->tree().getValue(openvdb::Coord(-2, 0, 0)), -0.5f);
+  EXPECT_EQ(back.grid().grid->getName(), "sdf");
+}
+
+TEST_F(VdbFile, DoubleGridsBecomeFloat) {
+  initialize_openvdb();
+  auto grid = openvdb::DoubleGrid::create(2.0);
+  grid->setName("density");
+  grid->tree().setValue(openvdb::Coord(1, 2, 3), -0.125);
+  openvdb::io::File((folder_ / "d.vdb").string()).write({grid});
+  EXPECT_EQ(read_level_set(folder_ / "d.vdb", "", context_).grid().grid->tree().getValue(openvdb::Coord(1, 2, 3)), -0.125f);
+}
+
+TEST_F(VdbFile, ErrorsAreOneSentenceAboutTheFile) {
+  EXPECT_NE(error_of(folder_ / "none.vdb").find("does not exist"), std::string::npos);
+  EXPECT_NE(error_of(folder_).find("is a folder"), std::string::npos);
+  std::ofstream(folder_ / "empty.vdb");
+  EXPECT_NE(error_of(folder_ / "empty.vdb").find("is empty"), std::string::npos);
+  std::ofstream(folder_ / "text.vdb") << "these are words and no volume";
+  EXPECT_NE(error_of(folder_ / "text.vdb").find("is not a .vdb file"), std::string::npos);
+  write_level_set(folder_ / "a.vdb", ramp(), context_);
+  EXPECT_NE(error_of(folder_ / "a.vdb", "fog").find("no grid named 'fog'; it has sdf"), std::string::npos);
+}
+
+TEST_F(VdbFile, EveryTruncationIsRefused) {
+  write_level_set(folder_ / "a.vdb", ramp(), context_);
+  const auto size = fs::file_size(folder_ / "a.vdb");
+  for (std::uintmax_t keep = 1; keep < size; keep += size / 40) {
+    fs::copy_file(folder_ / "a.vdb", folder_ / "cut.vdb", fs::copy_options::overwrite_existing);
+    fs::resize_file(folder_ / "cut.vdb", keep);
+    EXPECT_NE(error_of(folder_ / "cut.vdb"), "no error") << keep << " of " << size;
+  }
+}
+
+TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setName("sdf");
+  grid->tree().setValue(openvdb::Coord(4, 5, 6), std::nanf(""));
+  openvdb::io::File((folder_ / "nan.vdb").string()).write({grid});
+  EXPECT_NE(error_of(folder_ / "nan.vdb").find("not finite at index [4, 5, 6]"), std::string::npos);
+}
+
+TEST_F(VdbFile, HermiteGridsAreDescribed) {
+  const LevelSet volume = ramp();
+  const HermiteGrid hermite = sample_level_set(BlockGrid(volume, 0.0, context_), context_);
+  hermite.write(folder_ / "h.vdb", context_);
+  const std::vector<GridSummary> grids = describe_vdb(folder_ / "h.vdb");
+  ASSERT_EQ(grids.size(), 1u);
+  EXPECT_EQ(grids[0].name, "hermite");
+  EXPECT_NE(grids[0].value_type.find("hermite_float"), std::string::npos);
+  EXPECT_GT(grids[0].active_voxels, 0u);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,152 @@
+#include "algorithms/hermite/samplers.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "algorithms/core/level_set_grid.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Calls f(position, normal) for every crossing, in index space.
+template <class F>
+void for_each_crossing(const HermiteGrid& grid, F&& f) {
+  for (const HermiteBlock& block : grid.blocks())
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(block.crossing[axis], [&](int sample) {
+        const HermiteVoxel& voxel = block.voxels[sample];
+        Vector3d at(block.lower[0] + (sample >> 6), block.lower[1] + ((sample >> 3) & 7), block.lower[2] + (sample & 7));
+        at[axis] += voxel.offset[axis];
+        f(at, Vector3d(voxel.normal[axis][0], voxel.normal[axis][1], voxel.normal[axis][2]));
+      });
+}
+
+LevelSet sphere(float radius) {
+  initialize_openvdb();
+  return make_level_set(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(radius, openvdb::Vec3f(0.3f, 0.1f, -0.2f), 1.0f));
+}
+
+TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
+  RunContext context;
+  const HermiteGrid grid = sample_level_set(BlockGrid(sphere(20.0f), 0.0, context), context);
+  const Vector3d centre(0.3, 0.1, -0.2);
+  std::size_t crossings = 0;
+  for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
+    ++crossings;
+    ASSERT_NEAR((at - centre).norm(), 20.0, 0.01);  // linear interpolation errs by curvature / 8 at most
+    ASSERT_GT(normal.dot((at - centre).normalized()), 0.998);
+    ASSERT_NEAR(normal.norm(), 1.0, 1e-5);
+  });
+  EXPECT_EQ(crossings, grid.crossing_edges());
+  EXPECT_NEAR(static_cast<double>(crossings), 6.0 * M_PI * 400.0, 200.0);  // two for each lattice line through the disc
+}
+
+TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
+  // Only the two layers next to the surface are active; the background beyond them must not be read.
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(100.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  const Vector3d normal = Vector3d(0.2, 0.1, 1.0).normalized();
+  for (int x = 0; x < 20; ++x)
+    for (int y = 0; y < 20; ++y)
+      for (int z = 0; z < 20; ++z) {
+        const double d = normal.dot(Vector3d(x, y, z) - Vector3d::Constant(9.7));
+        if (std::abs(d) < 1.0) grid->tree().setValue(openvdb::Coord(x, y, z), static_cast<float>(d));
+        else if (d < 0) grid->tree().setValueOff(openvdb::Coord(x, y, z), -100.0f);
+      }
+  RunContext context;
+  int checked = 0;
+  for_each_crossing(sample_level_set(BlockGrid(make_level_set(grid), 0.0, context), context),
+                    [&](const Vector3d& at, const Vector3d& found) {
+                      if ((at.array() < 3).any() || (at.array() > 16).any()) return;
+                      ++checked;
+                      ASSERT_GT(found.dot(normal), 1.0 - 1e-5);
+                    });
+  EXPECT_GT(checked, 100);
+}
+
+/// Octahedron with corners at ±radius from a centre, counter-clockwise or, reversed, inside out.
+PolygonMesh octahedron(double radius, const Vector3d& centre, bool reversed) {
+  PolygonMesh mesh;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {1.0, -1.0}) mesh.points.push_back((centre + side * radius * Vector3d::Unit(axis)).cast<float>());
+  for (std::uint32_t octant = 0; octant < 8; ++octant) {
+    const std::uint32_t sx = octant & 1, sy = (octant >> 1) & 1, sz = octant >> 2;
+    Triangle triangle{sx, 2 + sy, 4 + sz};
+    if (((sx + sy + sz) % 2 == 1) != reversed) std::swap(triangle[1], triangle[2]);
+    mesh.triangles.push_back(triangle);
+  }
+  return mesh;
+}
+
+LevelSet octahedron_level_set(double radius, const Vector3d& centre) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(3.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  for (int x = -20; x <= 20; ++x)
+    for (int y = -20; y <= 20; ++y)
+      for (int z = -20; z <= 20; ++z) {
+        const double d = ((Vector3d(x, y, z) - centre).cwiseAbs().sum() - radius) / std::sqrt(3.0);
+        grid->tree().setValue(openvdb::Coord(x, y, z), static_cast<float>(d));
+      }
+  return make_level_set(grid);
+}
+
+TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
+  const Vector3d centre(0.31, -0.27, 0.13);
+  const double radius = 12.4;
+  RunContext context;
+  for (const bool reversed : {false, true}) {
+    PolygonSampling sampling;
+    const HermiteGrid grid = sample_polygons(BlockGrid(octahedron_level_set(radius, centre), 0.0, context),
+                                             octahedron(radius, centre, reversed), context, &sampling);
+    EXPECT_EQ(sampling.fallback, 0u);
+    EXPECT_EQ(sampling.exact, grid.crossing_edges());
+    for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
+      ASSERT_NEAR((at - centre).cwiseAbs().sum(), radius, 2e-5);
+      const Vector3d face = (at - centre).cwiseSign() / std::sqrt(3.0);
+      ASSERT_GT(normal.dot(face), 1.0 - 1e-5);
+    });
+  }
+}
+
+TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
+  // A thin plate's two faces between two samples, and a third face beyond: the edge runs from inside to outside, so the
+  // faces that look along it are right, and the nearer to the level set's crossing of those is taken.
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) grid->tree().setValue(openvdb::Coord(x, y, z), z <= 3 ? -0.5f : 0.5f);
+  PolygonMesh mesh;
+  const auto plane = [&](float height, bool up) {
+    const auto first = static_cast<std::uint32_t>(mesh.points.size());
+    for (const auto& [x, y] : {std::pair{-9.f, -9.f}, {19.f, -9.f}, {19.f, 19.f}, {-9.f, 19.f}})
+      mesh.points.emplace_back(x, y, height);
+    mesh.quads.push_back(up ? Quad{first, first + 1, first + 2, first + 3} : Quad{first, first + 3, first + 2, first + 1});
+  };
+  plane(3.1f, true);
+  plane(3.45f, false);
+  plane(3.7f, true);
+  plane(-30.0f, false);  // makes the whole wound outwards, as a solid's surface is
+  RunContext context;
+  PolygonSampling sampling;
+  const HermiteGrid hermite = sample_polygons(BlockGrid(make_level_set(grid), 0.0, context), mesh, context, &sampling);
+  EXPECT_GT(sampling.ambiguous, 0u);
+  int checked = 0;
+  for_each_crossing(hermite, [&](const Vector3d& at, const Vector3d& normal) {
+    if (at.z() < 3 || at.z() > 4 || normal.z() < 0.9) return;
+    ++checked;
+    EXPECT_NEAR(at.z(), 3.7, 1e-5);
+  });
+  EXPECT_EQ(checked, 64);
+}
+
+}  // namespace
+}  // namespace hermesh
