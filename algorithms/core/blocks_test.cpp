@@ -82,7 +82,8 @@ TEST(Blocks, PlacementOfAShearedMirroredGridIsTheGridsOwn) {
   grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
   grid->tree().setValue(Coord(5, -6, 7), -1.0f);
   RunContext context;
-  const IndexToWorld& placement = BlockGrid(make_level_set(grid), 0.0, context).placement();
+  const BlockGrid blocks(make_level_set(grid), 0.0, context);
+  const IndexToWorld& placement = blocks.placement();
   const openvdb::Vec3d expected = grid->indexToWorld(Coord(5, -6, 7));
   const Eigen::Vector3d found =
       placement.origin + placement.local(Eigen::Vector3d(5 - placement.base[0], -6 - placement.base[1], 7 - placement.base[2]));

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,8 @@
 namespace hermesh {
 namespace {
 
-/// A float leaf with its mask, its flags and its share of the nodes above.
-constexpr double kLeafBytes = 2200.0;
+/// A float leaf of 8³ voxels with its masks, and the nodes of 16³ and 32³ children above it.
+constexpr double kLeafBytes = 2152.0, kMiddleBytes = 33.8e3, kUpperBytes = 270e3;
 /// OpenVDB's meshToVolume holds a closest-polygon index beside each distance, and dilated copies of both,
 /// while it works: 3.2 to 3.5 times the finished grid, measured on four meshes at three resolutions each.
 constexpr double kPeakOverGrid = 3.5;
@@ -50,12 +51,13 @@ void for_each_corner(const PolygonMesh& mesh, const Function& function) {
     for (const std::uint32_t corner : q) function(mesh.points[corner]);
 }
 
-/// Number of distinct 8³ blocks that hold a point. Stray points that no polygon uses count, too; there are
-/// few. Blocks are told apart by a 64-bit mix of their coordinates, where a rare collision does not matter.
-double blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
+/// Number of distinct blocks of `edge` voxels that hold a point. Stray points that no polygon uses count,
+/// too; there are few. Blocks are told apart by a 64-bit mix of their coordinates, where a rare collision
+/// does not matter.
+double blocks_with_points(const PolygonMesh& mesh, double voxel_size, double edge) {
   std::vector<std::uint64_t> keys;
   keys.reserve(mesh.points.size());
-  const double scale = 1.0 / (8.0 * voxel_size);
+  const double scale = 1.0 / (edge * voxel_size);
   for (const Eigen::Vector3f& point : mesh.points) {
     std::uint64_t key = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -67,6 +69,32 @@ double blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
   }
   std::sort(keys.begin(), keys.end());
   return double(std::unique(keys.begin(), keys.end()) - keys.begin());
+}
+
+/// What the estimates of blocks of any size share.
+struct Extent {
+  double surface;         ///< voxel faces
+  double thickness;       ///< of the band, voxels
+  Eigen::Vector3d sides;  ///< of the box around the band, voxels
+};
+
+struct Blocks {
+  double along_surface, scattered, all;
+};
+
+/// A plane layer of thickness t with unit normal n meets (e |n|₁ + t) / e³ blocks of edge e a unit of area,
+/// and |n|₁ is 3/2 on average over all directions. Blocks with points beyond those that the area explains are
+/// small scattered pieces, each of which costs as much as a point's ball. The box is the upper limit.
+Blocks count_blocks(const PolygonMesh& mesh, double voxel_size, const Extent& extent, double edge) {
+  const double volume = edge * edge * edge;
+  const double bare = extent.surface * 1.5 * edge / volume;
+  Blocks blocks;
+  blocks.along_surface = extent.surface * (1.5 * edge + extent.thickness) / volume;
+  blocks.scattered = std::max(0.0, blocks_with_points(mesh, voxel_size, edge) - bare);
+  const double box = ((extent.sides / edge).array() + 1.0).prod();
+  blocks.all =
+      std::min(box, blocks.along_surface + blocks.scattered * std::pow(edge + extent.thickness, 3) / volume);
+  return blocks;
 }
 
 std::optional<std::uint64_t> number_in(const std::string& path) {
@@ -136,31 +164,22 @@ void check_coordinates(const PolygonMesh& mesh, double voxel_size, double band) 
 
 BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                            double interior_band) {
-  const double thickness = exterior_band + interior_band;
-  const double surface = area(mesh) / voxel_size / voxel_size;  // in voxel faces
-  // A plane layer of thickness t with unit normal n meets (8 |n|₁ + t) / 8³ blocks of edge 8 a unit of area,
-  // and |n|₁ is 3/2 on average over all directions.
-  const double surface_blocks = surface * 12.0 / 512.0;
-  const double band_blocks = surface * (12.0 + thickness) / 512.0;
-  // Blocks with points beyond those that the area explains are small scattered pieces: each costs a ball's
-  // worth.
-  const double scattered = std::max(0.0, blocks_with_points(mesh, voxel_size) - surface_blocks);
-  const double ball_blocks = std::pow(8.0 + thickness, 3) / 512.0;
-
   Bounds box;
   for_each_corner(mesh, [&](const Eigen::Vector3f& point) { box.add(point.cast<double>()); });
-  double box_blocks = 1.0, box_voxels = 1.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double side = box.size()[axis] / voxel_size + 2.0 * std::max(exterior_band, interior_band) + 1.0;
-    box_voxels *= side;
-    box_blocks *= side / 8.0 + 1.0;
-  }
+  const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
+  const Extent extent{area(mesh) / voxel_size / voxel_size, exterior_band + interior_band,
+                      box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
 
   BandEstimate estimate;
-  estimate.leaves = std::min(box_blocks, band_blocks + scattered * ball_blocks);
+  const Blocks leaves = count_blocks(mesh, voxel_size, extent, 8.0);
+  estimate.leaves = leaves.all;
+  // A piece far below a voxel is a ball of the exterior band's radius.
+  const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
   estimate.active_voxels = std::min(
-      {box_voxels, 512.0 * estimate.leaves, thickness * surface + scattered * std::pow(thickness, 3)});
-  estimate.grid_bytes = kLeafBytes * estimate.leaves;
+      {extent.sides.prod(), 512.0 * leaves.all, extent.thickness * extent.surface + leaves.scattered * ball});
+  estimate.grid_bytes = kLeafBytes * leaves.all +
+                        kMiddleBytes * count_blocks(mesh, voxel_size, extent, 128.0).all +
+                        kUpperBytes * count_blocks(mesh, voxel_size, extent, 4096.0).all;
   estimate.peak_bytes = kPeakOverGrid * estimate.grid_bytes;
   return estimate;
 }
