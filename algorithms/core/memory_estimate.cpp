@@ -177,9 +177,10 @@ BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double ex
   const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
   estimate.active_voxels = std::min(
       {extent.sides.prod(), 512.0 * leaves.all, extent.thickness * extent.surface + leaves.scattered * ball});
+  // Eight upper nodes meet at the grid's origin, where most meshes lie.
   estimate.grid_bytes = kLeafBytes * leaves.all +
                         kMiddleBytes * count_blocks(mesh, voxel_size, extent, 128.0).all +
-                        kUpperBytes * count_blocks(mesh, voxel_size, extent, 4096.0).all;
+                        kUpperBytes * (8.0 + count_blocks(mesh, voxel_size, extent, 4096.0).all);
   estimate.peak_bytes = kPeakOverGrid * estimate.grid_bytes;
   return estimate;
 }

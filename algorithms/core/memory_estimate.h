@@ -10,7 +10,9 @@
 namespace hermesh {
 
 /// Estimated size of a narrow band. Right within a factor of two for surfaces that are smooth at the scale of
-/// a voxel; a surface that is rough below that scale is overestimated, never beyond its filled bounding box.
+/// a voxel. Small scattered pieces are overestimated up to eight times, since a piece that straddles blocks
+/// counts as several; a surface that is rough below a voxel is overestimated, too. Never more than the filled
+/// bounding box.
 struct BandEstimate {
   double active_voxels = 0.0;
   double leaves = 0.0;      ///< 8³ blocks

@@ -38,7 +38,7 @@ constexpr std::array<int, 12> segments(int pattern) {
       if (inside(i) || !inside(i + 1)) continue;
       int leave = i + 1;
       while (inside(leave + 1)) ++leave;
-      next[edge_between(face[leave & 3], face[(leave + 1) & 3])] = edge_between(face[i], face[(i + 1) & 3]);
+      next[edge_between(face[i], face[(i + 1) & 3])] = edge_between(face[leave & 3], face[(leave + 1) & 3]);
     }
   return next;
 }

@@ -21,6 +21,13 @@ TEST(TriangulationTable, KnownCells) {
   EXPECT_EQ(kTriangulation[0b10010110].count, 4);   // every other corner, each cut off by itself
 }
 
+TEST(TriangulationTable, ACutOffCornerFacesAwayFromIt) {
+  // Corner 0 inside: the normal of the triangle over the edges' middles points along (1,1,1), counter-clockwise.
+  const auto& triangle = kTriangulation[1].triangles[0];
+  const auto axis_after = [](int edge) { return (kCellEdges[edge].axis + 1) % 3; };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(kCellEdges[triangle[(i + 1) % 3]].axis, axis_after(triangle[i]));
+}
+
 TEST(TriangulationTable, UsesEveryCrossingEdgeAndNoOther) {
   for (int pattern = 0; pattern < 256; ++pattern) {
     std::set<int> used;

@@ -1,0 +1,87 @@
+// Extraction of a sphere, per active voxel: our variants beside OpenVDB's, at several resolutions. A mesh is
+// judged before it is timed; a wrong one is not timed, and the program then ends with 1.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/variants.h"
+#include "experiments/bench/sphere_level_set.h"
+#include "reference/variants.h"
+#include "validation/mesh_report.h"
+
+namespace hermesh {
+namespace {
+
+int failures = 0;  // SkipWithError leaves Google Benchmark's own exit code at 0
+
+const LevelSet& sphere(int resolution) {
+  static std::map<int, LevelSet> cache;
+  auto found = cache.find(resolution);
+  if (found == cache.end()) found = cache.emplace(resolution, sphere_level_set(resolution)).first;
+  return found->second;
+}
+
+/// What is wrong with a mesh of the sphere: it must be one closed component of the sphere's volume. The
+/// tolerance is that of a polygonal sphere of this size: chords lie inside by a share of about one over the
+/// squared resolution.
+std::optional<std::string> fault(const PolygonMesh& mesh, int resolution) {
+  RunContext context;
+  validation::JudgeOptions options;
+  options.self_intersections = options.libraries = false;
+  const validation::MeshReport report = validation::judge(to_mesh_file(mesh), options, context);
+  if (!report.closed()) return std::to_string(report.boundary_edges) + " boundary edges";
+  if (!report.oriented()) return std::to_string(report.inconsistent_edges) + " inconsistent edges";
+  if (report.components != 1) return std::to_string(report.components) + " components";
+  const double radius = 0.5 * resolution, volume = 4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3);
+  if (std::abs(report.volume / volume - 1.0) > 20.0 / (resolution * resolution))
+    return "volume " + std::to_string(report.volume) + " instead of " + std::to_string(volume);
+  return std::nullopt;
+}
+
+void extract_sphere(benchmark::State& state, const Extractor& extractor, int resolution) {
+  const LevelSet& level_set = sphere(resolution);
+  const Options options(extractor.name, extractor.options, {});
+  const auto extract = [&] {
+    RunContext context;
+    return extractor.extract({.level_set = level_set, .options = options, .context = context});
+  };
+  try {
+    if (const auto wrong = fault(extract(), resolution)) throw Error(extractor.name + ": " + *wrong);
+    for ([[maybe_unused]] auto iteration : state) benchmark::DoNotOptimize(extract());
+  } catch (const std::exception& error) {
+    ++failures;
+    state.SkipWithError(error.what());
+  }
+  state.counters["s/voxel"] =
+      benchmark::Counter(static_cast<double>(level_set.active_voxels()),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+void register_all() {
+  std::vector<Extractor> extractors(our_extractors().begin(), our_extractors().end());
+  extractors.push_back(find_variant(reference_extractors(), "openvdb"));
+  for (const int resolution : {32, 128, 512})
+    for (const Extractor& extractor : extractors)
+      benchmark::RegisterBenchmark(
+          (extractor.name + "/sphere/" + std::to_string(resolution)).c_str(),
+          [extractor, resolution](benchmark::State& state) { extract_sphere(state, extractor, resolution); })
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime()
+          ->MeasureProcessCPUTime();
+}
+
+}  // namespace
+}  // namespace hermesh
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  hermesh::register_all();
+  const std::size_t ran = benchmark::RunSpecifiedBenchmarks();
+  return ran == 0 || hermesh::failures > 0 ? 1 : 0;
+}

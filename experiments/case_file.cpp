@@ -1,0 +1,119 @@
+#include "experiments/case_file.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <set>
+
+#include "algorithms/core/error.h"
+
+namespace hermesh {
+
+namespace {
+
+class CaseFileReader {
+ public:
+  explicit CaseFileReader(const std::filesystem::path& path) : path_(path) {}
+
+  std::vector<CaseRecipe> read() {
+    toml::table document;
+    try {
+      document = toml::parse_file(path_.string());
+    } catch (const toml::parse_error& error) {
+      fail(error.source(), std::string(error.description()));
+    }
+    check_keys(document, {"case"});
+    const toml::node* const list = document.get("case");
+    const toml::array* const cases = list ? list->as_array() : nullptr;
+    if (!cases) fail(document.source(), "there is no [[case]]");
+    for (const toml::node& node : *cases) add_case(table(node));
+    return std::move(cases_);
+  }
+
+ private:
+  void add_case(const toml::table& entry) {
+    CaseRecipe result;
+    result.name = text(entry, "name");
+    result.summary = text(entry, "summary");
+    if (!names_.insert(result.name).second)
+      fail(entry.source(), "the case '" + result.name + "' is there twice");
+    if (entry.contains("files")) {
+      check_keys(entry, {"name", "summary", "files", "triangles", "stand_in"});
+      add_files(result, *entry.get("files"));
+      result.triangles = static_cast<std::size_t>(number(*get(entry, "triangles")));
+      result.stand_in = text(entry, "stand_in");
+      check_recipe(*get(entry, "stand_in"), result.stand_in);
+    } else if (entry.contains("recipe")) {
+      check_keys(entry, {"name", "summary", "recipe", "parameters", "sha256"});
+      result.recipe = text(entry, "recipe");
+      check_recipe(*get(entry, "recipe"), result.recipe);
+      if (const toml::node* parameters = entry.get("parameters"))
+        for (const auto& [key, value] : table(*parameters))
+          result.parameters[std::string(key.str())] = number(value);
+      result.sha256 = text(entry, "sha256");
+    } else {
+      check_keys(entry, {"name", "summary", "close_holes_of", "sha256"});
+      result.close_holes_of = text(entry, "close_holes_of");
+      const auto base = std::ranges::find(cases_, result.close_holes_of, &CaseRecipe::name);
+      if (base == cases_.end() || !base->close_holes_of.empty())
+        fail(entry.source(), "close_holes_of must name a case that stands above and is of another kind");
+      result.sha256 = text(entry, "sha256");
+    }
+    cases_.push_back(std::move(result));
+  }
+
+  void add_files(CaseRecipe& result, const toml::node& node) {
+    const toml::array* const files = node.as_array();
+    if (!files || files->empty()) fail(node.source(), "'files' must be a list of tables");
+    for (const toml::node& item : *files) {
+      const toml::table& file = table(item);
+      check_keys(file, {"file", "sha256", "from"});
+      result.files.push_back(
+          {text(file, "file"), text(file, "sha256"), file.contains("from") ? text(file, "from") : ""});
+    }
+  }
+
+  void check_recipe(const toml::node& node, const std::string& recipe) {
+    if (std::ranges::find(all_recipes(), recipe, &Recipe::name) == all_recipes().end())
+      fail(node.source(), "there is no recipe '" + recipe + "'");
+  }
+  void check_keys(const toml::table& entry, std::initializer_list<std::string_view> known) {
+    for (const auto& [key, value] : entry)
+      if (std::ranges::find(known, key.str()) == known.end())
+        fail(key.source(), "unknown key '" + std::string(key.str()) + "'");
+  }
+  const toml::table& table(const toml::node& node) {
+    if (!node.is_table()) fail(node.source(), "a table should stand here");
+    return *node.as_table();
+  }
+  const toml::node* get(const toml::table& entry, std::string_view key) {
+    const toml::node* const node = entry.get(key);
+    if (!node) fail(entry.source(), "the key '" + std::string(key) + "' is missing");
+    return node;
+  }
+  std::string text(const toml::table& entry, std::string_view key) {
+    const toml::node* const node = get(entry, key);
+    if (!node->is_string()) fail(node->source(), "'" + std::string(key) + "' must be text");
+    return **node->as_string();
+  }
+  double number(const toml::node& node) {
+    const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
+    if (!value || !(*value > -1e300 && *value < 1e300)) fail(node.source(), "a number should stand here");
+    return *value;
+  }
+  [[noreturn]] void fail(const toml::source_region& where, const std::string& what) const {
+    throw Error(path_.string() + ", line " + std::to_string(where.begin.line) + ": " + what);
+  }
+
+  std::filesystem::path path_;
+  std::vector<CaseRecipe> cases_;
+  std::set<std::string> names_;
+};
+
+}  // namespace
+
+std::vector<CaseRecipe> read_case_file(const std::filesystem::path& path) {
+  return CaseFileReader(path).read();
+}
+
+}  // namespace hermesh

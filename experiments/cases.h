@@ -1,0 +1,41 @@
+// Cases: named inputs. experiments/cases.toml is the one file of recipes; this finds, checks or makes what it
+// names.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+struct CaseInfo {
+  std::string name;
+  std::string summary;  ///< one line
+  std::string kind;     ///< "file" or "generated"
+};
+
+/// A case made ready. Every table says `origin`, so that nobody takes a stand-in for the real thing.
+struct LoadedCase {
+  std::string name;
+  PolygonMesh mesh;
+  std::string origin;  ///< "data folder", "package registry", "generated", or "stand-in: …" with the reason
+  std::string sha256;  ///< of the file's bytes, or of the generated mesh's arrays
+};
+
+/// All cases of cases.toml, in its order. @throws Error naming the file and line of a mistake.
+std::vector<CaseInfo> list_cases();
+
+/// Looks in $HERMESH_DATA, then in the cache (filled from a package registry on first use), else makes the
+/// procedural stand-in of the same size. A name that is no case but a path to a mesh file is read as that
+/// file.
+/// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
+LoadedCase load_case(const std::string& name, RunContext& context);
+
+/// Where the experiments and the recipes are: $HERMESH_EXPERIMENTS, else the source tree that the program was
+/// built from.
+std::filesystem::path experiments_folder();
+
+}  // namespace hermesh

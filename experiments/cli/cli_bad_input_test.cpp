@@ -1,0 +1,213 @@
+// Bad input: a clear sentence, exit code 1 or 2, and nothing half-written. Each run must name what is wrong
+// with it.
+#include <algorithm>
+
+#include "experiments/cli/process_for_tests.h"
+
+namespace hermesh::cli {
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+class BadInputTest : public ProgramTest {
+ protected:
+  /// The program must refuse with one line on stderr that holds all of `words`, and must leave the folder as
+  /// it was.
+  void expect_refusal(int exit_code, const Arguments& arguments, const std::vector<std::string>& words) {
+    std::string command = "hermesh";
+    for (const std::string& argument : arguments) command += " " + argument;
+    SCOPED_TRACE(command);
+    const std::set<std::string> before = files();
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_EQ(outcome.err.rfind("hermesh: ", 0), 0u) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    for (const std::string& word : words) EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before);
+  }
+
+  void expect_bad_mesh(const std::string& name, const std::string& content) {
+    write(name, content);
+    expect_refusal(1, {"remesh", name, "out.ply", "--resolution", "10"}, {name});
+    expect_refusal(1, {"voxelize", name, "out.vdb", "--resolution", "10"}, {name});
+    expect_refusal(1, {"validate", name}, {name});
+    expect_refusal(1, {"info", name}, {name});
+  }
+};
+
+TEST_F(BadInputTest, MissingFile) {
+  expect_refusal(1, {"remesh", "missing.ply", "out.ply", "--resolution", "10"}, {"missing.ply"});
+  expect_refusal(1, {"extract", "missing.vdb", "out.ply"}, {"missing.vdb"});
+  expect_refusal(1, {"validate", "missing.off"}, {"missing.off"});
+  expect_refusal(1, {"info", "missing.vdb"}, {"missing.vdb"});
+  expect_refusal(1, {"run", "missing.toml", "--out", "rows"}, {"missing.toml"});
+  expect_refusal(1, {"report", "missing"}, {"missing"});
+}
+
+TEST_F(BadInputTest, FolderInPlaceOfInput) {
+  std::filesystem::create_directory(path("folder.ply"));
+  std::filesystem::create_directory(path("folder.vdb"));
+  expect_refusal(1, {"validate", "folder.ply"}, {"folder.ply"});
+  expect_refusal(1, {"extract", "folder.vdb", "out.ply"}, {"folder.vdb"});
+}
+
+TEST_F(BadInputTest, EmptyFile) {
+  for (const char* name : {"empty.ply", "empty.obj", "empty.off", "empty.stl", "empty.ply.gz"})
+    expect_bad_mesh(name, "");
+  write("empty.vdb", "");
+  expect_refusal(1, {"extract", "empty.vdb", "out.ply"}, {"empty.vdb"});
+  expect_refusal(1, {"info", "empty.vdb"}, {"empty.vdb"});
+}
+
+TEST_F(BadInputTest, TruncatedFile) {
+  write_cube();
+  const std::string cube = read("cube.off");
+  expect_bad_mesh("cut.off", cube.substr(0, cube.size() / 2));
+  expect_bad_mesh("cut_header.ply", "ply\nformat ascii 1.0\nelement vertex 3\n");
+  for (const std::string name : {"whole.ply", "whole.stl"}) {
+    ASSERT_EQ(run({"remesh", "cube.off", name, "--resolution", "8"}).exit_code, 0);
+    const std::string whole = read(name);
+    expect_bad_mesh("cut_" + name, whole.substr(0, whole.size() - 7));
+    expect_bad_mesh("half_" + name, whole.substr(0, whole.size() / 2));
+  }
+}
+
+TEST_F(BadInputTest, TruncatedVolume) {
+  write_cube();
+  ASSERT_EQ(run({"voxelize", "cube.off", "cube.vdb", "--resolution", "16"}).exit_code, 0);
+  const std::string whole = read("cube.vdb");
+  for (const std::size_t size : {whole.size() / 10, whole.size() / 2, whole.size() - 20}) {
+    write("cut.vdb", whole.substr(0, size));
+    expect_refusal(1, {"extract", "cut.vdb", "out.ply"}, {"cut.vdb"});
+  }
+}
+
+TEST_F(BadInputTest, WrongType) {
+  write_cube();
+  write("cube.txt", read("cube.off"));
+  expect_refusal(1, {"remesh", "cube.txt", "out.ply", "--resolution", "10"}, {"cube.txt", ".ply"});
+  expect_refusal(1, {"info", "cube.txt"}, {"cube.txt"});
+  expect_bad_mesh("cube_is_off.ply", read("cube.off"));
+  write("cube_is_off.vdb", read("cube.off"));
+  expect_refusal(1, {"extract", "cube_is_off.vdb", "out.ply"}, {"cube_is_off.vdb"});
+  expect_refusal(1, {"info", "cube_is_off.vdb"}, {"cube_is_off.vdb"});
+  expect_refusal(1, {"extract", "cube.off", "out.ply"}, {"cube.off"});
+}
+
+TEST_F(BadInputTest, BadNumbersInAMesh) {
+  expect_bad_mesh("nan.off", "OFF\n3 1 0\n0 0 0\n1 0 nan\n0 1 0\n3 0 1 2\n");
+  expect_bad_mesh("inf.obj", "v 0 0 0\nv 1 0 inf\nv 0 1 0\nf 1 2 3\n");
+  expect_bad_mesh("index.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n");
+  expect_bad_mesh("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
+  expect_bad_mesh("negative.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n");
+  expect_bad_mesh("none.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n");
+  expect_bad_mesh("none.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+}
+
+TEST_F(BadInputTest, VoxelSize) {
+  write_cube();
+  const auto refuse = [&](const Arguments& size, const std::string& word) {
+    for (const Arguments& command :
+         {Arguments{"remesh", "cube.off", "out.ply"}, {"voxelize", "cube.off", "out.vdb"}}) {
+      Arguments arguments = command;
+      arguments.insert(arguments.end(), size.begin(), size.end());
+      expect_refusal(2, arguments, {word});
+    }
+  };
+  for (const char* bad : {"0", "-0.1", "nan", "inf", "-inf", "small", ""})
+    refuse({"--voxel-size", bad}, "--voxel-size");
+  for (const char* bad : {"0", "-5", "nan", "2.5", "many"}) refuse({"--resolution", bad}, "--resolution");
+  refuse({}, "--voxel-size");
+  refuse({"--voxel-size", "0.1", "--resolution", "10"}, "--resolution");
+  for (const char* band : {"--exterior-band", "--interior-band"})
+    for (const char* bad : {"0", "-3", "nan", "inf"}) refuse({"--resolution", "10", band, bad}, band);
+}
+
+TEST_F(BadInputTest, AbsurdlySmallVoxelsAreRefusedBeforeAllocation) {
+  write_cube();
+  for (const char* size : {"1e-6", "1e-12", "1e-300"}) {
+    for (const char* voxelizer : {"openvdb", "exact"}) {
+      expect_refusal(1, {"remesh", "cube.off", "out.ply", "--voxel-size", size, "--voxelizer", voxelizer},
+                     {"GiB"});
+      expect_refusal(1, {"voxelize", "cube.off", "out.vdb", "--voxel-size", size, "--voxelizer", voxelizer},
+                     {"GiB"});
+    }
+  }
+  expect_refusal(1, {"remesh", "cube.off", "out.ply", "--resolution", "1000000000"}, {"GiB"});
+  expect_refusal(1,
+                 {"remesh", "cube.off", "out.ply", "--resolution", "50", "--interior-band", "1e9",
+                  "--exterior-band", "1e9"},
+                 {"GiB"});
+}
+
+TEST_F(BadInputTest, MeshWithoutExtent) {
+  write("point.off", "OFF\n3 1 0\n1 1 1\n1 1 1\n1 1 1\n3 0 1 2\n");
+  expect_refusal(1, {"remesh", "point.off", "out.ply", "--resolution", "10"}, {"point.off", "--voxel-size"});
+}
+
+TEST_F(BadInputTest, UnwritableOutput) {
+  write_cube();
+  std::filesystem::create_directory(path("folder.ply"));
+  std::filesystem::create_directory(path("folder.vdb"));
+  for (const char* out :
+       {"missing/out.ply", "folder.ply", "out.txt", "out.ply.gz", "out", "out.vdb", "cube.off/out.ply"})
+    expect_refusal(1, {"remesh", "cube.off", out, "--resolution", "10"}, {out});
+  for (const char* out : {"missing/out.vdb", "folder.vdb", "out.ply"})
+    expect_refusal(1, {"voxelize", "cube.off", out, "--resolution", "10"}, {out});
+  expect_refusal(1, {"remesh", "cube.off", "/dev/null", "--resolution", "10"}, {"/dev/null"});
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+}
+
+TEST_F(BadInputTest, FailureLeavesAnOlderOutputAsItWas) {
+  write_cube();
+  write("out.ply", "older");
+  expect_refusal(1, {"remesh", "missing.ply", "out.ply", "--resolution", "10"}, {"missing.ply"});
+  expect_refusal(1, {"remesh", "cube.off", "out.ply", "--resolution", "10", "--isovalue", "1e6"},
+                 {"isovalue"});
+  EXPECT_EQ(read("out.ply"), "older");
+}
+
+TEST_F(BadInputTest, UnknownNamesAndOptionValues) {
+  write_cube();
+  const Arguments remesh = {"remesh", "cube.off", "out.ply", "--resolution", "10"};
+  const auto refuse = [&](const Arguments& more, const std::vector<std::string>& words) {
+    Arguments arguments = remesh;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refusal(2, arguments, words);
+  };
+  refuse({"--extractor", "nonsense"}, {"nonsense", "dual-contouring"});
+  refuse({"--voxelizer", "nonsense"}, {"nonsense", "openvdb"});
+  refuse({"--nonsense"}, {"--nonsense"});
+  refuse({"-o", "nonsense=1"}, {"nonsense", "dual-contouring"});
+  refuse({"-o", "nonsense"}, {"nonsense"});
+  refuse({"-o", "placement=nonsense"}, {"placement", "nonsense", "average"});
+  refuse({"-o", "placement=average", "-o", "placement=optimal"}, {"placement", "twice"});
+  refuse({"--extractor", "openvdb", "-o", "adaptivity=2"}, {"adaptivity", "2"});
+  refuse({"--isovalue", "nan"}, {"--isovalue"});
+  refuse({"--threads", "0"}, {"--threads"});
+  refuse({"--threads", "-1"}, {"--threads"});
+  refuse({"--threads", "two"}, {"--threads"});
+}
+
+TEST_F(BadInputTest, Usage) {
+  write_cube();
+  expect_refusal(2, {}, {"--help"});
+  expect_refusal(2, {"nonsense"}, {"nonsense"});
+  expect_refusal(2, {"remesh", "cube.off"}, {"OUT"});
+  expect_refusal(2, {"validate"}, {"MESH"});
+  expect_refusal(2, {"validate", "cube.off", "--require", "closed,pretty"}, {"pretty", "manifold"});
+  expect_refusal(2, {"validate", "cube.off", "--certify"}, {"--reference"});
+  expect_refusal(2, {"validate", "cube.off", "--features", "cube.off", "--dihedral", "200"}, {"--dihedral"});
+  expect_refusal(2, {"validate", "cube.off", "--samples", "0"}, {"--samples"});
+  expect_refusal(2, {"run", "x.toml", "--tier", "huge"}, {"--tier", "quick"});
+  expect_refusal(2, {"report", ".", "--format", "html"}, {"--format", "md"});
+}
+
+TEST_F(BadInputTest, GridThatIsNotThere) {
+  write_cube();
+  ASSERT_EQ(run({"voxelize", "cube.off", "cube.vdb", "--resolution", "10"}).exit_code, 0);
+  expect_refusal(1, {"extract", "cube.vdb", "out.ply", "--grid", "density"}, {"cube.vdb", "density", "sdf"});
+}
+
+}  // namespace
+}  // namespace hermesh::cli

@@ -1,0 +1,243 @@
+// The program from the outside: what its commands do, print and return.
+#include <signal.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "experiments/cli/process_for_tests.h"
+
+namespace hermesh::cli {
+namespace {
+
+using Json = nlohmann::json;
+using CliTest = ProgramTest;
+
+/// The names in a list of objects that have one.
+std::vector<std::string> names(const Json& list) {
+  std::vector<std::string> all;
+  for (const Json& item : list) all.push_back(item.at("name"));
+  return all;
+}
+
+bool contains(const std::vector<std::string>& all, const std::string& name) {
+  return std::find(all.begin(), all.end(), name) != all.end();
+}
+
+TEST_F(CliTest, EveryCommandHasHelp) {
+  const Outcome overview = run({"--help"});
+  EXPECT_EQ(overview.exit_code, 0);
+  for (const char* command : {"list", "voxelize", "extract", "remesh", "validate", "info", "run", "report"}) {
+    SCOPED_TRACE(command);
+    EXPECT_NE(overview.out.find(command), std::string::npos);
+    const Outcome help = run({command, "--help"});
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_EQ(help.err, "");
+    for (const char* option : {"--threads", "--quiet", "--help"})
+      EXPECT_NE(help.out.find(option), std::string::npos) << help.out;
+  }
+}
+
+TEST_F(CliTest, ListIsJsonWithEveryVariant) {
+  const Outcome outcome = run({"list", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Json list = Json::parse(outcome.out);
+  for (const char* name :
+       {"marching-cubes", "dual-contouring", "openvdb", "cgal-surface-mesher", "marching-cubes-decimated"})
+    EXPECT_TRUE(contains(names(list["extractors"]), name)) << name;
+  for (const char* name : {"openvdb", "exact"})
+    EXPECT_TRUE(contains(names(list["voxelizers"]), name)) << name;
+  EXPECT_FALSE(list["cases"].empty());
+  EXPECT_FALSE(list["experiments"].empty());
+  for (const Json& extractor : list["extractors"]) {
+    EXPECT_FALSE(extractor["summary"].get<std::string>().empty());
+    EXPECT_TRUE(extractor["promises"]["closed"].is_boolean());
+    for (const Json& option : extractor["options"]) EXPECT_FALSE(option["help"].get<std::string>().empty());
+  }
+}
+
+TEST_F(CliTest, ListForPeopleNamesTheSame) {
+  const Outcome text = run({"list"});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  const Json list = Json::parse(run({"list", "--json"}).out);
+  for (const char* kind : {"extractors", "voxelizers", "experiments", "cases"})
+    for (const std::string& name : names(list[kind]))
+      EXPECT_NE(text.out.find(name), std::string::npos) << name;
+}
+
+TEST_F(CliTest, CubeThroughAllStages) {
+  write_cube();
+  const Outcome outcome =
+      run({"remesh", "cube.off", "out.ply", "--resolution", "20", "--extractor", "marching-cubes"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("marching-cubes"), std::string::npos);
+
+  const Outcome judged = run(
+      {"validate", "out.ply", "--reference", "cube.off", "--features", "cube.off", "--certify", "--require",
+       "closed,manifold,oriented,watertight,no-self-intersection", "--json", "--samples", "20000"});
+  ASSERT_EQ(judged.exit_code, 0) << judged.err << judged.out;
+  const Json report = Json::parse(judged.out);
+  for (const char* key :
+       {"boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
+        "degenerate_polygons", "duplicate_polygons", "isolated_points", "genus", "self_intersecting_pairs"})
+    EXPECT_EQ(report.at(key), 0) << key;
+  EXPECT_EQ(report.at("components"), 1);
+  EXPECT_EQ(report.at("euler_characteristic"), 2);
+  EXPECT_GT(report.at("points"), 1000);
+  EXPECT_GT(report.at("triangles"), 2000);
+  EXPECT_EQ(report.at("quads"), 0);
+  // Marching cubes cuts the corners of the cube, whose side is 2, off by less than a voxel of 0.1.
+  EXPECT_NEAR(report.at("volume"), 8.0, 0.1);
+  EXPECT_NEAR(report.at("area"), 24.0, 1.0);
+  for (const char* direction : {"to_reference", "from_reference"}) {
+    const Json& distances = report.at(direction);
+    EXPECT_LE(distances.at("mean"), distances.at("rms"));
+    EXPECT_LE(distances.at("rms"), distances.at("max"));
+    EXPECT_LT(distances.at("max"), 0.1);
+    // A sampled maximum is a lower bound of the certified interval's upper end.
+    EXPECT_LE(distances.at("max"), report.at(std::string("certified_") + direction).at("upper"));
+  }
+}
+
+TEST_F(CliTest, VoxelizeAndExtractGiveWhatRemeshGives) {
+  write_sphere();
+  ASSERT_EQ(run({"voxelize", "sphere.off", "sphere.vdb", "--voxel-size", "0.1"}).exit_code, 0);
+  ASSERT_EQ(run({"extract", "sphere.vdb", "two.ply", "--extractor", "marching-cubes"}).exit_code, 0);
+  ASSERT_EQ(run({"extract", "sphere.vdb", "exact.ply", "--source", "sphere.off"}).exit_code, 0);
+  ASSERT_EQ(run({"remesh", "sphere.off", "one.ply", "--resolution", "20", "--extractor", "marching-cubes"})
+                .exit_code,
+            0);
+  ASSERT_EQ(run({"remesh", "sphere.off", "remeshed.ply", "--resolution", "20"}).exit_code, 0);
+  EXPECT_EQ(read("one.ply"), read("two.ply"));
+  EXPECT_EQ(read("exact.ply"), read("remeshed.ply"));
+
+  const Outcome info = run({"info", "sphere.vdb"});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_NE(info.out.find("sdf"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("level set"), std::string::npos) << info.out;
+}
+
+TEST_F(CliTest, BandsAndIsovalueTakeEffect) {
+  write_sphere();
+  const Outcome narrow = run({"voxelize", "sphere.off", "narrow.vdb", "--voxel-size", "0.1"});
+  const Outcome wide = run({"voxelize", "sphere.off", "wide.vdb", "--voxel-size", "0.1", "--interior-band",
+                            "6", "--exterior-band", "6"});
+  ASSERT_EQ(narrow.exit_code, 0) << narrow.err;
+  ASSERT_EQ(wide.exit_code, 0) << wide.err;
+  EXPECT_NE(run({"info", "narrow.vdb"}).out, run({"info", "wide.vdb"}).out);
+  // Moving the isovalue outwards by 0.2 makes the sphere's radius 1.2 and its volume 1.2³ times as large.
+  const auto volume = [&](const std::string& isovalue) {
+    EXPECT_EQ(run({"extract", "wide.vdb", "out.ply", "--isovalue", isovalue}).exit_code, 0);
+    return Json::parse(run({"validate", "out.ply", "--json"}).out).at("volume").get<double>();
+  };
+  EXPECT_NEAR(volume("0.2") / volume("0"), 1.728, 0.02);
+  EXPECT_NEAR(volume("-0.2") / volume("0"), 0.512, 0.02);
+}
+
+TEST_F(CliTest, EveryExtractorRuns) {
+  write_sphere();
+  const Json list = Json::parse(run({"list", "--json"}).out);
+  for (const std::string& name : names(list["extractors"])) {
+    const Outcome outcome =
+        run({"remesh", "sphere.off", name + ".obj", "--resolution", "16", "--extractor", name, "--quiet"});
+    EXPECT_EQ(outcome.exit_code, 0) << name << ": " << outcome.err;
+    EXPECT_EQ(outcome.out + outcome.err, "") << name;
+    EXPECT_EQ(run({"validate", name + ".obj", "--require", "closed"}).exit_code, 0) << name;
+  }
+}
+
+TEST_F(CliTest, SameBytesForEveryNumberOfThreads) {
+  write_sphere();
+  const Json list = Json::parse(run({"list", "--json"}).out);
+  int compared = 0;
+  for (const Json& extractor : list["extractors"]) {
+    if (!extractor.at("ours")) continue;
+    const std::string name = extractor.at("name");
+    for (const char* threads : {"1", "2"})
+      ASSERT_EQ(run({"remesh", "sphere.off", name + threads + ".ply", "--resolution", "64", "--extractor",
+                     name, "--threads", threads})
+                    .exit_code,
+                0);
+    EXPECT_TRUE(read(name + "1.ply") == read(name + "2.ply")) << name;
+    ++compared;
+  }
+  EXPECT_GE(compared, 2);
+}
+
+TEST_F(CliTest, RequirementNotMetIsExitCodeThree) {
+  write("triangle.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  const Outcome outcome = run({"validate", "triangle.off", "--require", "manifold,closed", "--json"});
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+  const Json report = Json::parse(outcome.out);
+  EXPECT_EQ(report.at("boundary_edges"), 3);
+  EXPECT_TRUE(report.at("genus").is_null());
+  EXPECT_EQ(report.at("unmet_requirements"), Json::array({"closed"}));
+  EXPECT_EQ(
+      run({"validate", "triangle.off", "--require", "manifold,oriented,no-self-intersection"}).exit_code, 0);
+  EXPECT_EQ(run({"validate", "triangle.off", "--require", "watertight"}).exit_code, 3);
+  EXPECT_EQ(run({"validate", "triangle.off"}).exit_code, 0);
+}
+
+TEST_F(CliTest, InfoOfAMesh) {
+  write_cube();
+  const Outcome outcome = run({"info", "cube.off"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* text :
+       {"points     8\n", "triangles  12\n", "quads      0\n", "(-1, -1, -1)", "(1, 1, 1)", "(2, 2, 2)"})
+    EXPECT_NE(outcome.out.find(text), std::string::npos) << outcome.out;
+}
+
+TEST_F(CliTest, ProgressIsShownOnATerminalAndErased) {
+  write_sphere();
+  const std::vector<std::string> arguments = {"remesh", "sphere.off", "out.ply", "--resolution", "200"};
+  const std::string erase = "\r\033[K";
+  const std::string sent = terminal_output(arguments);
+  EXPECT_NE(sent.find("%"), std::string::npos) << sent;
+  EXPECT_EQ(sent.find('\n'), std::string::npos) << sent;
+  ASSERT_GE(sent.size(), erase.size());
+  EXPECT_EQ(sent.substr(sent.size() - erase.size()), erase);
+
+  std::vector<std::string> quiet = arguments;
+  quiet.push_back("--quiet");
+  EXPECT_EQ(terminal_output(quiet), "");
+  EXPECT_EQ(run(arguments).err, "");
+}
+
+// The program must be in the middle of its work when the signal comes: these meshes take many seconds.
+class InterruptTest : public ProgramTest {
+ protected:
+  void expect_cancelled(int signal, int exit_code, std::chrono::milliseconds after,
+                        const std::vector<std::string>& arguments) {
+    const std::set<std::string> before = files();
+    const Outcome outcome = run(arguments, Interruption{signal, after});
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.out << outcome.err;
+    EXPECT_LT(outcome.seconds, 1.0);
+    EXPECT_EQ(outcome.err, "");
+    EXPECT_EQ(files(), before);
+  }
+};
+
+TEST_F(InterruptTest, LeavesNothingBehind) {
+  write_sphere();
+  for (const int milliseconds : {50, 300, 1000})
+    expect_cancelled(SIGINT, 130, std::chrono::milliseconds(milliseconds),
+                     {"remesh", "sphere.off", "out.ply", "--resolution", "700"});
+}
+
+TEST_F(InterruptTest, EndsLibraryCodeThatDoesNotPoll) {
+  write_sphere();
+  expect_cancelled(
+      SIGINT, 130, std::chrono::milliseconds(700),
+      {"remesh", "sphere.off", "out.ply", "--resolution", "200", "--extractor", "cgal-surface-mesher"});
+}
+
+TEST_F(InterruptTest, KeepsTheOlderOutput) {
+  write_sphere();
+  write("out.vdb", "older");
+  expect_cancelled(SIGTERM, 143, std::chrono::milliseconds(300),
+                   {"voxelize", "sphere.off", "out.vdb", "--resolution", "700"});
+  EXPECT_EQ(read("out.vdb"), "older");
+}
+
+}  // namespace
+}  // namespace hermesh::cli

@@ -1,0 +1,29 @@
+// Numbers and points as text for the screen.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdio>
+#include <string>
+
+namespace hermesh::cli {
+
+/// Six significant digits.
+inline std::string text(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.6g", value);
+  return buffer;
+}
+
+inline std::string text(const Eigen::Vector3d& point) {
+  char buffer[96];
+  std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", point.x(), point.y(), point.z());
+  return buffer;
+}
+
+inline std::string seconds_text(double seconds) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3f s", seconds);
+  return buffer;
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,74 @@
+// hermesh info: what a file holds.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/core/vdb_file.h"
+#include "experiments/cli/format.h"
+#include "experiments/cli/session.h"
+
+namespace hermesh::cli {
+namespace {
+
+std::string index_text(const std::array<int, 3>& index) {
+  return "(" + std::to_string(index[0]) + ", " + std::to_string(index[1]) + ", " + std::to_string(index[2]) +
+         ")";
+}
+
+void print_mesh(const std::filesystem::path& path, RunContext& context) {
+  const MeshFile mesh = read_mesh_file(path, context);
+  Bounds used;
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t point : triangle) used.add(mesh.points[point]);
+  for (const Quad& quad : mesh.quads)
+    for (const std::uint32_t point : quad) used.add(mesh.points[point]);
+  std::cout << "file       " << path.string() << "\nkind       polygon mesh"
+            << "\npoints     " << mesh.points.size() << "\ntriangles  " << mesh.triangles.size()
+            << "\nquads      " << mesh.quads.size() << "\nlower      " << text(used.lower) << "\nupper      "
+            << text(used.upper) << "\nsize       " << text(used.size()) << "\norigin     "
+            << (mesh.origin ? text(*mesh.origin) : "not stated") << '\n';
+}
+
+void print_grid(const GridSummary& grid) {
+  std::cout << "grid           " << grid.name << "\n  values       " << grid.value_type;
+  if (!grid.readable) std::cout << " (a type that this program does not know)";
+  std::cout << "\n  class        " << grid.grid_class << '\n';
+  if (!grid.readable) return;
+  std::cout << "  voxel size   " << text(grid.voxel_size) << "\n  active       " << grid.active_voxels
+            << " voxels";
+  if (grid.active_voxels > 0)
+    std::cout << ", indices " << index_text(grid.lower) << " to " << index_text(grid.upper);
+  std::cout << "\n  background   " << text(grid.background) << "\n  memory       " << grid.memory_bytes
+            << " bytes\n";
+}
+
+void print_volume(const std::filesystem::path& path) {
+  const std::vector<GridSummary> grids = describe_vdb(path);
+  std::cout << "file           " << path.string() << "\nkind           OpenVDB, " << grids.size()
+            << (grids.size() == 1 ? " grid\n" : " grids\n");
+  for (const GridSummary& grid : grids) print_grid(grid);
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "info", "What a mesh or a .vdb file holds");
+  auto file = std::make_shared<std::string>();
+  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl, also with .gz) or .vdb")->required();
+  command->callback([file, &session] {
+    session.command = [file, &session] {
+      const std::filesystem::path path = *file;
+      if (is_mesh_path(path))
+        print_mesh(path, session.context);
+      else if (path.extension() == ".vdb")
+        print_volume(path);
+      else
+        throw Error("cannot tell what '" + *file + "' is: its name ends neither in .vdb nor in " +
+                    ".ply, .obj, .off or .stl (.gz may follow)");
+      return kDone;
+    };
+  });
+}
+
+}  // namespace hermesh::cli

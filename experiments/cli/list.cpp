@@ -1,0 +1,130 @@
+// hermesh list: variants, voxelizers, experiments and cases.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "algorithms/variants.h"
+#include "experiments/cases.h"
+#include "experiments/cli/format.h"
+#include "experiments/cli/session.h"
+#include "experiments/harness.h"
+
+namespace hermesh::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+bool is_ours(const std::string& extractor) {
+  return std::ranges::any_of(our_extractors(), [&](const Extractor& ours) { return ours.name == extractor; });
+}
+
+Json to_json(const OptionSpec& option) {
+  Json json = {{"name", option.name}, {"default", option.fallback}, {"help", option.help}};
+  if (option.choices.empty()) {
+    json["minimum"] = option.minimum;
+    json["maximum"] = option.maximum;
+  } else {
+    json["choices"] = option.choices;
+  }
+  return json;
+}
+
+Json to_json(const Extractor& extractor) {
+  Json options = Json::array();
+  for (const OptionSpec& option : extractor.options) options.push_back(to_json(option));
+  const Promises& promises = extractor.promises;
+  return {{"name", extractor.name},
+          {"summary", extractor.summary},
+          {"ours", is_ours(extractor.name)},
+          {"promises",
+           {{"closed", promises.closed},
+            {"manifold", promises.manifold},
+            {"oriented", promises.oriented},
+            {"no_self_intersection", promises.no_self_intersection}}},
+          {"options", options}};
+}
+
+void print_json() {
+  Json all = {{"extractors", Json::array()},
+              {"voxelizers", Json::array()},
+              {"experiments", Json::array()},
+              {"cases", Json::array()}};
+  for (const Extractor& extractor : all_extractors()) all["extractors"].push_back(to_json(extractor));
+  for (const Voxelizer& voxelizer : all_voxelizers())
+    all["voxelizers"].push_back({{"name", voxelizer.name}, {"summary", voxelizer.summary}});
+  for (const ExperimentInfo& experiment : list_experiments())
+    all["experiments"].push_back(
+        {{"name", experiment.name}, {"question", experiment.question}, {"file", experiment.file.string()}});
+  for (const CaseInfo& item : list_cases())
+    all["cases"].push_back({{"name", item.name}, {"summary", item.summary}, {"kind", item.kind}});
+  std::cout << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+}
+
+void print_line(const std::string& name, const std::string& text) {
+  constexpr std::size_t kNameWidth = 24;
+  std::cout << "  " << name << std::string(name.size() < kNameWidth ? kNameWidth - name.size() : 1, ' ')
+            << text << '\n';
+}
+
+std::string promised(const Promises& promises) {
+  std::string text;
+  const auto add = [&](bool promise, const char* word) {
+    if (promise) text += (text.empty() ? "" : ", ") + std::string(word);
+  };
+  add(promises.closed, "closed");
+  add(promises.manifold, "manifold");
+  add(promises.oriented, "oriented");
+  add(promises.no_self_intersection, "no self-intersection");
+  return text.empty() ? "nothing" : text;
+}
+
+std::string allowed(const OptionSpec& option) {
+  if (option.choices.empty()) {
+    // A bound this large is the declaration's way to say that there is none.
+    const std::string upper = option.maximum >= 1e300 ? "" : " to " + text(option.maximum);
+    return (upper.empty() ? "from " : "") + text(option.minimum) + upper;
+  }
+  std::string names;
+  for (const std::string& choice : option.choices) names += (names.empty() ? "" : "|") + choice;
+  return names;
+}
+
+void print_extractor(const Extractor& extractor) {
+  print_line(extractor.name, extractor.summary + (is_ours(extractor.name) ? "" : " [reference]"));
+  print_line("", "promises: " + promised(extractor.promises));
+  for (const OptionSpec& option : extractor.options)
+    print_line("",
+               "-o " + option.name + "=" + option.fallback + " (" + allowed(option) + "): " + option.help);
+}
+
+void print_text() {
+  std::cout << "extractors (hermesh extract, remesh --extractor NAME)\n";
+  for (const Extractor& extractor : all_extractors()) print_extractor(extractor);
+  std::cout << "\nvoxelizers (hermesh voxelize, remesh --voxelizer NAME)\n";
+  for (const Voxelizer& voxelizer : all_voxelizers()) print_line(voxelizer.name, voxelizer.summary);
+  std::cout << "\nexperiments (hermesh run FILE)\n";
+  for (const ExperimentInfo& experiment : list_experiments()) {
+    print_line(experiment.name, experiment.question);
+    print_line("", experiment.file.string());
+  }
+  std::cout << "\ncases (inputs that experiments name)\n";
+  for (const CaseInfo& item : list_cases()) print_line(item.name, item.summary + " [" + item.kind + "]");
+}
+
+}  // namespace
+
+void add_list(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "list", "Variants, voxelizers, experiments and cases");
+  auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "Print JSON");
+  command->callback([json, &session] {
+    session.command = [json] {
+      *json ? print_json() : print_text();
+      return kDone;
+    };
+  });
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,103 @@
+// The program `hermesh`. What it does on the command line, its exit codes and its output are a contract for
+// scripts: results on stdout, everything else on stderr, a failure is one line there.
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <new>
+#include <thread>
+
+#include "experiments/cli/session.h"
+#include "experiments/cli/signals.h"
+#include "experiments/cli/terminal_progress.h"
+
+namespace hermesh::cli {
+namespace {
+
+int fail(int exit_code, std::string sentence) {
+  // Messages of libraries may hold line breaks; scripts rely on one line.
+  std::replace(sentence.begin(), sentence.end(), '\n', ' ');
+  std::cerr << "hermesh: " << sentence << std::endl;
+  return exit_code;
+}
+
+void add_common_options(CLI::App& app, Session& session) {
+  app.add_option("--threads", session.threads, "Number of threads, at least 1 (default: all of the machine)")
+      ->check([](const std::string& given) {
+        int count = 0;
+        return CLI::detail::lexical_cast(given, count) && count >= 1
+                   ? std::string()
+                   : "must be a whole number of at least 1, not '" + given + "'";
+      });
+  app.add_flag("--quiet", session.quiet, "Print results and errors only: no progress, notes or summaries");
+}
+
+int run_command(Session& session) {
+  const TerminalProgress progress(session.context, !session.quiet);
+  const int exit_code = session.command();
+  std::cout.flush();
+  if (!std::cout) throw Error("cannot write to the standard output");
+  return exit_code;
+}
+
+/// Turns whatever ends the command into an exit code and at most one line.
+int run_to_exit_code(Session& session) {
+  try {
+    return run_command(session);
+  } catch (const std::exception& error) {
+    // Whatever a library throws while the user is waiting for the end, it ends because the user said so.
+    if (const int exit_code = signal_exit_code()) end_process(exit_code);
+    if (dynamic_cast<const UsageError*>(&error)) return fail(kUsage, error.what());
+    if (dynamic_cast<const std::bad_alloc*>(&error))
+      return fail(kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory");
+    return fail(kFailed, error.what());
+  }
+}
+
+int run_program(int argc, char** argv) {
+  Session session;
+  CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
+  app.set_version_flag("--version", "hermesh " HERMESH_VERSION);
+  app.set_help_flag("--help,-h", "Print this help and exit");
+  app.require_subcommand(1);
+  add_common_options(app, session);
+  add_list(app, session);
+  add_conversions(app, session);
+  add_validate(app, session);
+  add_info(app, session);
+  add_experiments(app, session);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
+  }
+
+  const int threads = session.threads.value_or(std::max(1u, std::thread::hardware_concurrency()));
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  session.context.cancel = &handle_signals();
+  const int exit_code = run_to_exit_code(session);
+  work_is_finished();
+  if (!session.quiet && (exit_code == kDone || exit_code == kNotMet))
+    for (const std::string& note : session.context.notes) std::cerr << "note: " << note << '\n';
+  return exit_code;
+}
+
+}  // namespace
+
+CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary) {
+  CLI::App* command = app.add_subcommand(name, summary);
+  add_common_options(*command, session);
+  return command;
+}
+
+}  // namespace hermesh::cli
+
+int main(int argc, char** argv) {
+  try {
+    return hermesh::cli::run_program(argc, argv);
+  } catch (const std::exception& error) {
+    return hermesh::cli::fail(hermesh::cli::kFailed, error.what());
+  }
+}

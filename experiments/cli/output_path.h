@@ -1,0 +1,19 @@
+// Whether a result can be written, asked before the work that makes it.
+#pragma once
+
+#include <filesystem>
+
+namespace hermesh::cli {
+
+/// @throws Error if the path is not one that meshes are written to (.ply .obj .off .stl), or check_writable()
+/// throws.
+void check_mesh_output(const std::filesystem::path& path);
+
+/// @throws Error if the path does not end in .vdb, or check_writable() throws.
+void check_volume_output(const std::filesystem::path& path);
+
+/// @throws Error if the folder does not exist or cannot be written, or if something other than a plain file
+/// is there.
+void check_writable(const std::filesystem::path& path);
+
+}  // namespace hermesh::cli

@@ -1,0 +1,146 @@
+#include "experiments/cli/process_for_tests.h"
+
+#include <fcntl.h>
+#include <pty.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+namespace hermesh::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::filesystem::path make_folder() {
+  std::string name = (std::filesystem::temp_directory_path() / "hermesh_cli_XXXXXX").string();
+  if (!mkdtemp(name.data())) throw std::runtime_error("cannot make " + name);
+  return name;
+}
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream content;
+  content << in.rdbuf();
+  return content.str();
+}
+
+int open_or_exit(const std::filesystem::path& file, int flags) {
+  const int opened = open(file.c_str(), flags | O_CLOEXEC, 0600);
+  if (opened < 0) _exit(126);
+  return opened;
+}
+
+}  // namespace
+
+ProgramTest::ProgramTest() : folder_(make_folder()), streams_(make_folder()) {}
+
+ProgramTest::~ProgramTest() {
+  std::filesystem::remove_all(folder_);
+  std::filesystem::remove_all(streams_);
+}
+
+void ProgramTest::execute(std::vector<std::string> words, int err) const {
+  words.insert(words.begin(), HERMESH_PROGRAM);
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  dup2(open_or_exit("/dev/null", O_RDONLY), STDIN_FILENO);
+  dup2(open_or_exit(streams_ / "out", O_WRONLY | O_CREAT | O_TRUNC), STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  if (chdir(folder_.c_str()) != 0) _exit(126);
+  execv(argv[0], argv.data());
+  _exit(127);
+}
+
+Outcome ProgramTest::run(const std::vector<std::string>& arguments,
+                         std::optional<Interruption> interruption) {
+  const pid_t child = fork();
+  if (child == 0) execute(arguments, open_or_exit(streams_ / "err", O_WRONLY | O_CREAT | O_TRUNC));
+  if (interruption) {
+    std::this_thread::sleep_for(interruption->after);
+    kill(child, interruption->signal);
+  }
+  const Clock::time_point start = Clock::now();
+  int status = 0;
+  waitpid(child, &status, 0);
+  const std::chrono::duration<double> elapsed = Clock::now() - start;
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content_of(streams_ / "out"),
+          content_of(streams_ / "err"), elapsed.count()};
+}
+
+std::string ProgramTest::terminal_output(const std::vector<std::string>& arguments) {
+  int terminal = -1, end_of_program = -1;
+  if (openpty(&terminal, &end_of_program, nullptr, nullptr, nullptr) != 0)
+    throw std::runtime_error("cannot open a terminal");
+  const pid_t child = fork();
+  if (child == 0) execute(arguments, end_of_program);
+  close(end_of_program);
+  std::string sent;
+  char buffer[4096];
+  // Reading fails once the program has closed its end.
+  for (ssize_t size; (size = ::read(terminal, buffer, sizeof buffer)) > 0;) sent.append(buffer, size);
+  close(terminal);
+  waitpid(child, nullptr, 0);
+  return sent;
+}
+
+void ProgramTest::write(const std::string& name, const std::string& content) {
+  std::ofstream(path(name), std::ios::binary) << content;
+}
+
+std::string ProgramTest::read(const std::string& name) const { return content_of(path(name)); }
+
+std::set<std::string> ProgramTest::files() const {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_))
+    names.insert(std::filesystem::relative(entry.path(), folder_).string());
+  return names;
+}
+
+void ProgramTest::write_cube() {
+  write("cube.off",
+        "OFF\n8 12 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
+        "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n"
+        "3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+}
+
+void ProgramTest::write_sphere() {
+  constexpr int kRings = 24, kSides = 48;
+  const auto ring_point = [](int ring, int side) { return 1 + (ring - 1) * kSides + side % kSides; };
+  std::ostringstream points, faces;
+  int face_count = 0;
+  points << "0 0 1\n";
+  for (int ring = 1; ring < kRings; ++ring)
+    for (int side = 0; side < kSides; ++side) {
+      const double polar = std::numbers::pi * ring / kRings, azimuth = 2 * std::numbers::pi * side / kSides;
+      points << std::sin(polar) * std::cos(azimuth) << ' ' << std::sin(polar) * std::sin(azimuth) << ' '
+             << std::cos(polar) << '\n';
+    }
+  points << "0 0 -1\n";
+  const int south = 1 + (kRings - 1) * kSides;
+  const auto face = [&](int a, int b, int c) {
+    faces << "3 " << a << ' ' << b << ' ' << c << '\n';
+    ++face_count;
+  };
+  for (int side = 0; side < kSides; ++side) {
+    face(0, ring_point(1, side), ring_point(1, side + 1));
+    face(south, ring_point(kRings - 1, side + 1), ring_point(kRings - 1, side));
+    for (int ring = 1; ring < kRings - 1; ++ring) {
+      face(ring_point(ring, side), ring_point(ring + 1, side), ring_point(ring + 1, side + 1));
+      face(ring_point(ring, side), ring_point(ring + 1, side + 1), ring_point(ring, side + 1));
+    }
+  }
+  std::ostringstream header;
+  header << "OFF\n" << south + 1 << ' ' << face_count << " 0\n";
+  write("sphere.off", header.str() + points.str() + faces.str());
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,57 @@
+// Runs the program in a test, and makes the small files that it works on.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace hermesh::cli {
+
+struct Outcome {
+  int exit_code = -1;  ///< −1 if a signal killed it
+  std::string out, err;
+  double seconds = 0.0;  ///< from the signal on, where one was sent
+};
+
+struct Interruption {
+  int signal;
+  std::chrono::milliseconds after;
+};
+
+/// Every test works in a new folder of its own, which is removed at the end.
+class ProgramTest : public testing::Test {
+ protected:
+  ProgramTest();
+  ~ProgramTest() override;
+
+  /// Runs `hermesh` with these arguments, the test's folder as working directory and nothing to read on
+  /// stdin.
+  Outcome run(const std::vector<std::string>& arguments, std::optional<Interruption> interruption = {});
+
+  std::filesystem::path path(const std::string& name) const { return folder_ / name; }
+  /// The same with a terminal for stderr; returns all that the terminal was sent.
+  std::string terminal_output(const std::vector<std::string>& arguments);
+
+  void write(const std::string& name, const std::string& content);
+  std::string read(const std::string& name) const;
+  /// Names of all that is in the folder.
+  std::set<std::string> files() const;
+
+  /// A cube with a side of 2 about the origin, 8 points and 12 triangles, as cube.off.
+  void write_cube();
+  /// A unit sphere of latitudes and longitudes, as sphere.off.
+  void write_sphere();
+
+ private:
+  /// In the child: the streams and the folder are set; `err` is a file descriptor.
+  [[noreturn]] void execute(std::vector<std::string> words, int err) const;
+
+  std::filesystem::path folder_, streams_;
+};
+
+}  // namespace hermesh::cli

@@ -1,0 +1,53 @@
+// What all commands of the program share.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "algorithms/core/error.h"
+#include "algorithms/core/run_context.h"
+
+namespace CLI {
+class App;
+}
+
+namespace hermesh::cli {
+
+/// 130 and 143 (128 + the signal's number) stand for a cancelled run.
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNotMet = 3 };
+
+/// A command line that asks for something that does not exist or cannot be: exit code 2.
+class UsageError : public Error {
+  using Error::Error;
+};
+
+/// Runs `check`, whose errors are the user's choice of words (the name of a variant, the value of an option),
+/// so that they count as usage.
+template <typename Check>
+auto as_usage(Check check) {
+  try {
+    return check();
+  } catch (const Error& error) {
+    throw UsageError(error.what());
+  }
+}
+
+struct Session {
+  RunContext context;
+  bool quiet = false;
+  std::optional<int> threads;    ///< none: as many as the machine has
+  std::function<int()> command;  ///< the one that was asked for; returns an ExitCode
+};
+
+// Each adds its commands, which set session.command when they are parsed.
+void add_list(CLI::App& app, Session& session);
+void add_conversions(CLI::App& app, Session& session);  ///< voxelize, extract, remesh
+void add_validate(CLI::App& app, Session& session);
+void add_info(CLI::App& app, Session& session);
+void add_experiments(CLI::App& app, Session& session);  ///< run, report
+
+/// A subcommand with the options that all of them take.
+CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary);
+
+}  // namespace hermesh::cli

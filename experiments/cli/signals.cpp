@@ -1,0 +1,84 @@
+#include "experiments/cli/signals.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <system_error>
+#include <thread>
+
+#include "algorithms/core/atomic_file.h"
+#include "experiments/cli/terminal_progress.h"
+
+namespace hermesh::cli {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Long enough for code that polls the flag to unwind, short enough to feel immediate.
+constexpr auto kGrace = 150ms;
+
+enum class State { working, finished, ending };
+
+std::atomic<bool> cancel_flag{false};
+std::atomic<int> signal_number{0};
+std::atomic<State> state{State::working};
+int wake_pipe[2] = {-1, -1};
+
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free,
+              "a signal handler may touch lock-free atomics only");
+
+extern "C" void on_signal(int number) {
+  const int saved_errno = errno;
+  int none = 0;
+  signal_number.compare_exchange_strong(none, number);
+  cancel_flag.store(true);
+  const char byte = 0;
+  [[maybe_unused]] const ssize_t written = write(wake_pipe[1], &byte, 1);
+  errno = saved_errno;
+}
+
+void watch() {
+  char byte;
+  while (read(wake_pipe[0], &byte, 1) < 0 && errno == EINTR) {
+  }
+  std::this_thread::sleep_for(kGrace);
+  State working = State::working;
+  if (state.compare_exchange_strong(working, State::ending)) end_process(signal_exit_code());
+}
+
+}  // namespace
+
+const std::atomic<bool>& handle_signals() {
+  if (pipe2(wake_pipe, O_CLOEXEC | O_NONBLOCK) != 0 || fcntl(wake_pipe[0], F_SETFL, 0) != 0)
+    throw std::system_error(errno, std::generic_category(), "cannot make a pipe");
+  std::thread(watch).detach();
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return cancel_flag;
+}
+
+void work_is_finished() noexcept {
+  State working = State::working;
+  if (state.compare_exchange_strong(working, State::finished)) return;
+  while (working == State::ending) pause();
+}
+
+int signal_exit_code() noexcept {
+  const int number = signal_number.load();
+  return number == 0 ? 0 : 128 + number;
+}
+
+void end_process(int exit_code) noexcept {
+  remove_unfinished_files();
+  erase_progress_line();
+  _exit(exit_code);
+}
+
+}  // namespace hermesh::cli

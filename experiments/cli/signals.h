@@ -1,0 +1,25 @@
+// SIGINT and SIGTERM: ask the work to stop, and see to it that the process ends.
+#pragma once
+
+#include <atomic>
+
+namespace hermesh::cli {
+
+/// Handles SIGINT and SIGTERM from now on: the returned flag is set, and a watchdog thread ends the process
+/// 150 ms later, because a library's loop may never look at the flag. It removes unfinished files first. Call
+/// once, before the work starts. A signal that the caller had ignored is handled, too: who sends it wants the
+/// end.
+const std::atomic<bool>& handle_signals();
+
+/// The work is done and its output stands under its name: a signal from now on changes nothing. Does not
+/// return if the watchdog is ending the process at this moment.
+void work_is_finished() noexcept;
+
+/// 128 plus the number of the signal that came; 0 if none did.
+int signal_exit_code() noexcept;
+
+/// Removes unfinished files and ends the process without running destructors, which a waiting user gains
+/// nothing by.
+[[noreturn]] void end_process(int exit_code) noexcept;
+
+}  // namespace hermesh::cli

@@ -1,0 +1,218 @@
+// What every variant of the table owes, tested for each of them: its own promises on awkward volumes, the
+// same bytes at any thread count, and a sane answer to empty, full and broken volumes. A new variant is
+// tested here without a line.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "algorithms/variants.h"
+#include "experiments/test_volumes.h"
+#include "validation/mesh_report.h"
+
+namespace hermesh {
+namespace {
+
+std::vector<Extractor> table() {
+  const auto ours = our_extractors();
+  return {ours.begin(), ours.end()};
+}
+
+PolygonMesh extract(const Extractor& extractor, const LevelSet& volume, double isovalue = 0.0) {
+  RunContext context;
+  const Options options(extractor.name, extractor.options, {});
+  return extractor.extract(
+      {.level_set = volume, .isovalue = isovalue, .options = options, .context = context});
+}
+
+validation::MeshReport judge_counts(const MeshFile& mesh) {
+  RunContext context;
+  return validation::judge(mesh, {.self_intersections = false, .libraries = false}, context);
+}
+
+void expect_promises(const Extractor& extractor, const MeshFile& mesh) {
+  if (mesh.triangle_count() == 0) return;
+  const validation::MeshReport report = judge_counts(mesh);
+  if (extractor.promises.closed) EXPECT_EQ(report.boundary_edges, 0);
+  if (extractor.promises.oriented) EXPECT_EQ(report.inconsistent_edges, 0);
+  if (extractor.promises.manifold) {
+    EXPECT_EQ(report.non_manifold_edges, 0);
+    EXPECT_EQ(report.non_manifold_vertices, 0);
+    EXPECT_EQ(report.degenerate_polygons, 0);
+    EXPECT_EQ(report.duplicate_polygons, 0);
+  }
+}
+
+/// Many small sign patterns in one volume, each with outside all around it: pattern(i) gives the bits of its
+/// samples.
+LevelSet patterns(int per_axis, int size, const std::function<std::uint32_t(int)>& pattern,
+                  std::uint32_t seed) {
+  const int pitch = size + 1;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> magnitude(0.05f, 1.0f);
+  std::vector<std::uint32_t> bits(static_cast<std::size_t>(per_axis) * per_axis * per_axis);
+  for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = pattern(static_cast<int>(i));
+  const int n = per_axis * pitch;
+  return make_volume({n, n, n}, 1.0f, [&, per_axis](int x, int y, int z) {
+    const int local[3] = {x % pitch, y % pitch, z % pitch};
+    const bool gap = local[0] == size || local[1] == size || local[2] == size;
+    const int which = ((x / pitch) * per_axis + y / pitch) * per_axis + z / pitch;
+    const bool inside = !gap && ((bits[which] >> ((local[0] * size + local[1]) * size + local[2])) & 1);
+    return inside ? -magnitude(random) : magnitude(random);
+  });
+}
+
+class Conformance : public testing::TestWithParam<Extractor> {
+ protected:
+  const Extractor& extractor() const { return GetParam(); }
+  void expect_on(const LevelSet& volume, double isovalue = 0.0) const {
+    expect_promises(extractor(), to_mesh_file(extract(extractor(), volume, isovalue)));
+  }
+};
+
+TEST_P(Conformance, All256PatternsOfACell) {
+  expect_on(patterns(
+      7, 2, [](int i) { return static_cast<std::uint32_t>(i % 256); }, 1));
+}
+
+TEST_P(Conformance, RandomPatternsOfTwoCellsAnAxis) {
+  std::mt19937 random(2);
+  expect_on(patterns(
+      40, 3, [&](int) { return static_cast<std::uint32_t>(random()) & ((1u << 27) - 1); }, 3));
+}
+
+TEST_P(Conformance, WhiteNoise) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  expect_on(make_volume({64, 64, 64}, 1.0f, [&](int, int, int) { return value(random); }));
+}
+
+TEST_P(Conformance, WhiteNoiseOnAnInsideBackground) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  expect_on(make_volume({30, 20, 25}, -1.0f, [&](int, int, int) { return value(random); }));
+}
+
+TEST_P(Conformance, IntegersWithAThirdOfTheSamplesAtTheIsovalue) {
+  std::mt19937 random(6);
+  std::uniform_int_distribution<int> value(-1, 1);
+  const LevelSet volume =
+      make_volume({48, 48, 48}, 3.0f, [&](int, int, int) { return static_cast<float>(value(random)); });
+  for (const double isovalue : {0.0, 1.0, -1.0}) expect_on(volume, isovalue);
+}
+
+TEST_P(Conformance, SphereIsOneComponentOfTheRightVolume) {
+  const PolygonMesh mesh = extract(extractor(), make_sphere(20.0, 0.5));
+  expect_promises(extractor(), to_mesh_file(mesh));
+  const validation::MeshReport report = judge_counts(to_mesh_file(mesh));
+  EXPECT_EQ(report.components, 1);
+  EXPECT_EQ(report.euler_characteristic, 2);
+  const double exact = 4.0 / 3.0 * M_PI * 1000.0;
+  EXPECT_NEAR(report.volume, exact, 0.005 * exact);  // positive: counter-clockwise seen from outside
+}
+
+TEST_P(Conformance, FarFromTheOriginNothingIsLost) {
+  const PolygonMesh near = extract(extractor(), make_sphere(12.0, 0.01));
+  const PolygonMesh far = extract(extractor(), make_sphere(12.0, 0.01, {1e6, -1e6, 0.0}));
+  ASSERT_EQ(near.points.size(), far.points.size());
+  for (std::size_t i = 0; i < near.points.size(); ++i)
+    ASSERT_LT((far.world(i) - Eigen::Vector3d(1e6, -1e6, 0.0) - near.world(i)).norm(), 1e-6);
+}
+
+TEST_P(Conformance, SameBytesAtAnyThreadCount) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  const LevelSet volume = make_volume({64, 40, 50}, 1.0f, [&](int, int, int) { return value(random); });
+  std::vector<PolygonMesh> meshes;
+  for (const int threads : {1, 2, 7}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
+    meshes.push_back(extract(extractor(), volume));
+  }
+  EXPECT_FALSE(meshes[0].empty());
+  EXPECT_TRUE(meshes[0] == meshes[1]);
+  EXPECT_TRUE(meshes[0] == meshes[2]);
+}
+
+TEST_P(Conformance, EmptyAndFullVolumesGiveEmptyMeshes) {
+  EXPECT_TRUE(extract(extractor(), make_volume({0, 0, 0}, 1.0f, [](int, int, int) { return 1.0f; })).empty());
+  EXPECT_TRUE(extract(extractor(), make_volume({9, 9, 9}, 1.0f, [](int, int, int) { return 1.0f; })).empty());
+  EXPECT_TRUE(
+      extract(extractor(), make_volume({9, 9, 9}, -1.0f, [](int, int, int) { return -1.0f; })).empty());
+}
+
+TEST_P(Conformance, OneVoxelInsideIsOneClosedComponent) {
+  // At a block's first and last sample, so that the cells around it lie in blocks that the tree does not
+  // have.
+  for (const int at : {0, 7, 8, 15}) {
+    const PolygonMesh mesh = extract(extractor(), make_volume({16, 16, 16}, 1.0f, [&](int x, int y, int z) {
+                                       return x == at && y == at && z == at ? -1.0f : 1.0f;
+                                     }));
+    expect_promises(extractor(), to_mesh_file(mesh));
+    const validation::MeshReport report = judge_counts(to_mesh_file(mesh));
+    EXPECT_EQ(report.components, 1);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    EXPECT_GT(report.volume, 0.0);
+  }
+}
+
+TEST_P(Conformance, ValuesThatAreNotFiniteAreRefused) {
+  for (const float bad : {std::nanf(""), INFINITY}) {
+    const LevelSet volume = make_volume(
+        {9, 9, 9}, 1.0f, [&](int x, int, int) { return x == 4 ? bad : static_cast<float>(x - 5); });
+    EXPECT_THROW(extract(extractor(), volume), Error);
+  }
+}
+
+TEST_P(Conformance, CancelsAtOnce) {
+  const std::atomic<bool> cancel{true};
+  RunContext context;
+  context.cancel = &cancel;
+  const Options options(extractor().name, extractor().options, {});
+  const LevelSet sphere = make_sphere(20.0, 1.0);
+  EXPECT_THROW(extractor().extract({.level_set = sphere, .options = options, .context = context}), Cancelled);
+}
+
+TEST_P(Conformance, PromisesHoldAfterARoundTripThroughStl) {
+  std::mt19937 random(8);
+  std::uniform_int_distribution<int> value(-1, 1);
+  const LevelSet volume =
+      make_volume({24, 24, 24}, 3.0f, [&](int, int, int) { return static_cast<float>(value(random)); });
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("hermesh-conformance-" + extractor().name + "-" + std::to_string(::getpid()) + ".stl");
+  RunContext context;
+  const PolygonMesh mesh = extract(extractor(), volume);
+  write_mesh(path, mesh, context);
+  const MeshFile back = read_mesh_file(path, context);
+  std::filesystem::remove(path);
+  EXPECT_EQ(back.triangle_count(), mesh.triangle_count());
+  expect_promises(extractor(), back);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ours, Conformance, testing::ValuesIn(table()), [](const auto& param) {
+  std::string name = param.param.name;
+  for (char& c : name)
+    if (c == '-') c = '_';
+  return name;
+});
+
+/// The whole million of random sign patterns, a tenth of which every run of the tests does.
+TEST(ConformanceSlow, MarchingCubesOnAMillionRandomPatterns) {
+  const Extractor& extractor = find_variant(our_extractors(), "marching-cubes");
+  std::mt19937 random(9);
+  for (int batch = 0; batch < 16; ++batch)
+    expect_promises(
+        extractor,
+        to_mesh_file(
+            extract(extractor,
+                    patterns(
+                        40, 3, [&](int) { return static_cast<std::uint32_t>(random()) & ((1u << 27) - 1); },
+                        100 + batch))));
+}
+
+}  // namespace
+}  // namespace hermesh

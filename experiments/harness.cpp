@@ -1,0 +1,155 @@
+#include "experiments/harness.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "experiments/cases.h"
+#include "experiments/provenance.h"
+#include "experiments/run_cells.h"
+#include "experiments/table.h"
+
+namespace hermesh {
+namespace {
+
+const Tier& find_tier(const Experiment& experiment, const std::string& name) {
+  const auto tier = experiment.tiers.find(name);
+  if (tier == experiment.tiers.end())
+    throw Error("the experiment " + experiment.name + " has no tier \"" + name + "\"");
+  return tier->second;
+}
+
+/// The variants whose cell "case/resolution/variant" contains the text; the label and the name both count as
+/// variant.
+std::vector<VariantEntry> filtered(const std::vector<VariantEntry>& variants, const std::string& cell,
+                                   const std::string& text) {
+  std::vector<VariantEntry> left;
+  for (const VariantEntry& variant : variants)
+    if ((cell + variant.label).find(text) != std::string::npos ||
+        (cell + variant.name).find(text) != std::string::npos)
+      left.push_back(variant);
+  return left;
+}
+
+Json run_head(const Experiment& experiment, const RunSettings& settings) {
+  Json head = {{"experiment", experiment.name}, {"tier", settings.tier}, {"question", experiment.question}};
+  const Json origin = provenance(experiments_folder());
+  head["run"] = origin.at("date").get<std::string>() + "-" + std::to_string(getpid());
+  head.update(origin);
+  head["columns"] = experiment.columns;
+  return head;
+}
+
+/// 3 for a broken promise or for judges that contradict one another, 1 for a variant that failed.
+int exit_code(const std::vector<Json>& rows) {
+  int code = 0;
+  for (const Json& row : rows) {
+    const auto any = [&](const char* key) { return row.contains(key) && !row.at(key).empty(); };
+    if (any("broken") || any("disagreements")) return 3;
+    if (row.contains("failed")) code = 1;
+  }
+  return code;
+}
+
+std::filesystem::path make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Error("cannot make the folder " + folder.string() + ": " + error.message());
+  return folder;
+}
+
+/// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one
+/// starts.
+class Run {
+ public:
+  Run(const RunSettings& settings, const Tables& tables, RunContext& context, std::ostream& table)
+      : settings_(settings),
+        tables_(tables),
+        context_(context),
+        table_(table),
+        experiment_(read_experiment(settings.experiment,
+                                    {tables.extractors, tables.voxelizers, tables.cases, column_names()})),
+        tier_(find_tier(experiment_, settings.tier)),
+        out_(make_folder(settings.out)),
+        head_(run_head(experiment_, settings)) {}
+
+  int run() {
+    table_ << "## " << experiment_.name << " (" << settings_.tier << "): " << experiment_.question << "\n\n";
+    for (const CaseEntry& entry : tier_.cases) run_case(entry);
+    if (rows_.empty())
+      throw Error("no cell of " + experiment_.name + " contains \"" + settings_.filter +
+                  "\" in its case/resolution/variant");
+    write_legend(rows_, table_);
+    table_ << "\nRows: " << (out_ / "rows.jsonl").string() << "; pictures: " << (out_ / "*.png").string()
+           << "\n";
+    return exit_code(rows_);
+  }
+
+ private:
+  void run_case(const CaseEntry& entry) {
+    std::optional<LoadedCase> input;
+    for (const int resolution : entry.resolutions) {
+      const std::string cell = entry.name + "/" + std::to_string(resolution) + "/";
+      const std::vector<VariantEntry> variants = filtered(experiment_.variants, cell, settings_.filter);
+      if (variants.empty()) continue;
+      if (!input) input = tables_.load(entry.name, context_);
+      for (const std::string& voxelizer : experiment_.voxelizers)
+        finish_group(run_group({.experiment = experiment_,
+                                .tier = tier_,
+                                .entry = entry,
+                                .input = *input,
+                                .resolution = resolution,
+                                .voxelizer = find_variant(tables_.voxelizers, voxelizer),
+                                .variants = variants,
+                                .tables = tables_,
+                                .out = out_,
+                                .head = head_},
+                               context_));
+    }
+  }
+
+  void finish_group(std::vector<Json> rows) {
+    for (const Json& row : rows) append_row(out_ / "rows.jsonl", row);
+    write_markdown({rows, 0}, table_);
+    table_.flush();
+    rows_.insert(rows_.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
+  }
+
+  const RunSettings& settings_;
+  const Tables& tables_;
+  RunContext& context_;
+  std::ostream& table_;
+  Experiment experiment_;
+  const Tier& tier_;
+  std::filesystem::path out_;
+  Json head_;
+  std::vector<Json> rows_;
+};
+
+}  // namespace
+
+std::vector<ExperimentInfo> list_experiments() {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(experiments_folder()))
+    if (entry.path().extension() == ".toml" && entry.path().filename() != "cases.toml")
+      files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  std::vector<ExperimentInfo> experiments;
+  for (const auto& file : files) experiments.push_back({file.stem().string(), read_question(file), file});
+  return experiments;
+}
+
+int run_experiment(const RunSettings& settings, const Tables& tables, RunContext& context,
+                   std::ostream& table) {
+  return Run(settings, tables, context, table).run();
+}
+
+int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
+  Tables tables{all_extractors(), all_voxelizers(), {}, load_case};
+  for (const CaseInfo& info : list_cases()) tables.cases.push_back(info.name);
+  return run_experiment(settings, tables, context, table);
+}
+
+}  // namespace hermesh

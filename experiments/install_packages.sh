@@ -1,0 +1,35 @@
+# Sourced by ./reproduce and ./test: install_packages NAME… installs what is missing of the distribution's packages, or
+# without root names it and stops.
+
+# To build and run the program.
+hermesh_packages=(
+  g++ cmake ninja-build ccache pkg-config ca-certificates git
+  libopenvdb-dev libtbb-dev libeigen3-dev libimath-dev libboost-dev libcgal-dev libopenmesh-dev libembree-dev
+  libcairo2-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libbenchmark-dev libgtest-dev)
+
+install_packages() {
+  local missing=() name
+  if ! command -v dpkg-query >/dev/null; then
+    echo "This is no Debian-like system: install what these Debian packages hold by hand: $*" >&2
+    return 0
+  fi
+  for name in "$@"; do
+    dpkg-query -W -f='${Status}' "$name" 2>/dev/null | grep -q 'ok installed' || missing+=("$name")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  if [ "$(id -u)" -ne 0 ]; then
+    echo "These packages are missing: ${missing[*]}" >&2
+    echo "Install them with: sudo apt-get install --no-install-recommends ${missing[*]}" >&2
+    exit 1
+  fi
+  echo "Installing packages: ${missing[*]}"
+  local log
+  log=$(mktemp)
+  if ! { apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"; } \
+      >"$log" 2>&1; then
+    tail -n 20 "$log" >&2
+    echo "The packages could not be installed; the lines above say why." >&2
+    exit 1
+  fi
+  rm -f "$log"
+}

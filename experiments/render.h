@@ -1,0 +1,50 @@
+// Pictures of meshes: side by side from one camera, shaded, with a wireframe close-up. Rays by Embree,
+// drawing by Cairo.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+/// Where the camera stands, in degrees. The y axis points up in every picture.
+struct Viewpoint {
+  double azimuth = 29.0;    ///< 0 looks at the box's +z side, 90 at its +x side
+  double elevation = 20.0;  ///< above the horizon
+};
+
+/// What the close-up shows: a square about a point, both as fractions of the frame's box.
+struct CloseUp {
+  std::array<double, 3> centre{0.5, 0.5, 0.5};  ///< along x, y and z of the box, 0 to 1
+  double size = 0.12;  ///< side of the square, as a fraction of the box's longest side
+};
+
+struct Picture {
+  std::string label;                  ///< bold, the variant's name
+  std::vector<std::string> captions;  ///< a few figures below it, a line each
+  std::function<PolygonMesh()> load;  ///< called once, so that only one mesh at a time is in memory
+};
+
+struct Sheet {
+  std::string title, subtitle;
+  Bounds frame;  ///< world units; the camera looks at this box, whatever the meshes are
+  CloseUp close_up;
+  Viewpoint viewpoint;
+  std::vector<Picture> pictures;
+  int cell_pixels = 400;  ///< width of one picture
+  int columns = 4;        ///< pictures side by side before the next row begins
+};
+
+/// All meshes from one camera on one sheet: for each, the whole object shaded and a close-up with the
+/// polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red, an empty mesh says
+/// "empty". The same sheet gives the same pixels at any thread count. Written aside and renamed.
+/// @throws Error if the path cannot be written; Cancelled.
+void render_sheet(const std::filesystem::path& png, const Sheet& sheet, RunContext& context);
+
+}  // namespace hermesh

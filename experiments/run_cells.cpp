@@ -1,0 +1,326 @@
+#include "experiments/run_cells.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "algorithms/core/mesh_file.h"
+#include "experiments/columns.h"
+#include "experiments/measure.h"
+#include "experiments/provenance.h"
+#include "validation/report_json.h"
+
+namespace hermesh {
+namespace {
+
+/// A context for one piece of work: its own stage times, the same cancellation; progress only where wanted,
+/// since a terminal has no business inside a timed repetition.
+RunContext child_context(const RunContext& context, bool with_progress) {
+  RunContext child;
+  child.cancel = context.cancel;
+  if (with_progress) child.on_progress = context.on_progress;
+  return child;
+}
+
+/// FNV-1a over the arrays, to see whether a repetition gave the same mesh without keeping both.
+std::uint64_t fingerprint(const PolygonMesh& mesh) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const auto add = [&](const void* data, std::size_t bytes) {
+    const unsigned char* at = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i + 4 <= bytes; i += 4) {
+      std::uint32_t word;
+      std::memcpy(&word, at + i, 4);
+      hash = (hash ^ word) * 0x100000001b3u;
+    }
+  };
+  add(mesh.origin.data(), sizeof(double) * 3);
+  add(mesh.points.data(), mesh.points.size() * sizeof(Eigen::Vector3f));
+  add(mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle));
+  add(mesh.quads.data(), mesh.quads.size() * sizeof(Quad));
+  return hash;
+}
+
+std::string file_name(std::string label) {
+  for (char& c : label)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '-';
+  return label;
+}
+
+Json seconds_json(const std::vector<double>& seconds, bool warm) {
+  return {{"median", median(seconds)},
+          {"minimum", *std::min_element(seconds.begin(), seconds.end())},
+          {"repetitions", seconds.size()},
+          {"warm", warm},
+          {"all", seconds}};
+}
+
+Json stages_json(const std::vector<StageSeconds>& repetitions) {
+  Json json = Json::object();
+  for (const auto& [name, seconds] : median_stages(repetitions)) json[name] = seconds;
+  return json;
+}
+
+Json optional_json(const std::optional<std::int64_t>& value) { return value ? Json(*value) : Json(nullptr); }
+
+/// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
+/// up and does not count, unless it alone uses up the budget: then it is the only repetition there is.
+struct Timing {
+  Contender contender;
+  std::vector<StageSeconds> stages;
+  bool warm = true;
+
+  Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
+    contender.budget_seconds = tier.seconds_per_variant;
+    contender.repetitions = tier.repetitions;
+    warm = first_seconds < tier.seconds_per_variant;
+    if (warm) return;
+    contender.seconds = {first_seconds};
+    stages = {std::move(first_stages)};
+  }
+};
+
+struct Cell {
+  const Extractor* extractor = nullptr;
+  Options options;
+  Json row;
+  std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
+  std::uint64_t mesh_fingerprint = 0;
+  std::optional<Timing> timing;  ///< absent when the variant failed
+};
+
+class Group {
+ public:
+  Group(const GroupInput& group, RunContext& context)
+      : in_(group),
+        context_(context),
+        voxel_size_(bounds(group.input.mesh).size().maxCoeff() / group.resolution),
+        name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)) {
+    if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.name));
+  }
+
+  std::vector<Json> run() {
+    for (const VariantEntry& variant : in_.variants) cells_.push_back(make_cell(variant));
+    const auto failed = attempt([&] { voxelize(); });
+    source_ = to_mesh_file(in_.input.mesh);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      cells_[i].row["voxelization"] = voxelization_;
+      const auto sentence = failed ? failed : attempt([&] { extract_and_judge(cells_[i], i); });
+      if (sentence) fail(cells_[i], *sentence);
+    }
+    time_all();
+    std::vector<Json> rows;
+    for (Cell& cell : cells_) rows.push_back(cell.row);
+    add_time_ratios(rows);
+    if (in_.tier.pixels > 0) picture(rows);
+    return rows;
+  }
+
+ private:
+  Cell make_cell(const VariantEntry& variant) const {
+    Cell cell;
+    cell.extractor = &find_variant(in_.tables.extractors, variant.name);
+    cell.options = Options(variant.name, cell.extractor->options, variant.options);
+    cell.row = in_.head;
+    cell.row["case"] = {{"name", in_.input.name},
+                        {"origin", in_.input.origin},
+                        {"sha256", in_.input.sha256},
+                        {"points", in_.input.mesh.points.size()},
+                        {"triangles", in_.input.mesh.triangle_count()}};
+    cell.row["resolution"] = in_.resolution;
+    cell.row["voxel_size"] = voxel_size_;
+    cell.row["samples"] = in_.tier.samples;
+    cell.row["variant"] = {{"name", variant.name},
+                           {"label", variant.label},
+                           {"options", cell.options.canonical()},
+                           {"promises", promise_words(cell.extractor->promises)}};
+    return cell;
+  }
+
+  /// The sentence of what went wrong, if anything did. Being cancelled is no failure of a variant.
+  std::optional<std::string> attempt(const std::function<void()>& work) {
+    try {
+      work();
+      return std::nullopt;
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::bad_alloc&) {
+      return "there is not enough memory";
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+  }
+
+  static void fail(Cell& cell, const std::string& sentence) {
+    cell.row["failed"] = sentence;
+    cell.row["promise_letters"] = "FAILED";
+    cell.row["promise_verdict"] = "FAILED: " + sentence;
+    cell.timing.reset();
+  }
+
+  void voxelize() {
+    voxelization_ = {{"name", in_.voxelizer.name}};
+    const auto once = [&](bool with_progress, std::optional<StageSeconds>* stages) {
+      RunContext child = child_context(context_, with_progress);
+      const double seconds = timed([&] {
+        level_set_ =
+            in_.voxelizer.voxelize({.mesh = in_.input.mesh, .voxel_size = voxel_size_, .context = child});
+      });
+      if (stages) *stages = child.stage_seconds;
+      return seconds;
+    };
+    const PeakMemory memory;
+    std::optional<StageSeconds> stages;
+    const double first = once(true, &stages);
+    voxelization_["peak_bytes"] = optional_json(memory.bytes());
+    if (!level_set_ || level_set_.active_voxels() == 0)
+      throw Error("the voxelizer " + in_.voxelizer.name + " gave a level set without active voxels");
+    Timing timing(in_.tier, first, *stages);
+    timing.contender.run = [&] {
+      const double seconds = once(false, &stages);
+      timing.stages.push_back(*stages);
+      return seconds;
+    };
+    race(std::span(&timing.contender, 1));
+    voxelization_["seconds"] = seconds_json(timing.contender.seconds, timing.warm);
+    voxelization_["stage_seconds"] = stages_json(timing.stages);
+    voxelization_["active_voxels"] = level_set_.active_voxels();
+    voxelization_["memory_bytes"] = level_set_.memory_bytes();
+  }
+
+  PolygonMesh extract(const Cell& cell, RunContext& child) const {
+    return cell.extractor->extract(
+        {.level_set = level_set_, .source = &in_.input.mesh, .options = cell.options, .context = child});
+  }
+
+  void extract_and_judge(Cell& cell, std::size_t number) {
+    context_.check();
+    RunContext child = child_context(context_, true);
+    PolygonMesh mesh;
+    {
+      const PeakMemory memory;
+      const double seconds = timed([&] { mesh = extract(cell, child); });
+      const auto peak = memory.bytes();
+      cell.row["peak_bytes"] = optional_json(peak);
+      if (peak) cell.row["bytes_per_active_voxel"] = static_cast<double>(*peak) / level_set_.active_voxels();
+      cell.timing.emplace(in_.tier, seconds, child.stage_seconds);
+    }
+    cell.row["triangle_count"] = mesh.triangle_count();
+    cell.mesh_fingerprint = fingerprint(mesh);
+    if (mesh.empty()) throw Error("the mesh is empty");
+    const std::filesystem::path folder = in_.out / "meshes" / (in_.experiment.name + "-" + name_);
+    std::filesystem::create_directories(folder);
+    cell.mesh_file =
+        folder / (std::to_string(number + 1) + "-" + file_name(cell.row["variant"]["label"]) + ".ply");
+    write_mesh(cell.mesh_file, mesh, child);
+    cell.row["notes"] = child.notes;
+    mesh = {};
+    judge_file(cell);
+  }
+
+  /// Judges the mesh as its file holds it, so that the writer and the reader are judged with it.
+  void judge_file(Cell& cell) {
+    RunContext child = child_context(context_, true);
+    validation::JudgeOptions options;
+    options.self_intersections = in_.tier.self_intersections;
+    options.reference = &source_;
+    options.samples = in_.tier.samples;
+    if (in_.experiment.features) {
+      options.features = &source_;
+      options.dihedral_degrees = *in_.experiment.features;
+    }
+    validation::MeshReport report;
+    cell.row["judge_seconds"] =
+        timed([&] { report = validation::judge(read_mesh_file(cell.mesh_file, child), options, child); });
+    cell.row["report"] = validation::to_json(report);
+
+    const Promises& promises = cell.extractor->promises;
+    const PromiseCheck check = check_promises(promises, report);
+    cell.row["broken"] = check.broken;
+    cell.row["unchecked"] = check.unchecked;
+    cell.row["promise_letters"] = promise_letters(promises, check);
+    cell.row["promise_verdict"] = promise_verdict(promises, check);
+    Json disagreements = Json::array();
+    for (const validation::LibraryCounts& library : report.libraries)
+      for (const std::string& sentence : library.disagreements)
+        disagreements.push_back(library.library + ": " + sentence);
+    cell.row["disagreements"] = std::move(disagreements);
+  }
+
+  double repeat(Cell& cell) {
+    context_.check();
+    RunContext child = child_context(context_, false);
+    std::optional<PolygonMesh> mesh;
+    const double seconds = timed([&] { mesh.emplace(extract(cell, child)); });
+    cell.timing->stages.push_back(child.stage_seconds);
+    if (fingerprint(*mesh) != cell.mesh_fingerprint) cell.row["repetitions_differ"] = true;
+    return seconds;
+  }
+
+  void time_all() {
+    const Stage stage(context_, "timing");
+    const Json load = load_averages();
+    std::vector<Contender> contenders;
+    std::vector<Cell*> timed_cells;
+    for (Cell& cell : cells_) {
+      if (!cell.timing) continue;
+      contenders.push_back(cell.timing->contender);
+      contenders.back().run = [this, &cell] { return repeat(cell); };
+      timed_cells.push_back(&cell);
+    }
+    race(contenders);
+    for (std::size_t i = 0; i < contenders.size(); ++i) {
+      Json& row = timed_cells[i]->row;
+      row["seconds"] = seconds_json(contenders[i].seconds, timed_cells[i]->timing->warm);
+      row["stage_seconds"] = stages_json(timed_cells[i]->timing->stages);
+      row["nanoseconds_per_active_voxel"] =
+          1e9 * row["seconds"]["median"].get<double>() / static_cast<double>(level_set_.active_voxels());
+      row["load"] = load;
+    }
+  }
+
+  void picture(const std::vector<Json>& rows) {
+    Sheet sheet;
+    sheet.title = in_.input.name + " at resolution " + std::to_string(in_.resolution);
+    sheet.subtitle =
+        in_.input.origin + ", sha256 " + in_.input.sha256.substr(0, 12) + "; voxelizer " + in_.voxelizer.name;
+    sheet.frame = bounds(in_.input.mesh);
+    sheet.close_up = in_.entry.close_up;
+    sheet.viewpoint = in_.entry.viewpoint;
+    sheet.cell_pixels = in_.tier.pixels;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      std::string figures = readable(rows[i].value("triangle_count", 0.0)) + " triangles";
+      if (rows[i].contains("seconds"))
+        figures += " · " + readable(rows[i]["seconds"]["median"].get<double>()) + " s";
+      if (rows[i].contains("report") && rows[i]["report"].contains("from_reference"))
+        figures += " · rms " +
+                   readable(rows[i]["report"]["from_reference"]["rms"].get<double>() / voxel_size_) +
+                   " voxel";
+      sheet.pictures.push_back(
+          {rows[i]["variant"]["label"], {figures, rows[i]["promise_verdict"]}, [this, i] {
+             RunContext child = child_context(context_, false);
+             const auto& file = cells_[i].mesh_file;
+             return file.empty() ? PolygonMesh{} : read_mesh(file, child);
+           }});
+    }
+    render_sheet(in_.out / (name_ + ".png"), sheet, context_);
+  }
+
+  const GroupInput& in_;
+  RunContext& context_;
+  double voxel_size_;
+  std::string name_;
+  LevelSet level_set_;
+  MeshFile source_;
+  Json voxelization_;
+  std::vector<Cell> cells_;
+};
+
+}  // namespace
+
+std::vector<Json> run_group(const GroupInput& group, RunContext& context) {
+  return Group(group, context).run();
+}
+
+}  // namespace hermesh

@@ -1,0 +1,251 @@
+#include "experiments/table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace hermesh {
+namespace {
+
+std::vector<const Column*> shown_columns(const std::vector<Json>& rows) {
+  std::vector<const Column*> shown;
+  const Json* names = rows.empty() ? nullptr : find(rows.front(), "/columns");
+  for (const Column& column : all_columns()) {
+    if (!names) shown.push_back(&column);
+  }
+  if (!names) return shown;
+  for (const Json& name : *names)
+    for (const Column& column : all_columns())
+      if (name == column.name) shown.push_back(&column);
+  return shown;
+}
+
+/// Columns on a terminal: one for each code point, since no wide or combining letters occur in tables.
+std::size_t display_width(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](unsigned char c) { return (c & 0xc0) != 0x80; }));
+}
+
+std::string replaced(std::string text, const std::vector<std::pair<std::string, std::string>>& pairs) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const auto& p) {
+      return text.compare(i, p.first.size(), p.first) == 0;
+    });
+    result += pair == pairs.end() ? std::string(1, text[i]) : pair->second;
+    i += pair == pairs.end() ? 1 : pair->first.size();
+  }
+  return result;
+}
+
+std::string for_markdown(const std::string& text) { return replaced(text, {{"|", "\\|"}, {"\n", " "}}); }
+
+std::string for_latex(const std::string& text) {
+  return replaced(text, {{"\\", "\\textbackslash{}"},
+                         {"&", "\\&"},
+                         {"%", "\\%"},
+                         {"$", "\\$"},
+                         {"#", "\\#"},
+                         {"_", "\\_"},
+                         {"{", "\\{"},
+                         {"}", "\\}"},
+                         {"~", "\\textasciitilde{}"},
+                         {"^", "\\textasciicircum{}"},
+                         {"÷", "$\\div$"},
+                         {"×", "$\\times$"},
+                         {"°", "$^\\circ$"},
+                         {"–", "--"},
+                         {"·", "$\\cdot$"},
+                         {"→", "$\\to$"}});
+}
+
+std::string for_csv(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  quoted += replaced(text, {{"\"", "\"\""}});
+  quoted += '"';
+  return quoted;
+}
+
+/// "dragon at resolution 400" and what that was.
+std::string group_title(const Json& row) {
+  return text_at(row, "/case/name") + " at resolution " + text_at(row, "/resolution");
+}
+
+std::vector<std::string> group_facts(const Json& row) {
+  std::string input = "input: " + text_at(row, "/case/origin") + ", sha256 " +
+                      text_at(row, "/case/sha256").substr(0, 12) + ", " +
+                      readable(number_at(row, "/case/triangles")) + " triangles";
+  if (text_at(row, "/case/origin").starts_with("stand-in"))
+    input = "STAND-IN DATA, not the original; " + input;
+  std::string grid = "grid: voxelizer " + text_at(row, "/voxelization/name") + ", voxel " +
+                     readable(number_at(row, "/voxel_size"));
+  if (find(row, "/voxelization/active_voxels"))
+    grid += ", " + readable(number_at(row, "/voxelization/active_voxels")) + " active voxels, " +
+            readable(number_at(row, "/voxelization/memory_bytes") / (1 << 20)) + " MiB, made in " +
+            readable(number_at(row, "/voxelization/seconds/median")) + " s";
+  std::string run = "run: commit " + text_at(row, "/commit").substr(0, 12);
+  if (const Json* dirty = find(row, "/dirty"); dirty && *dirty == true) run += " with changes";
+  run += ", " + text_at(row, "/date") + ", " + text_at(row, "/machine/cpu") + ", " +
+         text_at(row, "/threads") + " threads";
+  if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
+  return {input, grid, run};
+}
+
+std::vector<std::string> joined_list(const Json& row, const std::string& pointer) {
+  std::vector<std::string> items;
+  if (const Json* list = find(row, pointer))
+    for (const Json& item : *list) items.push_back(item.get<std::string>());
+  return items;
+}
+
+/// What nobody may overlook in a group, one sentence each.
+std::vector<std::string> alarms(const RowGroup& group) {
+  std::vector<std::string> sentences;
+  for (const Json& row : group.rows) {
+    const std::string who = text_at(row, "/variant/label") + " on " + group_title(row) + ": ";
+    if (find(row, "/failed")) sentences.push_back("FAILED: " + who + text_at(row, "/failed"));
+    for (const std::string& broken : joined_list(row, "/broken"))
+      sentences.push_back("BROKEN: " + who + broken);
+    for (const std::string& unchecked : joined_list(row, "/unchecked"))
+      sentences.push_back("UNCHECKED: " + who + "the promise of " + unchecked);
+    for (const std::string& disagreement : joined_list(row, "/disagreements"))
+      sentences.push_back("DISAGREEMENT of the judges: " + who + disagreement);
+    if (const Json* differ = find(row, "/repetitions_differ"); differ && *differ == true)
+      sentences.push_back("NOT DETERMINISTIC: " + who + "repetitions gave different meshes");
+  }
+  return sentences;
+}
+
+}  // namespace
+
+std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<std::pair<std::string, RowGroup>>> runs;
+  for (const Json& row : rows) {
+    std::string key;
+    for (const char* part : {"/experiment", "/tier", "/case/name", "/resolution", "/voxelization/name"})
+      key += text_at(row, part) + "\n";
+    if (!runs.contains(key)) order.push_back(key);
+    auto& groups = runs[key];
+    const std::string run = text_at(row, "/run");
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == run; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {run, {}});
+    group->second.rows.push_back(row);
+  }
+  std::vector<RowGroup> result;
+  for (const std::string& key : order) {
+    result.push_back(std::move(runs[key].back().second));
+    result.back().earlier_runs = static_cast<int>(runs[key].size()) - 1;
+  }
+  return result;
+}
+
+void write_markdown(const RowGroup& group, std::ostream& out) {
+  if (group.rows.empty()) return;
+  out << "### " << for_markdown(group_title(group.rows.front())) << "\n\n";
+  for (const std::string& fact : group_facts(group.rows.front())) out << "- " << fact << "\n";
+  if (group.earlier_runs > 0)
+    out << "- earlier runs of these cells in the same folder, not shown: " << group.earlier_runs << "\n";
+
+  const std::vector<const Column*> shown = shown_columns(group.rows);
+  std::vector<std::vector<std::string>> lines{{"variant"}};
+  for (const Column* column : shown) lines[0].push_back(column->header);
+  for (const Json& row : group.rows) {
+    lines.push_back({for_markdown(text_at(row, "/variant/label"))});
+    for (const Column* column : shown) lines.back().push_back(for_markdown(cell_text(*column, row)));
+  }
+  std::vector<std::size_t> widths(lines[0].size(), 3);
+  for (const auto& line : lines)
+    for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], display_width(line[c]));
+
+  const auto left_aligned = [&](std::size_t c) {
+    return c == 0 || shown[c - 1]->name == "promises" || shown[c - 1]->name == "options";
+  };
+  for (std::size_t r = 0; r < lines.size(); ++r) {
+    out << (r == 0 ? "\n|" : "|");
+    for (std::size_t c = 0; c < widths.size(); ++c) {
+      const std::string padding(widths[c] - display_width(lines[r][c]), ' ');
+      out << ' ' << (left_aligned(c) ? lines[r][c] + padding : padding + lines[r][c]) << " |";
+    }
+    out << '\n';
+    if (r > 0) continue;
+    out << '|';
+    for (std::size_t c = 0; c < widths.size(); ++c)
+      out << ' ' << (left_aligned(c) ? std::string(widths[c], '-') : std::string(widths[c] - 1, '-') + ":")
+          << " |";
+    out << '\n';
+  }
+  const std::vector<std::string> loud = alarms(group);
+  if (!loud.empty()) out << '\n';
+  for (const std::string& sentence : loud) out << "- **" << for_markdown(sentence) << "**\n";
+  out << '\n';
+}
+
+void write_legend(const std::vector<Json>& rows, std::ostream& out) {
+  out << "Columns:";
+  const char* separator = " ";
+  for (const Column* column : shown_columns(rows)) {
+    out << separator << "*" << column->header << "* " << column->meaning;
+    separator = "; ";
+  }
+  out << ".\n";
+}
+
+void write_latex(const RowGroup& group, std::ostream& out) {
+  if (group.rows.empty()) return;
+  const std::vector<const Column*> shown = shown_columns(group.rows);
+  out << "\\begin{table}\n\\centering\n\\begin{tabular}{l" << std::string(shown.size(), 'r')
+      << "}\n\\toprule\nvariant";
+  for (const Column* column : shown) out << " & " << for_latex(column->header);
+  out << " \\\\\n\\midrule\n";
+  for (const Json& row : group.rows) {
+    out << for_latex(text_at(row, "/variant/label"));
+    for (const Column* column : shown) out << " & " << for_latex(cell_text(*column, row));
+    out << " \\\\\n";
+  }
+  out << "\\bottomrule\n\\end{tabular}\n\\caption{" << for_latex(group_title(group.rows.front())) << ".";
+  for (const std::string& fact : group_facts(group.rows.front())) out << " " << for_latex(fact) << ".";
+  for (const std::string& sentence : alarms(group)) out << " \\textbf{" << for_latex(sentence) << ".}";
+  out << "}\n\\end{table}\n\n";
+}
+
+void write_csv(const std::vector<Json>& rows, std::ostream& out) {
+  const std::vector<std::pair<std::string, std::string>> keys = {{"experiment", "/experiment"},
+                                                                 {"tier", "/tier"},
+                                                                 {"run", "/run"},
+                                                                 {"commit", "/commit"},
+                                                                 {"dirty", "/dirty"},
+                                                                 {"date", "/date"},
+                                                                 {"cpu", "/machine/cpu"},
+                                                                 {"threads", "/threads"},
+                                                                 {"case", "/case/name"},
+                                                                 {"origin", "/case/origin"},
+                                                                 {"sha256", "/case/sha256"},
+                                                                 {"resolution", "/resolution"},
+                                                                 {"voxel_size", "/voxel_size"},
+                                                                 {"voxelizer", "/voxelization/name"},
+                                                                 {"variant", "/variant/name"},
+                                                                 {"label", "/variant/label"},
+                                                                 {"failed", "/failed"}};
+  for (const auto& [name, pointer] : keys) out << name << ',';
+  for (std::size_t c = 0; c < all_columns().size(); ++c) out << (c ? "," : "") << all_columns()[c].name;
+  out << '\n';
+  for (const Json& row : rows) {
+    for (const auto& [name, pointer] : keys) out << for_csv(text_at(row, pointer)) << ',';
+    for (std::size_t c = 0; c < all_columns().size(); ++c) {
+      const Json value = value_of(all_columns()[c], row);
+      out << (c ? "," : "")
+          << for_csv(value.is_null()     ? ""
+                     : value.is_string() ? value.get<std::string>()
+                                         : value.dump());
+    }
+    out << '\n';
+  }
+}
+
+}  // namespace hermesh

@@ -1,0 +1,34 @@
+// Tables from rows: for a terminal (Markdown that is aligned), for other programs (CSV), for the paper
+// (LaTeX).
+#pragma once
+
+#include <ostream>
+#include <vector>
+
+#include "experiments/columns.h"
+#include "experiments/rows.h"
+
+namespace hermesh {
+
+/// Rows of one table: the same experiment, tier, run, case, resolution and voxelizer, in the order of the
+/// variants.
+struct RowGroup {
+  std::vector<Json> rows;
+  int earlier_runs = 0;  ///< how many other groups differ from this one in the run alone
+};
+
+/// Groups in the order in which they first appear; of groups that differ in the run alone, the last one.
+std::vector<RowGroup> latest_groups(const std::vector<Json>& rows);
+
+/// One Markdown table with what it was measured on above, and below it, in capitals, every broken promise,
+/// disagreement of the libraries and failure. Columns aligned for a terminal. Shows the columns that the rows
+/// name.
+void write_markdown(const RowGroup& group, std::ostream& out);
+/// What the headers mean that these rows use.
+void write_legend(const std::vector<Json>& rows, std::ostream& out);
+/// One LaTeX table environment; needs the package booktabs.
+void write_latex(const RowGroup& group, std::ostream& out);
+/// Every row and every column, numbers in full, in the columns' units (voxels, MiB, seconds).
+void write_csv(const std::vector<Json>& rows, std::ostream& out);
+
+}  // namespace hermesh

@@ -1,0 +1,30 @@
+#include "experiments/test_volumes.h"
+
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include "algorithms/core/level_set_grid.h"
+
+namespace hermesh {
+
+LevelSet make_volume(const std::array<int, 3>& size, float background,
+                     const std::function<float(int, int, int)>& value) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(background);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  auto access = grid->getAccessor();
+  for (int x = 0; x < size[0]; ++x)
+    for (int y = 0; y < size[1]; ++y)
+      for (int z = 0; z < size[2]; ++z) access.setValue(openvdb::Coord(x, y, z), value(x, y, z));
+  return make_level_set(grid);
+}
+
+LevelSet make_sphere(double radius_in_voxels, double voxel_size, const std::array<double, 3>& translation) {
+  initialize_openvdb();
+  auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      static_cast<float>(radius_in_voxels * voxel_size), openvdb::Vec3f(0), static_cast<float>(voxel_size),
+      3.0f);
+  grid->transform().postTranslate(openvdb::Vec3d(translation[0], translation[1], translation[2]));
+  return make_level_set(grid);
+}
+
+}  // namespace hermesh

@@ -1,0 +1,21 @@
+// Small volumes for tests. Light; the grids are made in the .cpp.
+#pragma once
+
+#include <array>
+#include <functional>
+
+#include "algorithms/core/level_set.h"
+
+namespace hermesh {
+
+/// A dense block of samples from index (0,0,0) to size − 1, all active, with voxel size 1 and the given
+/// background around it. The grid is marked as a level set, so that less than the isovalue is inside.
+LevelSet make_volume(const std::array<int, 3>& size, float background,
+                     const std::function<float(int, int, int)>& value);
+
+/// A narrow-band level set of a sphere about a point, band of three voxels, inside filled with tiles.
+/// `translation` places index zero in the world.
+LevelSet make_sphere(double radius_in_voxels, double voxel_size,
+                     const std::array<double, 3>& translation = {0, 0, 0});
+
+}  // namespace hermesh

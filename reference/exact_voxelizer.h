@@ -1,0 +1,23 @@
+// The oracle among the voxelizers: distances by brute force, signs by counting crossings of rays. Slow and
+// certain, for grids of up to a few million voxels.
+#pragma once
+
+#include "algorithms/core/variant.h"
+
+namespace hermesh {
+
+/// Grid "sdf" of class level set. The active voxels are exactly those whose distance to the surface is less
+/// than the band of their side; their values are that distance, computed in double precision and rounded once
+/// to single. Values outside of the band are exterior_band and −interior_band voxels in world units.
+///
+/// A point is inside when most of several rays from it cross the polygons an odd number of times (exact
+/// predicates). The sign can change only across the surface, so rays are cast for one voxel of every set of
+/// voxels that provably lie on one side: two neighbours whose distances add up to more than the voxel between
+/// them. For a closed mesh that does not intersect itself this is the true inside, with any winding; nested
+/// shells alternate; for an open mesh it is a vote. Triangles of no area are skipped: their edges belong to
+/// their neighbours, too.
+/// @throws Error for what check_voxelization_fits() refuses, and for a mesh whose triangles all have no area;
+/// Cancelled
+LevelSet exact_voxelizer(const VoxelizationInput& input);
+
+}  // namespace hermesh

@@ -1,0 +1,16 @@
+// OpenVDB's own voxelizer: openvdb::tools::meshToVolume (Mihai Aldén; the production descendant of the
+// thesis).
+#pragma once
+
+#include "algorithms/core/variant.h"
+
+namespace hermesh {
+
+/// Grid "sdf" of class level set, with default flags: OpenVDB renormalises the distances, so they are
+/// approximate everywhere. Signs do not depend on the winding; cavities are filled; an open mesh comes out
+/// without an inside, and a note says so. Values outside of the band are exterior_band and −interior_band
+/// voxels in world units.
+/// @throws Error for what check_voxelization_fits() refuses; Cancelled
+LevelSet openvdb_mesh_to_volume(const VoxelizationInput& input);
+
+}  // namespace hermesh

@@ -1,0 +1,34 @@
+// Small meshes with known geometry, and what the tests of this folder ask of a mesh.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/variant.h"
+
+namespace hermesh::test {
+
+/// Sphere about a centre: a subdivided octahedron of 8·4^levels triangles with its points on the sphere.
+PolygonMesh sphere(double radius, int levels, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero());
+/// Cube of six quads with edge 2·half, turned by 20°, 30° and 40° about x, y and z.
+PolygonMesh turned_cube(double half);
+Eigen::Matrix3d turn();
+/// Torus about the z axis of 2·rings·sides triangles.
+PolygonMesh torus(double major, double minor, int rings, int sides);
+/// Both in one mesh; the second one's points are moved into the first one's frame.
+PolygonMesh joined(const PolygonMesh& first, const PolygonMesh& second);
+PolygonMesh reversed(PolygonMesh mesh);
+
+double signed_volume(const PolygonMesh& mesh);
+/// Every directed edge exactly once, and its opposite exactly once: closed, edge-manifold and oriented.
+bool closed_and_oriented(const PolygonMesh& mesh);
+/// Points that polygons use, less edges, plus triangles.
+long euler_characteristic(const PolygonMesh& mesh);
+
+PolygonMesh extract(const std::string& extractor, const LevelSet& level_set,
+                    const std::map<std::string, std::string>& options = {}, double isovalue = 0.0);
+LevelSet voxelize(const std::string& voxelizer, const PolygonMesh& mesh, double voxel_size,
+                  double exterior = 3.0, double interior = 3.0);
+
+}  // namespace hermesh::test

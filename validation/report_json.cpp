@@ -1,0 +1,124 @@
+#include "validation/report_json.h"
+
+#include <cmath>
+
+namespace hermesh::validation {
+namespace {
+
+using Json = nlohmann::json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json vector(const Eigen::Vector3d& v) { return Json::array({number(v.x()), number(v.y()), number(v.z())}); }
+
+Json distances(const Distances& d) {
+  return {{"max", number(d.max)},
+          {"mean", number(d.mean)},
+          {"rms", number(d.rms)},
+          {"worst", vector(d.worst)},
+          {"samples", d.samples}};
+}
+
+Json places(const Places& p) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < p.points.size(); ++i) {
+    Json polygons = Json::array({p.polygons[i][0]});
+    if (p.polygons[i][1] >= 0) polygons.push_back(p.polygons[i][1]);
+    list.push_back({{"point", vector(p.points[i])}, {"polygons", polygons}});
+  }
+  return list;
+}
+
+Json all_places(const MeshReport& r) {
+  Json all = Json::object();
+  const auto add = [&all](const char* key, const Places& p) {
+    if (!p.points.empty()) all[key] = places(p);
+  };
+  add("boundary_edges", r.boundary_places);
+  add("non_manifold_edges", r.non_manifold_edge_places);
+  add("non_manifold_vertices", r.non_manifold_vertex_places);
+  add("inconsistent_edges", r.inconsistent_places);
+  add("degenerate_polygons", r.degenerate_places);
+  add("duplicate_polygons", r.duplicate_places);
+  if (r.self_intersections) add("self_intersecting_pairs", r.self_intersections->places);
+  return all;
+}
+
+Json library(const LibraryCounts& l) {
+  Json json = {{"loaded", l.loaded}, {"disagreements", l.disagreements}};
+  if (!l.loaded) {
+    json["refusal"] = l.refusal;
+    return json;
+  }
+  json["boundary_edges"] = l.boundary_edges;
+  json["components"] = l.components;
+  json["euler_characteristic"] = l.euler_characteristic;
+  json["volume"] = number(l.volume);
+  json["area"] = number(l.area);
+  return json;
+}
+
+Json features(const FeatureDistances& f) {
+  return {{"edges", f.edges},
+          {"corners", f.corners},
+          {"edges_excluded", f.edges_excluded},
+          {"edge_length", number(f.edge_length)},
+          {"edge_to_mesh", distances(f.edge_to_mesh)},
+          {"corner_to_mesh", distances(f.corner_to_mesh)}};
+}
+
+Json bound(const HausdorffBound& b) { return {{"lower", number(b.lower)}, {"upper", number(b.upper)}}; }
+
+Json counts(const MeshReport& r) {
+  Json json = {{"points", r.points},
+               {"triangles", r.triangles},
+               {"quads", r.quads},
+               {"boundary_edges", r.boundary_edges},
+               {"non_manifold_edges", r.non_manifold_edges},
+               {"non_manifold_vertices", r.non_manifold_vertices},
+               {"inconsistent_edges", r.inconsistent_edges},
+               {"degenerate_polygons", r.degenerate_polygons},
+               {"duplicate_polygons", r.duplicate_polygons},
+               {"isolated_points", r.isolated_points},
+               {"components", r.components},
+               {"euler_characteristic", r.euler_characteristic}};
+  json["genus"] = nullptr;
+  if (r.genus && *r.genus == std::floor(*r.genus))
+    json["genus"] = std::int64_t(*r.genus);
+  else if (r.genus)
+    json["genus"] = *r.genus;
+  json["self_intersecting_pairs"] = r.self_intersections ? Json(r.self_intersections->pairs) : Json(nullptr);
+  json["volume"] = number(r.volume);
+  json["area"] = number(r.area);
+  json["smallest_angle"] = number(r.smallest_angle);
+  json["worst_aspect"] = number(r.worst_aspect);
+  return json;
+}
+
+}  // namespace
+
+nlohmann::json to_json(const MeshReport& r) {
+  Json json = counts(r);
+  json["closed"] = r.closed();
+  json["manifold"] = r.manifold();
+  json["oriented"] = r.oriented();
+  json["watertight"] = r.self_intersections ? Json(r.watertight()) : Json(nullptr);
+  if (r.to_reference) json["to_reference"] = distances(*r.to_reference);
+  if (r.from_reference) json["from_reference"] = distances(*r.from_reference);
+  if (r.certified_to_reference) json["certified_to_reference"] = bound(*r.certified_to_reference);
+  if (r.certified_from_reference) json["certified_from_reference"] = bound(*r.certified_from_reference);
+  if (r.features) json["features"] = features(*r.features);
+  if (r.self_intersections)
+    json["self_intersections"] = {{"disjoint", r.self_intersections->disjoint},
+                                  {"vertex_sharing", r.self_intersections->vertex_sharing},
+                                  {"edge_sharing", r.self_intersections->edge_sharing}};
+  if (!r.libraries.empty()) {
+    json["libraries"] = Json::object();
+    for (const LibraryCounts& l : r.libraries) json["libraries"][l.library] = library(l);
+  }
+  json["places"] = all_places(r);
+  json["sentences"] = r.sentences();
+  return json;
+}
+
+}  // namespace hermesh::validation

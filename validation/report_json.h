@@ -1,0 +1,26 @@
+// The report as JSON, for scripts and result rows.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "validation/mesh_report.h"
+
+namespace hermesh::validation {
+
+/// One flat object with a key for each count and measure: `points triangles quads boundary_edges
+/// non_manifold_edges non_manifold_vertices inconsistent_edges degenerate_polygons duplicate_polygons
+/// isolated_points components euler_characteristic genus self_intersecting_pairs volume area smallest_angle
+/// worst_aspect`. Null stands for what was not asked for (self_intersecting_pairs), is not defined (genus) or
+/// infinite (worst_aspect). Beside them, where they were asked for:
+///  - to_reference, from_reference: {max, mean, rms, worst, samples};
+///  - certified_to_reference, certified_from_reference: {lower, upper};
+///  - features: {edges, corners, edges_excluded, edge_length, edge_to_mesh, corner_to_mesh}, the last two as
+///  above;
+///  - self_intersections: {disjoint, vertex_sharing, edge_sharing};
+///  - libraries: by name {loaded, refusal, boundary_edges, …, disagreements};
+/// and always closed, manifold, oriented, watertight (null unless self-intersections were asked for),
+/// sentences, and places: by the name of the count, a list of {point, polygons}. All lengths are in world
+/// units.
+nlohmann::json to_json(const MeshReport& report);
+
+}  // namespace hermesh::validation
