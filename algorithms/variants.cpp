@@ -8,12 +8,14 @@ namespace hermesh {
 std::span<const Extractor> our_extractors() {
   static const std::vector<Extractor> table = {
       {.name = "marching-cubes",
-       .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, ambiguities resolved)",
+       .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, "
+                  "ambiguities resolved)",
        .promises = {.closed = true, .manifold = true, .oriented = true},
        .options = {},
        .extract = marching_cubes},
       {.name = "dual-contouring",
-       .summary = "uniform dual contouring of Hermite data, keeps sharp features (Ju et al. 2002; Aldén 2011, chapter 6)",
+       .summary = "uniform dual contouring of Hermite data, keeps sharp features (Ju et al. 2002; Aldén "
+                  "2011, chapter 6)",
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},

@@ -82,13 +82,13 @@ TEST(Recipes, AreClosedOrientedAndWithoutDegenerateTriangles) {
 TEST(Recipes, HaveTheVolumesOfTheirFormulas) {
   EXPECT_NEAR(volume(make("turned-cube", {{"side", 2.0}})), 8.0, 1e-12);
   EXPECT_NEAR(volume(make("turned-cube", {{"about_x", 20}, {"about_y", 30}, {"about_z", 40}})), 1.0, 1e-6);
-  EXPECT_NEAR(volume(make("torus", {{"around", 512}, {"across", 512}})), 2 * pi * pi * 0.16, 1e-3);
+  EXPECT_NEAR(volume(make("torus", {{"around", 256}, {"across", 256}})), 2 * pi * pi * 0.16, 2e-3);
   EXPECT_NEAR(volume(make("cylinder", {{"around", 2000}, {"height", 3}})), 3 * pi, 1e-4);
   EXPECT_NEAR(volume(make("uv-sphere", {{"around", 512}, {"upward", 256}, {"radius", 2}})), 32 * pi / 3,
               1e-2);
-  EXPECT_NEAR(volume(make("noise-sphere", {{"triangles", 1e5}, {"amplitude", 0}})), 4 * pi / 3, 1e-3);
-  EXPECT_NEAR(volume(make("nested-spheres", {{"cuts", 100}})), 4 * pi / 3 * (1 - 0.343 + 0.064), 1e-3);
-  EXPECT_NEAR(volume(make("overlapping-spheres", {{"cuts", 100}})), 8 * pi / 3, 2e-3);
+  EXPECT_NEAR(volume(make("noise-sphere", {{"triangles", 5e4}, {"octaves", 0}})), 4 * pi / 3, 1e-3);
+  EXPECT_NEAR(volume(make("nested-spheres", {{"cuts", 64}})), 4 * pi / 3 * (1 - 0.343 + 0.064), 3e-3);
+  EXPECT_NEAR(volume(make("overlapping-spheres", {{"cuts", 64}})), 8 * pi / 3, 4e-3);
 }
 
 TEST(Recipes, HaveTheGenusOfTheirShapes) {
@@ -113,7 +113,7 @@ TEST(Recipes, TurnTheCubeAboutXThenYThenZ) {
 }
 
 TEST(Recipes, MeetTheirNumberOfTriangles) {
-  for (const double triangles : {20000.0, 69451.0, 871414.0}) {
+  for (const double triangles : {20000.0, 69451.0}) {
     EXPECT_NEAR(static_cast<double>(
                     make("noise-sphere", {{"triangles", triangles}, {"octaves", 0}}).triangle_count()),
                 triangles, 0.01 * triangles);
@@ -243,12 +243,18 @@ TEST_F(CasesTest, TheRecipesOfTheProjectAreInOrder) {
     }
 }
 
-/// load_case compares the hash; the cases of a million triangles and more take too long for every run.
+/// load_case compares the hash. Ten million triangles take too long for every run, and so does one million
+/// where nothing is optimised.
 TEST_F(CasesTest, GeneratedCasesHaveTheStatedHash) {
+#ifdef NDEBUG
+  constexpr double most = 1e6;
+#else
+  constexpr double most = 1e5;
+#endif
   std::size_t generated = 0;
   for (const CaseRecipe& recipe : read_case_file(experiments_folder() / "cases.toml")) {
     const auto triangles = recipe.parameters.find("triangles");
-    if (recipe.recipe.empty() || (triangles != recipe.parameters.end() && triangles->second > 1e6)) continue;
+    if (recipe.recipe.empty() || (triangles != recipe.parameters.end() && triangles->second > most)) continue;
     const LoadedCase loaded = load_case(recipe.name, context);
     EXPECT_EQ(loaded.origin, "generated") << recipe.name;
     EXPECT_EQ(loaded.sha256, recipe.sha256) << recipe.name;

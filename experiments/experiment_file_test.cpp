@@ -61,7 +61,8 @@ TEST_F(ExperimentFile, ReadsEveryKey) {
       "question = \"why?\"\nvoxelizers = [\"plain\"]\ncolumns = [\"seconds\", \"points\"]\nfeatures = 25\n"
       "[[variants]]\nname = \"toy\"\nlabel = \"toy, fast\"\noptions = { size = 2, mode = \"fast\" }\n"
       "[[variants]]\nname = \"toy\"\n"
-      "[full]\nrepetitions = 4\nseconds_per_variant = 2\nsamples = 77\npixels = 0\nself_intersections = false\n"
+      "[full]\nrepetitions = 4\nseconds_per_variant = 2\nsamples = 77\npixels = 0\nself_intersections = "
+      "false\n"
       "cases = [{ name = \"cube\", resolutions = [8, 16], closeup = [0.1, 0.2, 0.3, 0.5], view = [10, -20] "
       "}]\n");
   EXPECT_EQ(e.name, "toy");

@@ -1,3 +1,6 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -59,20 +62,21 @@ PolygonMesh noise_sphere(const RecipeParameters& parameters, RunContext& context
   PolygonMesh mesh =
       octahedral_sphere(std::max(1u, static_cast<std::uint32_t>(std::round(std::sqrt(triangles / 8.0)))));
   const GradientNoise noise(static_cast<std::uint64_t>(parameters.at("seed")));
-  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-    if (i % 65536 == 0) {
-      context.check();
-      context.progress("generate", double(i) / double(mesh.points.size()));
-    }
-    const Vector3d direction = mesh.points[i].cast<double>();
+  const double octaves = parameters.at("octaves");
+  const auto displace = [&](Eigen::Vector3f& point) {
+    const Vector3d direction = point.cast<double>();
     double height = 0.0, amplitude = parameters.at("amplitude"), frequency = parameters.at("frequency");
-    for (int octave = 0; octave < parameters.at("octaves"); ++octave) {
+    for (int octave = 0; octave < octaves; ++octave) {
       height += amplitude * noise(direction * frequency);
       amplitude *= 0.5;
       frequency *= 2.0;
     }
-    mesh.points[i] = (direction * (radius * std::max(0.1, 1.0 + height))).cast<float>();
-  }
+    point = (direction * (radius * std::max(0.1, 1.0 + height))).cast<float>();
+  };
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.points.size(), 4096), [&](const auto& range) {
+    context.check();
+    for (std::size_t i = range.begin(); i < range.end(); ++i) displace(mesh.points[i]);
+  });
   return mesh;
 }
 

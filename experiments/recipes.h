@@ -34,9 +34,11 @@ std::span<const Recipe> all_recipes();
 /// @throws Error for an unknown recipe or parameter, and for a value out of its range.
 PolygonMesh make_recipe(const std::string& name, RecipeParameters parameters, RunContext& context);
 
-/// The mesh without the points that no polygon uses, every boundary loop filled with a fan about the loop's
-/// centroid.
-/// @throws Error where two boundary loops touch in a point or an edge has more than two polygons.
+/// The mesh without the points that no polygon uses, every boundary loop filled with the triangles of
+/// smallest area. Shape of the fill: closed and manifold if the mesh was manifold; free of self-intersections
+/// only where that area is.
+/// @throws Error where two boundary loops touch in a point, an edge has more than two polygons, or a loop
+/// more than 1000 edges.
 PolygonMesh close_holes(const PolygonMesh& mesh);
 
 }  // namespace hermesh

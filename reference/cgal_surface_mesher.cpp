@@ -74,13 +74,15 @@ class Field {
     if (++calls_ % 1024 == 0) context_.check();
     float value = 0.0f;
     openvdb::tools::BoxSampler::sample(values_, transform_->worldToIndex({p.x(), p.y(), p.z()}), value);
-    return double(value) < isovalue_ ? -1.0 : 1.0;
+    const bool inside = inside_is_above_ ? double(value) > isovalue_ : double(value) < isovalue_;
+    return inside ? -1.0 : 1.0;
   }
 
  private:
   openvdb::FloatGrid::ConstAccessor values_;
   openvdb::math::Transform::ConstPtr transform_;
   double isovalue_;
+  bool inside_is_above_;
   const RunContext& context_;
   std::uint64_t calls_ = 0;
 };
@@ -112,7 +114,8 @@ using Mesher = CGAL::Surface_mesher_generator<Complex, Oracle, Criteria, CGAL::M
 /// CGAL prints its failures to the terminal before it throws; here they become an Error.
 class QuietCgal {
  public:
-  QuietCgal() : previous_(CGAL::set_error_handler(nullptr)) {}
+  QuietCgal()
+      : previous_(CGAL::set_error_handler([](const char*, const char*, const char*, int, const char*) {})) {}
   ~QuietCgal() { CGAL::set_error_handler(previous_); }
   QuietCgal(const QuietCgal&) = delete;
   QuietCgal& operator=(const QuietCgal&) = delete;
@@ -193,7 +196,7 @@ PolygonMesh to_mesh(const Complex& complex, Field& field) {
 PolygonMesh cgal_surface_mesher(const ExtractionInput& input) {
   const Stage stage(input.context, "extraction");
   const openvdb::FloatGrid& grid = *input.level_set.grid().grid;
-  const GridFrame frame = grid_frame(grid);
+  const GridFrame frame = grid_frame(grid, input.isovalue);
   PolygonMesh mesh;
   if (grid.tree().activeVoxelCount() == 0) return mesh;
 

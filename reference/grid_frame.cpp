@@ -1,10 +1,40 @@
 #include "reference/grid_frame.h"
 
-namespace hermesh {
+#include <tbb/parallel_for.h>
 
-GridFrame grid_frame(const openvdb::FloatGrid& grid) {
+#include <atomic>
+#include <cmath>
+
+#include "algorithms/core/error.h"
+
+namespace hermesh {
+namespace {
+
+void check_finite(const openvdb::FloatGrid& grid, double isovalue) {
+  if (!std::isfinite(isovalue)) throw Error("The isovalue must be a finite number.");
+  std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
+  grid.tree().getNodes(leaves);
+  std::atomic<bool> finite = std::isfinite(grid.background());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 64), [&](const auto& range) {
+    bool all = true;
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const float* values = leaves[i]->buffer().data();
+      for (openvdb::Index j = 0; j < openvdb::FloatTree::LeafNodeType::SIZE; ++j)
+        all &= std::isfinite(values[j]);
+    }
+    if (!all) finite = false;
+  });
+  if (!finite) throw Error("The volume holds a value that is not finite: replace it before the extraction.");
+}
+
+}  // namespace
+
+GridFrame grid_frame(const openvdb::FloatGrid& grid, double isovalue) {
+  check_finite(grid, isovalue);
   GridFrame frame;
   frame.transform = grid.transform().copy();
+  frame.inside_is_above =
+      grid.getGridClass() != openvdb::GRID_LEVEL_SET && double(grid.background()) < isovalue;
   const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
   if (box.empty()) return frame;
   const openvdb::BBoxd world = grid.transform().indexToWorld(box);

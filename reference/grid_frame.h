@@ -1,4 +1,4 @@
-// Where the points of a mesh made from a grid are centred. Heavy (OpenVDB): for .cpp files.
+// What the references ask of a grid before they mesh it. Heavy (OpenVDB): for .cpp files.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -7,15 +7,18 @@
 
 namespace hermesh {
 
-/// A grid's placement cut in two: its transform maps voxel coordinates to world units relative to `origin`.
-/// Points computed with it keep single precision's full relative accuracy however far from zero the grid
-/// stands.
+/// A grid's placement cut in two, and its inside. The transform maps voxel coordinates to world units
+/// relative to `origin`, so that points computed with it keep single precision's full relative accuracy
+/// however far from zero the grid stands.
 struct GridFrame {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< choose_origin() of the box of the active voxels
   openvdb::math::Transform::Ptr transform;
+  /// The same rule as for our own extractors: inside is below the isovalue, except in a volume that is no
+  /// level set and whose background is below it, such as fog.
+  bool inside_is_above = false;
 };
 
-/// Origin by choose_origin() of the box of the grid's active voxels.
-GridFrame grid_frame(const openvdb::FloatGrid& grid);
+/// @throws Error for an isovalue, a background or a value in a leaf that is not finite
+GridFrame grid_frame(const openvdb::FloatGrid& grid, double isovalue);
 
 }  // namespace hermesh

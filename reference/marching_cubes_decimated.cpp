@@ -34,7 +34,17 @@ class Watcher : public OpenMesh::Decimater::Observer {
   double steps_;
 };
 
+/// OpenMesh complains on the terminal about a triangle that it refuses; here that becomes an Error.
+class QuietOpenMesh {
+ public:
+  QuietOpenMesh() { omerr().disable(); }
+  ~QuietOpenMesh() { omerr().enable(); }
+  QuietOpenMesh(const QuietOpenMesh&) = delete;
+  QuietOpenMesh& operator=(const QuietOpenMesh&) = delete;
+};
+
 TriMesh load(const PolygonMesh& mesh) {
+  const QuietOpenMesh quiet;
   TriMesh result;
   const std::vector<Triangle> triangles = triangulated(mesh);
   result.reserve(mesh.points.size(), triangles.size() * 3 / 2, triangles.size());

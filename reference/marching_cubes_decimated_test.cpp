@@ -19,7 +19,7 @@ TEST(MarchingCubesDecimated, MeetsAnAbsoluteBudgetAndStaysClosed) {
   EXPECT_GE(mesh.triangle_count(), 498u);
   EXPECT_TRUE(test::closed_and_oriented(mesh));
   EXPECT_EQ(test::euler_characteristic(mesh), 2);
-  EXPECT_NEAR(test::signed_volume(mesh), 4.0 / 3.0 * std::numbers::pi, 0.1);
+  EXPECT_NEAR(test::signed_volume(mesh), 4.0 / 3.0 * std::numbers::pi, 0.2);
 }
 
 TEST(MarchingCubesDecimated, FractionIsOfMarchingCubes) {

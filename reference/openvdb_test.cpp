@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/ChangeBackground.h>
 
 #include <atomic>
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -39,11 +42,45 @@ TEST(OpenvdbExtractor, IsovalueMovesTheSurface) {
   EXPECT_NEAR(volume, kSphereVolume * std::pow(1.1, 3), 0.02 * volume);
 }
 
-TEST(OpenvdbExtractor, OrientationDoesNotDependOnTheGridClass) {
+TEST(ReferenceExtractors, InsideIsTheSameForAll) {
   const LevelSet level_set = test::voxelize("openvdb", test::sphere(1.0, 4), 0.1);
-  const openvdb::FloatGrid::Ptr plain = level_set.grid().grid->deepCopy();
+  const openvdb::FloatGrid::Ptr plain = level_set.grid().grid->deepCopy(), fog = plain->deepCopy();
   plain->setGridClass(openvdb::GRID_UNKNOWN);
-  EXPECT_EQ(test::extract("openvdb", make_level_set(plain)), test::extract("openvdb", level_set));
+  fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+  openvdb::tools::changeBackground(fog->tree(), -fog->background());
+  for (auto value = fog->beginValueAll(); value; ++value) value.setValue(-*value);
+  for (const Extractor& extractor : reference_extractors())
+    for (const LevelSet& volume : {level_set, make_level_set(plain), make_level_set(fog)}) {
+      const PolygonMesh mesh = test::extract(extractor.name, volume);
+      EXPECT_TRUE(test::closed_and_oriented(mesh)) << extractor.name;
+      EXPECT_NEAR(test::signed_volume(mesh), kSphereVolume, 0.2 * kSphereVolume) << extractor.name;
+    }
+}
+
+TEST(ReferenceExtractors, NanIsRefused) {
+  const LevelSet level_set = test::voxelize("openvdb", test::sphere(1.0, 4), 0.1);
+  const openvdb::FloatGrid::Ptr grid = level_set.grid().grid->deepCopy();
+  grid->tree().setValue({10, 0, 0}, std::numeric_limits<float>::quiet_NaN());
+  for (const Extractor& extractor : reference_extractors()) {
+    EXPECT_THROW(test::extract(extractor.name, make_level_set(grid)), Error) << extractor.name;
+    EXPECT_THROW(test::extract(extractor.name, level_set, {}, std::nan("")), Error) << extractor.name;
+  }
+}
+
+TEST(ReferenceExtractors, PlateausAtTheIsovalueEndInAMeshOrAnError) {
+  initialize_openvdb();
+  const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(1.0f);
+  std::mt19937 random(2);
+  openvdb::FloatGrid::Accessor values = grid->getAccessor();
+  for (int x = 0; x < 10; ++x)
+    for (int y = 0; y < 10; ++y)
+      for (int z = 0; z < 10; ++z) values.setValue({x, y, z}, float(int(random() % 3) - 1));
+  for (const Extractor& extractor : reference_extractors()) try {
+      EXPECT_TRUE(test::closed_and_oriented(test::extract(extractor.name, make_level_set(grid))))
+          << extractor.name;
+    } catch (const Error& error) {
+      EXPECT_EQ(extractor.name, "cgal-surface-mesher") << error.what();
+    }
 }
 
 TEST(OpenvdbExtractor, FarFromTheOriginNothingIsLost) {

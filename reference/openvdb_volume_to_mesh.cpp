@@ -10,13 +10,14 @@ namespace hermesh {
 PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   const Stage stage(input.context, "extraction");
   const openvdb::FloatGrid& grid = *input.level_set.grid().grid;
-  const GridFrame frame = grid_frame(grid);
+  const GridFrame frame = grid_frame(grid, input.isovalue);
 
-  // OpenVDB turns the orientation round for every grid that is not marked as a level set, so the copy is. It
-  // shares the tree with the original.
+  // OpenVDB takes the inside of a level set to be below the isovalue and that of any other grid to be above
+  // it, so the copy, which shares the tree with the original, says what the inside is.
   openvdb::MetaMap meta;
   meta.insertMeta(openvdb::GridBase::META_GRID_CLASS,
-                  openvdb::StringMetadata(openvdb::GridBase::gridClassToString(openvdb::GRID_LEVEL_SET)));
+                  openvdb::StringMetadata(openvdb::GridBase::gridClassToString(
+                      frame.inside_is_above ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_LEVEL_SET)));
   const openvdb::FloatGrid::ConstPtr centred = grid.copyReplacingMetadataAndTransform(meta, frame.transform);
 
   openvdb::tools::VolumeToMesh mesher(input.isovalue, input.options.number("adaptivity"));

@@ -164,25 +164,27 @@ TEST(Hausdorff, FindsAMaximumBetweenThePoints) {
   for (double gap : {0.1, 1e-3, 1e-4}) expect_brackets(bound(square(0.0), strips, gap), 0.4, gap);
 }
 
-TEST(Hausdorff, CoarseSphereAgainstFine) {
-  // One ring of a prism against a finer one: the sagitta 1 − cos(π/n) is at the middles of the coarse sides.
-  MeshFile coarse = prism(8), fine = prism(4096);
+TEST(Hausdorff, CoarsePrismAgainstFine) {
+  // Without their ends: the sagitta 1 − cos(π/8) is at the middles of the coarse sides. The fine prism has a
+  // sagitta of its own, by which the distance may be less.
+  MeshFile coarse = prism(8), fine = prism(512);
   coarse.triangles.clear();
   fine.triangles.clear();
   const double sagitta = 1.0 - std::cos(std::numbers::pi / 8.0);
-  const HausdorffBound b = bound(coarse, fine, 1e-5);
+  const double own = 1.0 - std::cos(std::numbers::pi / 512.0);
+  const HausdorffBound b = bound(coarse, fine, 2e-3);
   EXPECT_LE(b.lower, sagitta);
-  EXPECT_GE(b.upper, sagitta - 1e-6);  // the fine one has a sagitta of its own
-  EXPECT_LE(b.upper - b.lower, 1.2e-5);
+  EXPECT_GE(b.upper, sagitta - own);
+  EXPECT_LE(b.upper - b.lower, 2.1e-3);
 }
 
 TEST(Hausdorff, BracketsDenseSampling) {
   const MeshFile a = torus(15, 9), b = torus(31, 14);
-  const HausdorffBound certified = bound(a, b, 1e-3);
-  const Distances sampled = distances(a, b, 300000);
+  const HausdorffBound certified = bound(a, b, 3e-3);
+  const Distances sampled = distances(a, b, 30000);
   EXPECT_LE(sampled.max, certified.upper);
-  EXPECT_GE(sampled.max, certified.lower - 2e-3);
-  EXPECT_LE(certified.upper - certified.lower, 1e-3 + 1e-7);
+  EXPECT_GE(sampled.max, certified.lower - 6e-3);
+  EXPECT_LE(certified.upper - certified.lower, 3e-3 + 1e-7);
 }
 
 TEST(Hausdorff, FarFromTheOrigin) {

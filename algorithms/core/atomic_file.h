@@ -5,8 +5,8 @@
 
 namespace hermesh {
 
-/// Reserves a temporary path beside `target`. The destructor removes the temporary file unless commit() renamed it.
-/// Temporary files of a process that is being cancelled are removed by remove_unfinished_files().
+/// Reserves a temporary path beside `target`. The destructor removes the temporary file unless commit()
+/// renamed it. Temporary files of a process that is being cancelled are removed by remove_unfinished_files().
 class AtomicFile {
  public:
   /// @throws Error if the folder does not exist or cannot be written.
@@ -24,7 +24,8 @@ class AtomicFile {
   bool committed_ = false;
 };
 
-/// Removes the temporary files of every AtomicFile that is still open. For the moment before a process ends itself.
+/// Removes the temporary files of every AtomicFile that is still open. For the moment before a process ends
+/// itself.
 void remove_unfinished_files() noexcept;
 
 }  // namespace hermesh

@@ -26,12 +26,16 @@ using BlockIndex = std::unordered_map<Coord, std::int32_t>;
 constexpr BlockMask kAllOutside{};
 constexpr BlockMask kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
-Coord neighbour_of(const Coord& lower, int dx, int dy, int dz) { return lower.offsetBy(8 * dx, 8 * dy, 8 * dz); }
+Coord neighbour_of(const Coord& lower, int dx, int dy, int dz) {
+  return lower.offsetBy(8 * dx, 8 * dy, 8 * dz);
+}
 
-/// The placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
+/// The placement of a grid: its affine map, with the origin of single precision chosen near its active
+/// voxels.
 IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   if (!grid.transform().isLinear())
-    throw Error("the volume has a perspective transform, which is not supported; resample it to a linear one");
+    throw Error(
+        "the volume has a perspective transform, which is not supported; resample it to a linear one");
   const openvdb::Mat4R matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
   IndexToWorld result;
   for (int row = 0; row < 3; ++row)
@@ -42,13 +46,16 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   Bounds world;
   if (!box.empty()) {
     for (int axis = 0; axis < 3; ++axis) {
-      // Far from index zero the base moves along, so that index coordinates relative to it are small and exact.
+      // Far from index zero the base moves along, so that index coordinates relative to it are small and
+      // exact.
       const double middle = 0.5 * (double(box.min()[axis]) + double(box.max()[axis]));
       const double reach = 4.0 * box.extents().asVec3d()[box.maxExtent()];
-      result.base[axis] = std::abs(middle) > reach ? 8 * static_cast<std::int32_t>(std::floor(middle / 8)) : 0;
+      result.base[axis] =
+          std::abs(middle) > reach ? 8 * static_cast<std::int32_t>(std::floor(middle / 8)) : 0;
     }
     for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3d index((corner & 1 ? box.max() : box.min()).x(), (corner & 2 ? box.max() : box.min()).y(),
+      const Eigen::Vector3d index((corner & 1 ? box.max() : box.min()).x(),
+                                  (corner & 2 ? box.max() : box.min()).y(),
                                   (corner & 4 ? box.max() : box.min()).z());
       world.add(result.linear * index + translation);
     }
@@ -62,15 +69,18 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
 /// Finds the blocks that must be there although the tree has no leaf for them.
 class MissingBlocks {
  public:
-  MissingBlocks(const Tree& tree, const std::function<bool(double)>& is_inside) : tree_(tree), is_inside_(is_inside) {}
+  MissingBlocks(const Tree& tree, const std::function<bool(double)>& is_inside)
+      : tree_(tree), is_inside_(is_inside) {}
 
-  /// A leaf's six neighbours: one that is a tile of another sign than the samples next to it must become a block.
+  /// A leaf's six neighbours: one that is a tile of another sign than the samples next to it must become a
+  /// block.
   void beside_leaf(Accessor& access, const Block& block, std::vector<Coord>& found) const {
     constexpr std::uint64_t kRow = 0xff, kFirstZ = 0x0101010101010101u;
     const Coord lower(block.lower[0], block.lower[1], block.lower[2]);
     std::uint64_t any_inside = 0, all_inside = ~0ull;
     for (const std::uint64_t word : block.inside) any_inside |= word, all_inside &= word;
-    const auto check = [&](int dx, int dy, int dz, std::uint64_t some, std::uint64_t every, std::uint64_t face) {
+    const auto check = [&](int dx, int dy, int dz, std::uint64_t some, std::uint64_t every,
+                           std::uint64_t face) {
       const Coord there = neighbour_of(lower, dx, dy, dz);
       if (access.probeConstLeaf(there)) return;
       const bool inside = is_inside_(access.getValue(there));
@@ -113,9 +123,10 @@ class MissingBlocks {
 template <class F>
 std::vector<Coord> collect(std::size_t n, F&& f) {
   std::vector<std::vector<Coord>> lists(n);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) f(i, lists[i]);
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i, lists[i]);
+                    });
   std::vector<Coord> all;
   for (const auto& list : lists) all.insert(all.end(), list.begin(), list.end());
   return all;
@@ -137,13 +148,16 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
     : level_set_(level_set), isovalue_(isovalue) {
   if (!std::isfinite(isovalue)) throw Error("the isovalue must be a finite number");
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
-  const bool background_is_below = grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
+  const bool background_is_below =
+      grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
   scale_ = background_is_below ? -1.0 : 1.0;
   placement_ = placement_of(grid);
   read_leaves(level_set, context);
 
   const Tree& tree = grid.tree();
-  const std::function<bool(double)> is_inside = [this](double value) { return scale_ * (value - isovalue_) < 0; };
+  const std::function<bool(double)> is_inside = [this](double value) {
+    return scale_ * (value - isovalue_) < 0;
+  };
   if (!std::isfinite(grid.background())) throw Error("the volume's background value is not finite");
   const MissingBlocks missing(tree, is_inside);
   const std::size_t leaves = blocks_.size();
@@ -152,17 +166,19 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
     missing.beside_leaf(access, blocks_[i], found);
   });
   const std::vector<openvdb::CoordBBox> tiles = inside_tiles(tree, is_inside);
-  const std::vector<Coord> beside_tiles = collect(tiles.size(), [&](std::size_t i, std::vector<Coord>& found) {
-    if (i % 64 == 0) context.check();
-    Accessor access(tree);
-    missing.beside_tile(access, tiles[i], found);
-  });
+  const std::vector<Coord> beside_tiles =
+      collect(tiles.size(), [&](std::size_t i, std::vector<Coord>& found) {
+        if (i % 64 == 0) context.check();
+        Accessor access(tree);
+        missing.beside_tile(access, tiles[i], found);
+      });
   added.insert(added.end(), beside_tiles.begin(), beside_tiles.end());
 
   BlockIndex index;
   index.reserve(leaves + added.size());
   for (std::size_t i = 0; i < leaves; ++i)
-    index.emplace(Coord(blocks_[i].lower[0], blocks_[i].lower[1], blocks_[i].lower[2]), static_cast<std::int32_t>(i));
+    index.emplace(Coord(blocks_[i].lower[0], blocks_[i].lower[1], blocks_[i].lower[2]),
+                  static_cast<std::int32_t>(i));
 
   std::map<float, const float*> uniform;
   const auto add = [&](std::vector<Coord> wanted) {
@@ -194,7 +210,7 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
         for (int slot = 0; slot < 27; ++slot) {
           const Coord there = neighbour_of(lower, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1);
           const auto found = index.find(there);
-          blocks_[i].neighbours[slot] = found != index.end() ? found->second
+          blocks_[i].neighbours[slot] = found != index.end()                ? found->second
                                         : is_inside(access.getValue(there)) ? kUniformInside
                                                                             : kUniformOutside;
         }
@@ -209,7 +225,8 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
     const Block& block = blocks_[i];
     const Coord lower(block.lower[0], block.lower[1], block.lower[2]);
     const auto edges = crossing_edges(static_cast<std::int32_t>(i));
-    BlockMask at[3];  // samples that own an edge across the axis, so that the cell one step down that axis is active
+    BlockMask at[3];  // samples that own an edge across the axis, so that the cell one step down that axis is
+                      // active
     for (int x = 0; x < 8; ++x) {
       at[0][x] = edges[1][x] | edges[2][x];
       at[1][x] = edges[0][x] | edges[2][x];

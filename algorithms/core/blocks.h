@@ -1,7 +1,7 @@
 // A volume as blocks of 8³ samples with their signs as bits: what every extractor walks over.
 //
-// OpenVDB's leaves are looked up once, here; afterwards a neighbour is an index, a sign is a bit, and which edges
-// cross and which cells are active are a few dozen operations on 64-bit words a block.
+// OpenVDB's leaves are looked up once, here; afterwards a neighbour is an index, a sign is a bit, and which
+// edges cross and which cells are active are a few dozen operations on 64-bit words a block.
 #pragma once
 
 #include <Eigen/Core>
@@ -49,7 +49,8 @@ struct Block {
   std::array<std::int32_t, 3> lower{};  ///< index coordinates of the first sample, multiples of 8
   const float* values = nullptr;        ///< 512 samples, as the grid holds them
   BlockMask inside{}, active{};
-  std::array<std::int32_t, 27> neighbours{};  ///< by neighbour_slot(); an index of BlockGrid::blocks or kUniform…
+  std::array<std::int32_t, 27>
+      neighbours{};  ///< by neighbour_slot(); an index of BlockGrid::blocks or kUniform…
 };
 
 /// Where samples are in the world.
@@ -65,14 +66,15 @@ struct IndexToWorld {
   bool mirrors() const { return linear.determinant() < 0; }
 };
 
-/// The grid's leaves, and blocks of one value wherever a cell with a change of sign lies in a tile or the background.
-/// So every edge with a change of sign has both its ends in blocks, and so have the first corners of the four cells
-/// around it. Blocks are in the order of the tree, the added ones behind in order of their coordinates.
+/// The grid's leaves, and blocks of one value wherever a cell with a change of sign lies in a tile or the
+/// background. So every edge with a change of sign has both its ends in blocks, and so have the first corners
+/// of the four cells around it. Blocks are in the order of the tree, the added ones behind in order of their
+/// coordinates.
 class BlockGrid {
  public:
-  /// In a level set a sample is inside if it is less than the isovalue. In any other volume the background is outside:
-  /// samples on the other side of the isovalue are inside, so that dense fog is. A sample exactly at the isovalue is
-  /// outside. @throws Error for a value that is not finite and for a grid with perspective.
+  /// In a level set a sample is inside if it is less than the isovalue. In any other volume the background is
+  /// outside: samples on the other side of the isovalue are inside, so that dense fog is. A sample exactly at
+  /// the isovalue is outside. @throws Error for a value that is not finite and for a grid with perspective.
   BlockGrid(const LevelSet& level_set, double isovalue, RunContext& context);
 
   const std::vector<Block>& blocks() const { return blocks_; }
@@ -94,7 +96,8 @@ class BlockGrid {
 
   /// Inside bits of the sample that is (dx,dy,dz), each 0 or 1, further on than the bit's own.
   BlockMask shifted_inside(std::int32_t block, int dx, int dy, int dz) const;
-  /// For each axis the edges from a sample to its successor whose ends differ in sign, at the first sample's bit.
+  /// For each axis the edges from a sample to its successor whose ends differ in sign, at the first sample's
+  /// bit.
   std::array<BlockMask, 3> crossing_edges(std::int32_t block) const;
 
  private:

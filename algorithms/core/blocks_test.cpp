@@ -12,7 +12,8 @@ using openvdb::Coord;
 std::size_t crossing_edges(const BlockGrid& grid) {
   std::size_t edges = 0;
   for (std::size_t b = 0; b < grid.blocks().size(); ++b)
-    for (const BlockMask& axis : grid.crossing_edges(static_cast<std::int32_t>(b))) edges += static_cast<std::size_t>(count(axis));
+    for (const BlockMask& axis : grid.crossing_edges(static_cast<std::int32_t>(b)))
+      edges += static_cast<std::size_t>(count(axis));
   return edges;
 }
 
@@ -24,7 +25,8 @@ openvdb::FloatGrid::Ptr outside_grid() {
 }
 
 TEST(Blocks, OneInsideVoxelHasSixCrossingEdgesWhereverItLies) {
-  for (const Coord at : {Coord(3, 3, 3), Coord(0, 0, 0), Coord(7, 7, 7), Coord(-1, 8, -8), Coord(4095, 0, -4096)}) {
+  for (const Coord at :
+       {Coord(3, 3, 3), Coord(0, 0, 0), Coord(7, 7, 7), Coord(-1, 8, -8), Coord(4095, 0, -4096)}) {
     auto grid = outside_grid();
     grid->tree().setValue(at, -1.0f);
     RunContext context;
@@ -34,7 +36,8 @@ TEST(Blocks, OneInsideVoxelHasSixCrossingEdgesWhereverItLies) {
 }
 
 TEST(Blocks, ATileOfTheOtherSignIsWalledIn) {
-  // An inside tile of 8³ alone in the background, where the tree has no leaf at all: 6 faces of 64 edges each.
+  // An inside tile of 8³ alone in the background, where the tree has no leaf at all: 6 faces of 64 edges
+  // each.
   auto grid = outside_grid();
   grid->tree().addTile(1, Coord(16, 16, 16), -1.0f, true);
   RunContext context;
@@ -86,7 +89,8 @@ TEST(Blocks, PlacementOfAShearedMirroredGridIsTheGridsOwn) {
   const IndexToWorld& placement = blocks.placement();
   const openvdb::Vec3d expected = grid->indexToWorld(Coord(5, -6, 7));
   const Eigen::Vector3d found =
-      placement.origin + placement.local(Eigen::Vector3d(5 - placement.base[0], -6 - placement.base[1], 7 - placement.base[2]));
+      placement.origin +
+      placement.local(Eigen::Vector3d(5 - placement.base[0], -6 - placement.base[1], 7 - placement.base[2]));
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(found[axis], expected[axis], 1e-9);
   EXPECT_TRUE(placement.mirrors());
 }

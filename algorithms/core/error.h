@@ -6,8 +6,8 @@
 
 namespace hermesh {
 
-/// Bad input, or a failure that the user can do something about. what() is one sentence that names the file or the
-/// option and says what to do; the command line prints it and exits with 1.
+/// Bad input, or a failure that the user can do something about. what() is one sentence that names the file
+/// or the option and says what to do; the command line prints it and exits with 1.
 class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

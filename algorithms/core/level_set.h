@@ -10,8 +10,9 @@ namespace hermesh {
 
 struct LevelSetGrid;  // level_set_grid.h
 
-/// A sparse scalar grid of floats with its placement. As a level set: signed distance in world units, negative inside,
-/// right within a narrow band and ±background beyond. Copies share the grid, which nobody changes once it is made.
+/// A sparse scalar grid of floats with its placement. As a level set: signed distance in world units,
+/// negative inside, right within a narrow band and ±background beyond. Copies share the grid, which nobody
+/// changes once it is made.
 class LevelSet {
  public:
   LevelSet() = default;
@@ -20,10 +21,10 @@ class LevelSet {
   const LevelSetGrid& grid() const { return *grid_; }
   explicit operator bool() const { return grid_ != nullptr; }
 
-  double voxel_size() const;            ///< world units, cube root of the voxel's volume
-  double background() const;            ///< world units
+  double voxel_size() const;  ///< world units, cube root of the voxel's volume
+  double background() const;  ///< world units
   std::size_t active_voxels() const;
-  std::size_t memory_bytes() const;     ///< of the tree, allocated
+  std::size_t memory_bytes() const;       ///< of the tree, allocated
   std::array<int, 3> dimensions() const;  ///< active box in voxels
 
  private:

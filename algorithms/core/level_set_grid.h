@@ -1,4 +1,5 @@
-// The OpenVDB grid inside a LevelSet. Heavy (seconds a translation unit): include it from .cpp files that need it.
+// The OpenVDB grid inside a LevelSet. Heavy (seconds a translation unit): include it from .cpp files that
+// need it.
 #pragma once
 
 #include <openvdb/openvdb.h>

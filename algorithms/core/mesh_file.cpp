@@ -73,16 +73,24 @@ void TextCursor::fail_number(const char* what) {
   here.fail(in_quotes(found) + " is not " + what);
 }
 
-std::size_t PointMerger::slot_of(const Eigen::Vector3d& point) const {
+namespace {
+
+/// The finaliser of splitmix64 (Steele, Lea & Flood 2014): every bit of a coordinate reaches every bit of the
+/// hash.
+std::uint64_t hash_of(const Eigen::Vector3d& point) {
   std::uint64_t hash = 0;
   for (const double x : point) {
-    // The finaliser of splitmix64 (Steele, Lea & Flood 2014): every bit of a coordinate reaches every bit of
-    // the hash.
     hash += std::bit_cast<std::uint64_t>(x) + 0x9e3779b97f4a7c15u;
     hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
     hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
     hash ^= hash >> 31;
   }
+  return hash;
+}
+
+}  // namespace
+
+std::size_t PointMerger::slot_of(const Eigen::Vector3d& point, std::uint64_t hash) const {
   std::size_t slot = hash & (slots_.size() - 1);
   while (slots_[slot] != 0 && points_[slots_[slot] - 1] != point) slot = (slot + 1) & (slots_.size() - 1);
   return slot;
@@ -91,18 +99,22 @@ std::size_t PointMerger::slot_of(const Eigen::Vector3d& point) const {
 void PointMerger::grow() {
   slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
   for (std::size_t i = 0; i < points_.size(); ++i)
-    slots_[slot_of(points_[i])] = static_cast<std::uint32_t>(i + 1);
+    slots_[slot_of(points_[i], hash_of(points_[i]))] = static_cast<std::uint32_t>(i + 1);
 }
 
 std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
   if (2 * points_.size() >= slots_.size()) grow();
   const Eigen::Vector3d canonical = point.array() + 0.0;  // makes -0 to 0
-  const std::size_t slot = slot_of(canonical);
+  const std::uint64_t hash = hash_of(canonical);
+  std::uint32_t& recent = recent_[hash & (recent_.size() - 1)];
+  if (recent != 0 && points_[recent - 1] == canonical) return recent - 1;
+  const std::size_t slot = slot_of(canonical, hash);
   if (slots_[slot] == 0) {
     points_.push_back(canonical);
     slots_[slot] = static_cast<std::uint32_t>(points_.size());
   }
-  return slots_[slot] - 1;
+  recent = slots_[slot];
+  return recent - 1;
 }
 
 void MeshBuilder::fail_index(std::size_t polygon, std::int64_t corner) const {
@@ -222,7 +234,7 @@ MeshFile to_mesh_file(const PolygonMesh& mesh) {
   for (std::size_t i = 0; i < mesh.points.size(); ++i) file.points.push_back(mesh.world(i));
   file.triangles = mesh.triangles;
   file.quads = mesh.quads;
-  // Left out where a reader would choose the same origin by itself.
+  // Left out only where it says nothing: at 0, which a reader would choose by itself.
   if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
     file.origin = mesh.origin;
   return file;

@@ -1,4 +1,5 @@
-// Mesh files: PLY (ascii, binary of both endians), OBJ, OFF, STL, each also gzipped, in; PLY, OBJ, OFF, STL out.
+// Mesh files: PLY (ascii, binary of both endians), OBJ, OFF, STL, each also gzipped, in; PLY, OBJ, OFF, STL
+// out.
 #pragma once
 
 #include <filesystem>
@@ -9,22 +10,22 @@
 
 namespace hermesh {
 
-/// A mesh exactly as a file holds it: points in world units and double precision. Judges work on this. Polygons with
-/// more than four corners are cut into a fan about their first corner; STL's points are shared where all three
-/// coordinates are equal.
+/// A mesh exactly as a file holds it: points in world units and double precision. Judges work on this.
+/// Polygons with more than four corners are cut into a fan about their first corner; STL's points are shared
+/// where all three coordinates are equal.
 struct MeshFile {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
   std::vector<Quad> quads;
-  /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading back
-  /// gives the same points.
+  /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading
+  /// back gives the same points.
   std::optional<Eigen::Vector3d> origin;
 
   std::size_t triangle_count() const { return triangles.size() + 2 * quads.size(); }
 };
 
-/// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, or holds an index out of
-/// range, a coordinate that is not finite, or no polygon; the sentence names the file.
+/// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, or holds an index
+/// out of range, a coordinate that is not finite, or no polygon; the sentence names the file.
 MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context);
 
 /// Single precision relative to the file's own origin, or to choose_origin() of its bounds.
@@ -36,8 +37,12 @@ inline PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& cont
   return to_polygon_mesh(read_mesh_file(path, context));
 }
 
-/// Writes beside the path and renames, so that no half-written file stands there. Coordinates are single precision
-/// where that loses nothing and double otherwise; STL has single precision only, and a note says what that cost.
+/// Writes beside the path and renames, so that no half-written file stands there. Every point is stored as
+/// world() has it: binary PLY in single precision where that loses nothing and in double precision otherwise,
+/// OBJ and OFF in the shortest text of the double, STL in single precision only, with a note that says what
+/// that cost. Reading the file back gives the same double positions, and the same PolygonMesh bit for bit
+/// wherever the sums origin + point are exact in double precision: always where the origin is 0, and as long
+/// as a point's last bit is at least 2^-52 of its distance from 0.
 /// @throws Error for an unknown extension or a path that cannot be written.
 void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
 

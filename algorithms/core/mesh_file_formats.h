@@ -45,8 +45,11 @@ class PointMerger {
 
  private:
   void grow();
-  std::size_t slot_of(const Eigen::Vector3d& point) const;
+  std::size_t slot_of(const Eigen::Vector3d& point, std::uint64_t hash) const;
   std::vector<Eigen::Vector3d>& points_;
+  /// By the low bits of the hash, the latest point with them. Most corners repeat a point of a moment ago,
+  /// and this table stays in the processor's cache when the other one has outgrown it.
+  std::vector<std::uint32_t> recent_ = std::vector<std::uint32_t>(1 << 15, 0);
   std::vector<std::uint32_t> slots_;  ///< open addressing, number of a point plus one; 0 is free
 };
 

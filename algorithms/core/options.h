@@ -1,4 +1,5 @@
-// Options of a variant: declared in its table entry, given by the user as key=value, checked before the work starts.
+// Options of a variant: declared in its table entry, given by the user as key=value, checked before the work
+// starts.
 #pragma once
 
 #include <map>

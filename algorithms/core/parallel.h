@@ -1,5 +1,6 @@
-// Count – scan – fill: a parallel pass counts per block, a prefix sum gives each block its first index, a parallel pass
-// writes straight into the final arrays. No locks, and the same bytes for every number of threads.
+// Count – scan – fill: a parallel pass counts per block, a prefix sum gives each block its first index, a
+// parallel pass writes straight into the final arrays. No locks, and the same bytes for every number of
+// threads.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -17,10 +18,11 @@ namespace hermesh {
 /// Calls f(i) for i in 0…n−1, in parallel, and looks for cancellation every few blocks. @throws Cancelled.
 template <class F>
 void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16), [&](const tbb::blocked_range<std::size_t>& range) {
-    context.check();
-    for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      context.check();
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
+                    });
 }
 
 /// Replaces each count by the sum of those before it and returns the total.

@@ -15,7 +15,8 @@ namespace hermesh {
 
 class RunContext {
  public:
-  /// Called with the stage's name and the share of it that is done, 0 to 1; only from the thread that runs the stage.
+  /// Called with the stage's name and the share of it that is done, 0 to 1; only from the thread that runs
+  /// the stage.
   std::function<void(std::string_view stage, double fraction)> on_progress;
   /// Set by somebody else (a signal handler, say) to ask for an early end; may be null.
   const std::atomic<bool>* cancel = nullptr;
@@ -28,7 +29,8 @@ class RunContext {
   void progress(std::string_view stage, double fraction) const {
     if (on_progress) on_progress(stage, fraction);
   }
-  /// A sentence that the user should read although the work goes on, such as points that a file format rounds.
+  /// A sentence that the user should read although the work goes on, such as points that a file format
+  /// rounds.
   void note(std::string sentence) { notes.push_back(std::move(sentence)); }
 
   std::vector<std::pair<std::string, double>> stage_seconds;  ///< in order of completion

@@ -7,7 +7,8 @@ namespace {
 
 template <class Variant>
 const Variant& find(std::span<const Variant> table, const std::string& name, const std::string& kind) {
-  const auto found = std::find_if(table.begin(), table.end(), [&](const Variant& v) { return v.name == name; });
+  const auto found =
+      std::find_if(table.begin(), table.end(), [&](const Variant& v) { return v.name == name; });
   if (found != table.end()) return *found;
   std::string names;
   for (const Variant& variant : table) names += (names.empty() ? "" : ", ") + variant.name;

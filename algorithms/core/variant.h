@@ -13,8 +13,8 @@
 
 namespace hermesh {
 
-/// What a variant guarantees for every finite input. A broken promise is an error of the run; a defect that nobody
-/// promised away is a plain figure.
+/// What a variant guarantees for every finite input. A broken promise is an error of the run; a defect that
+/// nobody promised away is a plain figure.
 struct Promises {
   bool closed = false;                ///< no boundary edge
   bool manifold = false;              ///< no non-manifold edge or vertex
@@ -25,8 +25,9 @@ struct Promises {
 /// Volume in, mesh out.
 struct ExtractionInput {
   const LevelSet& level_set;
-  double isovalue = 0.0;                ///< in the units of the grid's values
-  const PolygonMesh* source = nullptr;  ///< the polygons that the volume was made from, where they are at hand
+  double isovalue = 0.0;  ///< in the units of the grid's values
+  const PolygonMesh* source =
+      nullptr;  ///< the polygons that the volume was made from, where they are at hand
   const Options& options;
   RunContext& context;
 };

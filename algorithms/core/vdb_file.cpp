@@ -39,7 +39,9 @@ void check_is_vdb(const fs::path& path) {
   constexpr std::int64_t kMagic = 0x56444220;
   std::int64_t magic = 0;
   if (!in.read(reinterpret_cast<char*>(&magic), sizeof magic))
-    throw Error(path.string() + (fs::file_size(path, ignored) == 0 ? " is empty" : " is truncated: it is too short for a .vdb file"));
+    throw Error(path.string() + (fs::file_size(path, ignored) == 0
+                                     ? " is empty"
+                                     : " is truncated: it is too short for a .vdb file"));
   if (magic != kMagic) throw Error(path.string() + " is not a .vdb file");
 }
 
@@ -51,9 +53,12 @@ std::string names_of(const openvdb::io::File& file) {
 
 openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const std::string& what) {
   if (auto same = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return same;
-  if (auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)) return std::make_shared<openvdb::FloatGrid>(*doubles);
-  if (auto integers = openvdb::gridPtrCast<openvdb::Int32Grid>(grid)) return std::make_shared<openvdb::FloatGrid>(*integers);
-  throw Error(what + " holds " + grid->valueType() + " values; a scalar grid is needed (float, double or int32)");
+  if (auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid))
+    return std::make_shared<openvdb::FloatGrid>(*doubles);
+  if (auto integers = openvdb::gridPtrCast<openvdb::Int32Grid>(grid))
+    return std::make_shared<openvdb::FloatGrid>(*integers);
+  throw Error(what + " holds " + grid->valueType() +
+              " values; a scalar grid is needed (float, double or int32)");
 }
 
 void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {
@@ -85,7 +90,8 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
       name = names;
     }
     if (!file.hasGrid(name))
-      throw Error(path.string() + " has no grid named '" + name + "'; it has " + (names.empty() ? "none" : names));
+      throw Error(path.string() + " has no grid named '" + name + "'; it has " +
+                  (names.empty() ? "none" : names));
     const std::string what = "the grid '" + name + "' of " + path.string();
     openvdb::FloatGrid::ConstPtr grid = as_float(file.readGrid(name), what);
     check_finite(*grid, what);
@@ -134,9 +140,11 @@ std::vector<GridSummary> describe_vdb(const fs::path& path) {
       summary.memory_bytes = grid->memUsage();
       const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
       if (!box.empty())
-        for (int axis = 0; axis < 3; ++axis) summary.lower[axis] = box.min()[axis], summary.upper[axis] = box.max()[axis];
+        for (int axis = 0; axis < 3; ++axis)
+          summary.lower[axis] = box.min()[axis], summary.upper[axis] = box.max()[axis];
       summary.voxel_size = std::cbrt(std::abs(grid->transform().voxelVolume()));
-      if (const auto scalar = openvdb::gridConstPtrCast<openvdb::FloatGrid>(grid)) summary.background = scalar->background();
+      if (const auto scalar = openvdb::gridConstPtrCast<openvdb::FloatGrid>(grid))
+        summary.background = scalar->background();
     }
     return summaries;
   });

@@ -35,7 +35,8 @@ class VdbFile : public testing::Test {
     auto grid = openvdb::FloatGrid::create(3.0f);
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
-    for (int x = -3; x <= 3; ++x) grid->tree().setValue(openvdb::Coord(x, 0, 0), 0.25f * static_cast<float>(x));
+    for (int x = -3; x <= 3; ++x)
+      grid->tree().setValue(openvdb::Coord(x, 0, 0), 0.25f * static_cast<float>(x));
     return make_level_set(grid);
   }
 
@@ -59,7 +60,9 @@ TEST_F(VdbFile, DoubleGridsBecomeFloat) {
   grid->setName("density");
   grid->tree().setValue(openvdb::Coord(1, 2, 3), -0.125);
   openvdb::io::File((folder_ / "d.vdb").string()).write({grid});
-  EXPECT_EQ(read_level_set(folder_ / "d.vdb", "", context_).grid().grid->tree().getValue(openvdb::Coord(1, 2, 3)), -0.125f);
+  EXPECT_EQ(
+      read_level_set(folder_ / "d.vdb", "", context_).grid().grid->tree().getValue(openvdb::Coord(1, 2, 3)),
+      -0.125f);
 }
 
 TEST_F(VdbFile, ErrorsAreOneSentenceAboutTheFile) {

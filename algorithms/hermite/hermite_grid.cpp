@@ -12,15 +12,22 @@
 namespace openvdb {
 namespace OPENVDB_VERSION_NAME {
 template <>
-inline const char* typeNameAsString<hermesh::HermiteVoxel>() { return "hermite_float"; }
+inline const char* typeNameAsString<hermesh::HermiteVoxel>() {
+  return "hermite_float";
+}
 template <>
-inline hermesh::HermiteVoxel zeroVal<hermesh::HermiteVoxel>() { return {}; }
+inline hermesh::HermiteVoxel zeroVal<hermesh::HermiteVoxel>() {
+  return {};
+}
 namespace math {
 inline hermesh::HermiteVoxel Abs(const hermesh::HermiteVoxel& voxel) { return voxel; }
 template <>
-inline bool isApproxEqual(const hermesh::HermiteVoxel& a, const hermesh::HermiteVoxel& b) { return a == b; }
+inline bool isApproxEqual(const hermesh::HermiteVoxel& a, const hermesh::HermiteVoxel& b) {
+  return a == b;
+}
 template <>
-inline bool isApproxEqual(const hermesh::HermiteVoxel& a, const hermesh::HermiteVoxel& b, const hermesh::HermiteVoxel&) {
+inline bool isApproxEqual(const hermesh::HermiteVoxel& a, const hermesh::HermiteVoxel& b,
+                          const hermesh::HermiteVoxel&) {
   return a == b;
 }
 }  // namespace math
@@ -70,7 +77,8 @@ HermiteGrid::HermiteGrid(const BlockGrid& grid, std::vector<std::int32_t>& sourc
   initialize_openvdb();
   const std::size_t all = grid.blocks().size();
   std::vector<std::uint8_t> live(all);
-  parallel_blocks(all, context, [&](std::size_t i) { live[i] = has_active_cell(grid, static_cast<std::int32_t>(i)); });
+  parallel_blocks(all, context,
+                  [&](std::size_t i) { live[i] = has_active_cell(grid, static_cast<std::int32_t>(i)); });
   source.clear();
   std::vector<std::int32_t> renumbered(all, -1);
   for (std::size_t i = 0; i < all; ++i)
@@ -84,7 +92,8 @@ HermiteGrid::HermiteGrid(const BlockGrid& grid, std::vector<std::int32_t>& sourc
   parallel_blocks(source.size(), context, [&](std::size_t i) {
     const Block& from = grid.blocks()[source[i]];
     HermiteBlock& block = blocks_[i];
-    leaves[i] = new HermiteTreeType::LeafNodeType(openvdb::Coord(from.lower[0], from.lower[1], from.lower[2]));
+    leaves[i] =
+        new HermiteTreeType::LeafNodeType(openvdb::Coord(from.lower[0], from.lower[1], from.lower[2]));
     block.lower = from.lower;
     block.voxels = leaves[i]->buffer().data();
     block.crossing = grid.crossing_edges(source[i]);
@@ -96,7 +105,8 @@ HermiteGrid::HermiteGrid(const BlockGrid& grid, std::vector<std::int32_t>& sourc
       HermiteVoxel& voxel = block.voxels[sample];
       voxel.inside = test(from.inside, sample);
       for (int axis = 0; axis < 3; ++axis)
-        voxel.crossing = static_cast<std::uint8_t>(voxel.crossing | (test(block.crossing[axis], sample) << axis));
+        voxel.crossing =
+            static_cast<std::uint8_t>(voxel.crossing | (test(block.crossing[axis], sample) << axis));
       if (voxel.crossing) leaves[i]->setValueOn(sample);
     }
   });

@@ -1,4 +1,5 @@
-// Hermite data of a whole volume: all edge crossings with their normals. Light; the OpenVDB tree is in the .cpp.
+// Hermite data of a whole volume: all edge crossings with their normals. Light; the OpenVDB tree is in the
+// .cpp.
 #pragma once
 
 #include <array>
@@ -16,21 +17,22 @@ namespace hermesh {
 
 /// 8³ voxels of the grid's tree, with its neighbours looked up.
 struct HermiteBlock {
-  std::array<std::int32_t, 3> lower{};   ///< index coordinates of the first voxel
-  HermiteVoxel* voxels = nullptr;        ///< 512, in the order of BlockMask
-  std::array<BlockMask, 3> crossing{};   ///< by axis: voxels whose up-wind edge is crossed
+  std::array<std::int32_t, 3> lower{};  ///< index coordinates of the first voxel
+  HermiteVoxel* voxels = nullptr;       ///< 512, in the order of BlockMask
+  std::array<BlockMask, 3> crossing{};  ///< by axis: voxels whose up-wind edge is crossed
   /// By neighbour_slot(); an index into HermiteGrid::blocks(), or −1 where no edge is crossed.
   std::array<std::int32_t, 27> neighbours{};
 };
 
 struct HermiteTree;  // owns the OpenVDB tree
 
-/// An OpenVDB grid of HermiteVoxel. There is a block for every cell with a crossing edge and for every owner of one.
+/// An OpenVDB grid of HermiteVoxel. There is a block for every cell with a crossing edge and for every owner
+/// of one.
 class HermiteGrid {
  public:
-  /// Allocates a block for each of `grid`'s that holds an active cell or a crossing edge and sets signs and crossing
-  /// flags; offsets and normals are for a sampler to fill in. Blocks keep the order of `grid`; `source` says which of
-  /// its blocks each was made from.
+  /// Allocates a block for each of `grid`'s that holds an active cell or a crossing edge and sets signs and
+  /// crossing flags; offsets and normals are for a sampler to fill in. Blocks keep the order of `grid`;
+  /// `source` says which of its blocks each was made from.
   HermiteGrid(const BlockGrid& grid, std::vector<std::int32_t>& source, RunContext& context);
 
   const std::vector<HermiteBlock>& blocks() const { return blocks_; }
@@ -38,7 +40,8 @@ class HermiteGrid {
   std::size_t crossing_edges() const;
   std::size_t memory_bytes() const;  ///< of the tree
 
-  /// Writes the tree as the grid `hermite`. A file that holds it is refused by programs that do not know the type.
+  /// Writes the tree as the grid `hermite`. A file that holds it is refused by programs that do not know the
+  /// type.
   void write(const std::filesystem::path& path, RunContext& context) const;
 
  private:

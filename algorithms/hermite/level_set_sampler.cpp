@@ -28,7 +28,8 @@ class Apron {
     const int here = index(x, y, z);
     Eigen::Vector3d result;
     for (int axis = 0; axis < 3; ++axis) {
-      const double below = values_[here - kStride[axis]], at = values_[here], above = values_[here + kStride[axis]];
+      const double below = values_[here - kStride[axis]], at = values_[here],
+                   above = values_[here + kStride[axis]];
       const double central = 0.5 * (above - below), forward = above - at, backward = at - below;
       result[axis] = !std::isnan(central)    ? central
                      : !std::isnan(forward)  ? forward
@@ -55,8 +56,10 @@ void sample_block(const BlockGrid& grid, std::int32_t source, const HermiteBlock
       const double to = grid.signed_value(grid.blocks()[end.block], end.sample);
       const double offset = from / (from - to);
 
-      Eigen::Vector3d normal = (1.0 - offset) * apron.gradient(x, y, z) + offset * apron.gradient(x + dx, y + dy, z + dz);
-      // Where two sheets are close the gradient may vanish or point back inside; the edge itself is then the best guess.
+      Eigen::Vector3d normal =
+          (1.0 - offset) * apron.gradient(x, y, z) + offset * apron.gradient(x + dx, y + dy, z + dz);
+      // Where two sheets are close the gradient may vanish or point back inside; the edge itself is then the
+      // best guess.
       const double rise = to > from ? 1.0 : -1.0;
       if (!(normal[axis] * rise > 0)) normal[axis] = std::abs(to - from) * rise;
       normal.normalize();

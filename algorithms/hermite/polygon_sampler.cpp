@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -11,8 +12,8 @@
 namespace hermesh {
 namespace {
 
-/// A point this close to a triangle's border or to an edge's end, in voxels, counts as on it, so that no line slips
-/// through between two triangles and no hit between two edges.
+/// A point this close to a triangle's border or to an edge's end, in voxels, counts as on it, so that no line
+/// slips through between two triangles and no hit between two edges.
 constexpr double kTolerance = 1e-7;
 
 struct IndexTriangle {
@@ -49,13 +50,34 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
   return result;
 }
 
-/// For each block the triangles whose box touches the edges that it owns: block b's are list[first[b]] … .
+/// How far around a block its triangles are gathered, in voxels: a crossing edge that no polygon hits has one
+/// at about this distance, for it is there because a sample next to the surface has the wrong sign.
+constexpr double kNearby = 1.0;
+
+/// Point of a triangle nearest to p (Ericson, Real-Time Collision Detection, §5.1.5).
+Eigen::Vector3d nearest_point(const IndexTriangle& triangle, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d &a = triangle.corner[0], &b = triangle.corner[1], &c = triangle.corner[2];
+  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
+               d6 = ac.dot(cp);
+  if (d1 <= 0 && d2 <= 0) return a;
+  if (d3 >= 0 && d4 <= d3) return b;
+  if (d6 >= 0 && d5 <= d6) return c;
+  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / (d1 - d3));
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / (d2 - d6));
+  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+  return a + ab * (vb / (va + vb + vc)) + ac * (vc / (va + vb + vc));
+}
+
+/// For each block the triangles whose box comes near the edges that it owns: block b's are list[first[b]] … .
 struct TriangleBins {
   std::vector<std::uint64_t> first;
   std::vector<std::uint32_t> list;
 };
 
-TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const HermiteGrid& grid, RunContext& context) {
+TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const HermiteGrid& grid,
+                           RunContext& context) {
   const std::vector<HermiteBlock>& blocks = grid.blocks();
   const auto& base = grid.placement().base;
   std::unordered_map<Key, std::uint32_t, KeyHash> index;
@@ -79,14 +101,14 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const He
       const auto& c = triangles[t].corner;
       Key from, to;
       for (int a = 0; a < 3; ++a) {
-        const double lower = std::min({c[0][a], c[1][a], c[2][a]}) - kTolerance;
-        const double upper = std::max({c[0][a], c[1][a], c[2][a]}) + kTolerance;
+        const double lower = std::min({c[0][a], c[1][a], c[2][a]}) - kNearby;
+        const double upper = std::max({c[0][a], c[1][a], c[2][a]}) + kNearby;
         from[a] = static_cast<std::int32_t>(std::clamp(std::floor(lower / 8 - 1), -1e9, 1e9));
         to[a] = static_cast<std::int32_t>(std::clamp(std::floor(upper / 8), -1e9, 1e9));
         from[a] = std::max(from[a], lowest[a]);
         to[a] = std::min(to[a], highest[a]);
       }
-      const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kTolerance);
+      const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kNearby);
       for (int x = from[0]; x <= to[0]; ++x)
         for (int y = from[1]; y <= to[1]; ++y)
           for (int z = from[2]; z <= to[2]; ++z) {
@@ -144,12 +166,14 @@ class BlockHits {
       }
   }
 
-  void write(PolygonSampling& sampling) const {
+  /// Writes the chosen hits; `nearby` are the numbers of the triangles that came near the block.
+  void write(const std::vector<IndexTriangle>& triangles, std::span<const std::uint32_t> nearby,
+             PolygonSampling& sampling) const {
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(block_.crossing[axis], [&](int sample) {
         const Best& best = best_[axis][sample];
         if (best.hits == 0) {
-          ++sampling.fallback;
+          take_nearest(axis, sample, triangles, nearby) ? ++sampling.nearest : ++sampling.fallback;
           return;
         }
         ++sampling.exact;
@@ -168,6 +192,29 @@ class BlockHits {
     bool consistent = false;
     int hits = 0;  ///< at different places
   };
+
+  /// For an edge that no polygon hits: the plane of the polygon nearest to the level set's crossing, if it
+  /// faces the way that the signs say, met as near to the edge as the edge's ends allow.
+  bool take_nearest(int axis, int sample, const std::vector<IndexTriangle>& triangles,
+                    std::span<const std::uint32_t> nearby) const {
+    HermiteVoxel& voxel = block_.voxels[sample];
+    const Eigen::Vector3d start(lower_[0] + (sample >> 6), lower_[1] + ((sample >> 3) & 7),
+                                lower_[2] + (sample & 7));
+    Eigen::Vector3d crossing = start;
+    crossing[axis] += voxel.offset[axis];
+    const IndexTriangle* nearest = nullptr;
+    double least = kNearby * kNearby;
+    for (const std::uint32_t t : nearby) {
+      if ((triangles[t].normal[axis] > 0) != voxel.inside) continue;
+      const double squared = (nearest_point(triangles[t], crossing) - crossing).squaredNorm();
+      if (squared < least) least = squared, nearest = &triangles[t];
+    }
+    if (!nearest) return false;
+    const double met = nearest->normal.dot(nearest->corner[0] - start) / nearest->normal[axis];
+    voxel.offset[axis] = static_cast<float>(std::clamp(met, 0.0, 1.0));
+    for (int a = 0; a < 3; ++a) voxel.normal[axis][a] = static_cast<float>(nearest->normal[a]);
+    return true;
+  }
 
   void offer(int axis, int u, int v, int pu, int pv, double hit, const Eigen::Vector3d& normal) {
     if (!(hit >= -kTolerance && hit <= 8.0 + kTolerance)) return;
@@ -207,14 +254,17 @@ HermiteGrid sample_polygons(const BlockGrid& grid, const PolygonMesh& mesh, RunC
   std::vector<PolygonSampling> counts(blocks.size());
   parallel_blocks(blocks.size(), context, [&](std::size_t b) {
     const auto hits = std::make_unique<BlockHits>(blocks[b], result.placement().base);
-    for (std::uint64_t i = bins.first[b]; i < bins.first[b + 1]; ++i)
-      for (int axis = 0; axis < 3; ++axis) hits->add(triangles[bins.list[i]], axis);
-    hits->write(counts[b]);
+    const std::span<const std::uint32_t> nearby(bins.list.data() + bins.first[b],
+                                                bins.first[b + 1] - bins.first[b]);
+    for (const std::uint32_t t : nearby)
+      for (int axis = 0; axis < 3; ++axis) hits->add(triangles[t], axis);
+    hits->write(triangles, nearby, counts[b]);
   });
   if (sampling) {
     *sampling = {};
     for (const PolygonSampling& c : counts) {
       sampling->exact += c.exact;
+      sampling->nearest += c.nearest;
       sampling->fallback += c.fallback;
       sampling->ambiguous += c.ambiguous;
     }

@@ -20,7 +20,8 @@ void for_each_crossing(const HermiteGrid& grid, F&& f) {
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(block.crossing[axis], [&](int sample) {
         const HermiteVoxel& voxel = block.voxels[sample];
-        Vector3d at(block.lower[0] + (sample >> 6), block.lower[1] + ((sample >> 3) & 7), block.lower[2] + (sample & 7));
+        Vector3d at(block.lower[0] + (sample >> 6), block.lower[1] + ((sample >> 3) & 7),
+                    block.lower[2] + (sample & 7));
         at[axis] += voxel.offset[axis];
         f(at, Vector3d(voxel.normal[axis][0], voxel.normal[axis][1], voxel.normal[axis][2]));
       });
@@ -28,7 +29,8 @@ void for_each_crossing(const HermiteGrid& grid, F&& f) {
 
 LevelSet sphere(float radius) {
   initialize_openvdb();
-  return make_level_set(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(radius, openvdb::Vec3f(0.3f, 0.1f, -0.2f), 1.0f));
+  return make_level_set(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      radius, openvdb::Vec3f(0.3f, 0.1f, -0.2f), 1.0f));
 }
 
 TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
@@ -43,7 +45,8 @@ TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
     ASSERT_NEAR(normal.norm(), 1.0, 1e-5);
   });
   EXPECT_EQ(crossings, grid.crossing_edges());
-  EXPECT_NEAR(static_cast<double>(crossings), 6.0 * M_PI * 400.0, 200.0);  // two for each lattice line through the disc
+  EXPECT_NEAR(static_cast<double>(crossings), 6.0 * M_PI * 400.0,
+              200.0);  // two for each lattice line through the disc
 }
 
 TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
@@ -56,8 +59,10 @@ TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
     for (int y = 0; y < 20; ++y)
       for (int z = 0; z < 20; ++z) {
         const double d = normal.dot(Vector3d(x, y, z) - Vector3d::Constant(9.7));
-        if (std::abs(d) < 1.0) grid->tree().setValue(openvdb::Coord(x, y, z), static_cast<float>(d));
-        else if (d < 0) grid->tree().setValueOff(openvdb::Coord(x, y, z), -100.0f);
+        if (std::abs(d) < 1.0)
+          grid->tree().setValue(openvdb::Coord(x, y, z), static_cast<float>(d));
+        else if (d < 0)
+          grid->tree().setValueOff(openvdb::Coord(x, y, z), -100.0f);
       }
   RunContext context;
   int checked = 0;
@@ -74,7 +79,8 @@ TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
 PolygonMesh octahedron(double radius, const Vector3d& centre, bool reversed) {
   PolygonMesh mesh;
   for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {1.0, -1.0}) mesh.points.push_back((centre + side * radius * Vector3d::Unit(axis)).cast<float>());
+    for (const double side : {1.0, -1.0})
+      mesh.points.push_back((centre + side * radius * Vector3d::Unit(axis)).cast<float>());
   for (std::uint32_t octant = 0; octant < 8; ++octant) {
     const std::uint32_t sx = octant & 1, sy = (octant >> 1) & 1, sz = octant >> 2;
     Triangle triangle{sx, 2 + sy, 4 + sz};
@@ -116,8 +122,9 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
 }
 
 TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
-  // A thin plate's two faces between two samples, and a third face beyond: the edge runs from inside to outside, so the
-  // faces that look along it are right, and the nearer to the level set's crossing of those is taken.
+  // A thin plate's two faces between two samples, and a third face beyond: the edge runs from inside to
+  // outside, so the faces that look along it are right, and the nearer to the level set's crossing of those
+  // is taken.
   initialize_openvdb();
   auto grid = openvdb::FloatGrid::create(1.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -129,7 +136,8 @@ TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
     const auto first = static_cast<std::uint32_t>(mesh.points.size());
     for (const auto& [x, y] : {std::pair{-9.f, -9.f}, {19.f, -9.f}, {19.f, 19.f}, {-9.f, 19.f}})
       mesh.points.emplace_back(x, y, height);
-    mesh.quads.push_back(up ? Quad{first, first + 1, first + 2, first + 3} : Quad{first, first + 3, first + 2, first + 1});
+    mesh.quads.push_back(up ? Quad{first, first + 1, first + 2, first + 3}
+                            : Quad{first, first + 3, first + 2, first + 1});
   };
   plane(3.1f, true);
   plane(3.45f, false);
@@ -137,7 +145,8 @@ TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
   plane(-30.0f, false);  // makes the whole wound outwards, as a solid's surface is
   RunContext context;
   PolygonSampling sampling;
-  const HermiteGrid hermite = sample_polygons(BlockGrid(make_level_set(grid), 0.0, context), mesh, context, &sampling);
+  const HermiteGrid hermite =
+      sample_polygons(BlockGrid(make_level_set(grid), 0.0, context), mesh, context, &sampling);
   EXPECT_GT(sampling.ambiguous, 0u);
   int checked = 0;
   for_each_crossing(hermite, [&](const Vector3d& at, const Vector3d& normal) {

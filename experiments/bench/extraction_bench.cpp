@@ -71,8 +71,7 @@ void register_all() {
           (extractor.name + "/sphere/" + std::to_string(resolution)).c_str(),
           [extractor, resolution](benchmark::State& state) { extract_sphere(state, extractor, resolution); })
           ->Unit(benchmark::kMillisecond)
-          ->UseRealTime()
-          ->MeasureProcessCPUTime();
+          ->UseRealTime();
 }
 
 }  // namespace

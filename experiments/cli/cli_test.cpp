@@ -67,7 +67,7 @@ TEST_F(CliTest, ListForPeopleNamesTheSame) {
 TEST_F(CliTest, CubeThroughAllStages) {
   write_cube();
   const Outcome outcome =
-      run({"remesh", "cube.off", "out.ply", "--resolution", "20", "--extractor", "marching-cubes"});
+      run({"remesh", "cube.off", "out.ply", "--resolution", "10", "--extractor", "marching-cubes"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_NE(outcome.out.find("marching-cubes"), std::string::npos);
@@ -83,17 +83,17 @@ TEST_F(CliTest, CubeThroughAllStages) {
     EXPECT_EQ(report.at(key), 0) << key;
   EXPECT_EQ(report.at("components"), 1);
   EXPECT_EQ(report.at("euler_characteristic"), 2);
-  EXPECT_GT(report.at("points"), 1000);
-  EXPECT_GT(report.at("triangles"), 2000);
+  EXPECT_GT(report.at("points"), 500);
+  EXPECT_GT(report.at("triangles"), 1000);
   EXPECT_EQ(report.at("quads"), 0);
-  // Marching cubes cuts the corners of the cube, whose side is 2, off by less than a voxel of 0.1.
+  // Marching cubes cuts the corners of the cube, whose side is 2, off by less than a voxel of 0.2.
   EXPECT_NEAR(report.at("volume"), 8.0, 0.1);
   EXPECT_NEAR(report.at("area"), 24.0, 1.0);
   for (const char* direction : {"to_reference", "from_reference"}) {
     const Json& distances = report.at(direction);
     EXPECT_LE(distances.at("mean"), distances.at("rms"));
     EXPECT_LE(distances.at("rms"), distances.at("max"));
-    EXPECT_LT(distances.at("max"), 0.1);
+    EXPECT_LT(distances.at("max"), 0.2);
     // A sampled maximum is a lower bound of the certified interval's upper end.
     EXPECT_LE(distances.at("max"), report.at(std::string("certified_") + direction).at("upper"));
   }
@@ -189,7 +189,7 @@ TEST_F(CliTest, InfoOfAMesh) {
 
 TEST_F(CliTest, ProgressIsShownOnATerminalAndErased) {
   write_sphere();
-  const std::vector<std::string> arguments = {"remesh", "sphere.off", "out.ply", "--resolution", "200"};
+  const std::vector<std::string> arguments = {"remesh", "sphere.off", "out.ply", "--resolution", "80"};
   const std::string erase = "\r\033[K";
   const std::string sent = terminal_output(arguments);
   EXPECT_NE(sent.find("%"), std::string::npos) << sent;
@@ -219,23 +219,23 @@ class InterruptTest : public ProgramTest {
 
 TEST_F(InterruptTest, LeavesNothingBehind) {
   write_sphere();
-  for (const int milliseconds : {50, 300, 1000})
+  for (const int milliseconds : {0, 100, 400})
     expect_cancelled(SIGINT, 130, std::chrono::milliseconds(milliseconds),
-                     {"remesh", "sphere.off", "out.ply", "--resolution", "700"});
+                     {"remesh", "sphere.off", "out.ply", "--resolution", "1000"});
 }
 
 TEST_F(InterruptTest, EndsLibraryCodeThatDoesNotPoll) {
   write_sphere();
   expect_cancelled(
       SIGINT, 130, std::chrono::milliseconds(700),
-      {"remesh", "sphere.off", "out.ply", "--resolution", "200", "--extractor", "cgal-surface-mesher"});
+      {"remesh", "sphere.off", "out.ply", "--resolution", "300", "--extractor", "cgal-surface-mesher"});
 }
 
 TEST_F(InterruptTest, KeepsTheOlderOutput) {
   write_sphere();
   write("out.vdb", "older");
   expect_cancelled(SIGTERM, 143, std::chrono::milliseconds(300),
-                   {"voxelize", "sphere.off", "out.vdb", "--resolution", "700"});
+                   {"voxelize", "sphere.off", "out.vdb", "--resolution", "1000"});
   EXPECT_EQ(read("out.vdb"), "older");
 }
 

@@ -1,7 +1,9 @@
 // hermesh voxelize, extract, remesh: polygons to level set, level set to mesh, and both in one.
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>

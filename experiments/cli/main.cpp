@@ -57,10 +57,10 @@ int run_to_exit_code(Session& session) {
 
 int run_program(int argc, char** argv) {
   Session session;
+  session.context.cancel = &handle_signals();
   CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
   app.set_version_flag("--version", "hermesh " HERMESH_VERSION);
   app.set_help_flag("--help,-h", "Print this help and exit");
-  app.require_subcommand(1);
   add_common_options(app, session);
   add_list(app, session);
   add_conversions(app, session);
@@ -73,10 +73,10 @@ int run_program(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
   }
+  if (!session.command) return fail(kUsage, "say what to do: a command is missing; see hermesh --help");
 
   const int threads = session.threads.value_or(std::max(1u, std::thread::hardware_concurrency()));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  session.context.cancel = &handle_signals();
   const int exit_code = run_to_exit_code(session);
   work_is_finished();
   if (!session.quiet && (exit_code == kDone || exit_code == kNotMet))

@@ -38,6 +38,18 @@ int open_or_exit(const std::filesystem::path& file, int flags) {
   return opened;
 }
 
+/// Returns once the process has a handler for the signal (or has ended): before that, the signal would end
+/// it.
+void wait_for_handler(pid_t process, int signal) {
+  const std::string key = "SigCgt:";
+  for (;; std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
+    const std::string status = content_of("/proc/" + std::to_string(process) + "/status");
+    const std::size_t at = status.find(key);
+    if (at == std::string::npos) return;
+    if (std::stoull(status.substr(at + key.size()), nullptr, 16) >> (signal - 1) & 1) return;
+  }
+}
+
 }  // namespace
 
 ProgramTest::ProgramTest() : folder_(make_folder()), streams_(make_folder()) {}
@@ -65,6 +77,7 @@ Outcome ProgramTest::run(const std::vector<std::string>& arguments,
   const pid_t child = fork();
   if (child == 0) execute(arguments, open_or_exit(streams_ / "err", O_WRONLY | O_CREAT | O_TRUNC));
   if (interruption) {
+    wait_for_handler(child, interruption->signal);
     std::this_thread::sleep_for(interruption->after);
     kill(child, interruption->signal);
   }

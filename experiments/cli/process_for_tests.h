@@ -20,7 +20,7 @@ struct Outcome {
 
 struct Interruption {
   int signal;
-  std::chrono::milliseconds after;
+  std::chrono::milliseconds after;  ///< from when the program handles it
 };
 
 /// Every test works in a new folder of its own, which is removed at the end.

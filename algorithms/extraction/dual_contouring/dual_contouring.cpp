@@ -12,7 +12,8 @@
 namespace hermesh {
 namespace {
 
-/// How far a confined vertex stays off its cell's faces, in voxels, so that no two cells place theirs at one point.
+/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never
+/// coincide.
 constexpr double kCellMargin = 1.0 / 1024.0;
 
 /// What one block adds to the mesh, and where in it.
@@ -41,7 +42,8 @@ class Contourer {
       Stage stage(context, "count");
       parallel_blocks(blocks, context, [&](std::size_t b) {
         points[b] = find_active_cells(static_cast<std::int32_t>(b));
-        for (const BlockMask& axis : grid_.blocks()[b].crossing) quads[b] += static_cast<std::uint64_t>(count(axis));
+        for (const BlockMask& axis : grid_.blocks()[b].crossing)
+          quads[b] += static_cast<std::uint64_t>(count(axis));
       });
     }
     mesh.points.resize(exclusive_scan(points, "points"));
@@ -53,7 +55,8 @@ class Contourer {
     }
     {
       Stage stage(context, "place points");
-      parallel_blocks(blocks, context, [&](std::size_t b) { place_points(static_cast<std::int32_t>(b), mesh); });
+      parallel_blocks(blocks, context,
+                      [&](std::size_t b) { place_points(static_cast<std::int32_t>(b), mesh); });
     }
     Stage stage(context, "connect");
     parallel_blocks(blocks, context, [&](std::size_t b) { connect(static_cast<std::int32_t>(b), mesh); });
@@ -80,10 +83,11 @@ class Contourer {
         int d[3] = {0, 0, 0};
         d[(axis + 1) % 3] = step & 1;
         d[(axis + 2) % 3] = step >> 1;
-        const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
-          const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
-          return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
-        });
+        const BlockMask shifted =
+            shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
+              const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
+              return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
+            });
         for (int word = 0; word < 8; ++word) output.active[word] |= shifted[word];
       }
     std::uint32_t before = 0;
@@ -130,9 +134,12 @@ class Contourer {
 
   Eigen::Vector3d place(const Qef& qef, const Eigen::Vector3d& corner) const {
     if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
-    if (!options_.confine) return qef.minimiser(options_.truncation);
+    const Eigen::Vector3d free = qef.minimiser(options_.truncation);
+    const Eigen::Vector3d from_centre = free - corner - Eigen::Vector3d::Constant(0.5);
+    if (from_centre.cwiseAbs().maxCoeff() <= 0.5 + options_.reach - kCellMargin) return free;
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
-    return qef.minimiser_within(corner + margin, corner + Eigen::Vector3d::Ones() - margin, options_.truncation);
+    return qef.minimiser_within(corner + margin, corner + Eigen::Vector3d::Ones() - margin,
+                                options_.truncation);
   }
 
   void connect(std::int32_t b, PolygonMesh& mesh) const {
@@ -143,7 +150,8 @@ class Contourer {
       for_each_bit(block.crossing[axis], [&](int sample) {
         const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
         const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-        constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise seen along the axis
+        constexpr int kAround[4][2] = {
+            {-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise seen along the axis
         Quad quad;
         for (int i = 0; i < 4; ++i) {
           int cell[3] = {at[0], at[1], at[2]};
@@ -165,12 +173,13 @@ class Contourer {
   /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.
   double height(const Quad& quad, std::array<int, 3> corners, const Eigen::Vector3d& hit, int axis) const {
     const Eigen::Vector3d a = positions_[quad[corners[0]]] - hit;
-    const Eigen::Vector3d normal = (positions_[quad[corners[1]]] - hit - a).cross(positions_[quad[corners[2]]] - hit - a);
+    const Eigen::Vector3d normal =
+        (positions_[quad[corners[1]]] - hit - a).cross(positions_[quad[corners[2]]] - hit - a);
     return normal.dot(a) / normal[axis];
   }
 
-  /// The split must follow a crease. The crossing itself lies on the true surface, so the diagonal is right whose surface
-  /// passes nearer to it; where both do, the shorter one makes the better triangles.
+  /// The split must follow a crease. The crossing itself lies on the true surface, so the diagonal is right
+  /// whose surface passes nearer to it; where both do, the shorter one makes the better triangles.
   bool second_diagonal_is_better(const Quad& quad, const Eigen::Vector3d& hit, int axis) const {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto left_of = [&](int i, int j) {
@@ -195,7 +204,8 @@ class Contourer {
 
 }  // namespace
 
-PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options, RunContext& context) {
+PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options,
+                            RunContext& context) {
   return Contourer(grid, options).run(context);
 }
 
@@ -206,30 +216,53 @@ PolygonMesh dual_contouring(const ExtractionInput& input) {
     return BlockGrid(input.level_set, input.isovalue, context);
   }();
   DualContouringOptions options;
-  if (input.options.text("placement") == "average") options.placement = DualContouringOptions::Placement::average;
+  if (input.options.text("placement") == "average")
+    options.placement = DualContouringOptions::Placement::average;
   options.truncation = input.options.number("truncation");
-  options.confine = input.options.text("confine") == "yes";
+  options.reach = input.options.number("reach");
 
   const std::string& source = input.options.text("hermite");
   const bool exact = source == "exact" || (source == "auto" && input.source);
   if (exact && !input.source)
-    throw Error("dual-contouring was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
-                "-o hermite=level-set");
+    throw Error(
+        "dual-contouring was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
+        "-o hermite=level-set");
   if (!exact) return dual_contouring(sample_level_set(grid, context), options, context);
   PolygonSampling sampling;
   const HermiteGrid hermite = sample_polygons(grid, *input.source, context, &sampling);
-  if (sampling.fallback > 0)
-    context.note(std::to_string(sampling.fallback) + " of " + std::to_string(sampling.exact + sampling.fallback) +
-                 " crossing edges hit no polygon; there the level set gave the Hermite data");
+  const std::size_t missed = sampling.nearest + sampling.fallback;
+  if (missed > 0)
+    context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
+                 " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
+                 " took the nearest one's plane, the others the level set's gradient");
   return dual_contouring(hermite, options, context);
 }
 
 std::vector<OptionSpec> dual_contouring_options() {
-  return {
-      {"placement", "optimal", "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the mean of its crossings", {"optimal", "average"}},
-      {"hermite", "auto", "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the polygons are at hand", {"auto", "exact", "level-set"}},
-      {"truncation", "0.1", "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features", {}, 0.0, 1.0},
-      {"confine", "yes", "'yes' keeps each point inside its cell; 'no' lets the minimiser leave it, which may fold the surface", {"yes", "no"}}};
+  return {{"placement",
+           "optimal",
+           "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
+           "the mean of its crossings",
+           {"optimal", "average"}},
+          {"hermite",
+           "auto",
+           "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
+           "polygons are at hand",
+           {"auto", "exact", "level-set"}},
+          {"truncation",
+           "0.1",
+           "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+           "features",
+           {},
+           0.0,
+           1.0},
+          {"reach",
+           "1",
+           "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
+           "the surface less",
+           {},
+           0.0,
+           1e6}};
 }
 
 }  // namespace hermesh

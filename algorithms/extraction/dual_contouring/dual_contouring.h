@@ -13,18 +13,23 @@ struct DualContouringOptions {
     average   ///< mean of the cell's crossings: smooth, and needs no normals
   };
   Placement placement = Placement::optimal;
-  /// Singular values below this share of the largest are dropped; larger is smoother and keeps fewer features.
+  /// Singular values below this share of the largest are dropped; larger is smoother and keeps fewer
+  /// features.
   double truncation = 0.1;
-  /// Search for the minimiser within the cell alone. Without it a vertex may leave its cell and fold the surface.
-  bool confine = true;
+  /// How far a minimiser may lie outside its cell, in voxels. One that lies further is searched for within
+  /// the cell alone. Larger keeps more of a feature that passes just outside a cell; smaller folds the
+  /// surface less.
+  double reach = 1.0;
 };
 
-/// One point for each active cell and one quad for each crossing edge. Closed and oriented; not manifold where several
-/// sheets pass through one cell, for they share its point. A quad's split runs along the diagonal whose two triangles
-/// turn less against each other, so that a crease is not cut across.
-PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options, RunContext& context);
+/// One point for each active cell and one quad for each crossing edge. Closed and oriented; not manifold
+/// where several sheets pass through one cell, for they share its point. A quad's split runs along the
+/// diagonal whose two triangles turn less against each other, so that a crease is not cut across.
+PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options,
+                            RunContext& context);
 
-/// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source polygons.
+/// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source
+/// polygons.
 PolygonMesh dual_contouring(const ExtractionInput& input);
 std::vector<OptionSpec> dual_contouring_options();
 

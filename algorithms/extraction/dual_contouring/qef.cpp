@@ -37,7 +37,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   const Eigen::Vector3d free = minimiser(truncation);
   if ((free.array() >= lower.array()).all() && (free.array() <= upper.array()).all()) return free;
 
-  // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved for.
+  // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved
+  // for.
   const Eigen::Vector3d low = lower - anchor_, high = upper - anchor_;
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
@@ -61,7 +62,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
       const Eigen::SelfAdjointEigenSolver<decltype(reduced)> solver(reduced);
       const double largest = solver.eigenvalues()[count - 1];
       for (int k = 0; k < count; ++k) {
-        if (!(solver.eigenvalues()[k] > truncation * truncation * largest) || !(solver.eigenvalues()[k] > 0)) continue;
+        if (!(solver.eigenvalues()[k] > truncation * truncation * largest) || !(solver.eigenvalues()[k] > 0))
+          continue;
         const double along = solver.eigenvectors().col(k).dot(residual) / solver.eigenvalues()[k];
         for (int i = 0; i < count; ++i) x[axes[i]] += along * solver.eigenvectors()(i, k);
       }

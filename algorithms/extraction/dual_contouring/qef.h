@@ -5,8 +5,8 @@
 
 namespace hermesh {
 
-/// Sum of squared distances to tangent planes, E(x) = Σ (nᵢ·(x − pᵢ))² (eq. 6.1), gathered about an anchor so that small
-/// differences of large coordinates never arise. Any length unit; here voxels.
+/// Sum of squared distances to tangent planes, E(x) = Σ (nᵢ·(x − pᵢ))² (eq. 6.1), gathered about an anchor so
+/// that small differences of large coordinates never arise. Any length unit; here voxels.
 class Qef {
  public:
   /// `anchor` is a point near the cell; plane points are given in the same frame.
@@ -17,13 +17,14 @@ class Qef {
   /// Mean of the plane points: the average placement, and where the minimiser starts from.
   Eigen::Vector3d mass_point() const { return anchor_ + sum_ / planes_; }
 
-  /// Minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1, after Kobbelt et al. 2001):
-  /// singular values of A below `truncation` times the largest are set to zero.
+  /// Minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1, after Kobbelt et
+  /// al. 2001): singular values of A below `truncation` times the largest are set to zero.
   Eigen::Vector3d minimiser(double truncation) const;
 
-  /// Minimiser within the box; the same as minimiser() where that lies inside. Each face, edge and corner of the box is
-  /// tried in turn for the smallest error, with the same truncation in the remaining directions.
-  Eigen::Vector3d minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, double truncation) const;
+  /// Minimiser within the box; the same as minimiser() where that lies inside. Each face, edge and corner of
+  /// the box is tried in turn for the smallest error, with the same truncation in the remaining directions.
+  Eigen::Vector3d minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
+                                   double truncation) const;
 
   double error(const Eigen::Vector3d& x) const;  ///< E(x), never negative
 

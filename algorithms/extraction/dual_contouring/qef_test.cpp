@@ -13,7 +13,8 @@ using Eigen::Vector3d;
 TEST(Qef, ThreePlanesMeetInTheirCorner) {
   const Vector3d corner(1000.3, -2000.6, 0.2);
   Qef qef(Vector3d(1000.5, -2000.5, 0.5));
-  for (int axis = 0; axis < 3; ++axis) qef.add_plane(corner + Vector3d::Unit((axis + 1) % 3) * 0.3, Vector3d::Unit(axis));
+  for (int axis = 0; axis < 3; ++axis)
+    qef.add_plane(corner + Vector3d::Unit((axis + 1) % 3) * 0.3, Vector3d::Unit(axis));
   EXPECT_LT((qef.minimiser(0.1) - corner).norm(), 1e-12);
   EXPECT_LT(qef.error(corner), 1e-20);
 }
@@ -27,7 +28,8 @@ TEST(Qef, OnAPlaneTheMinimiserIsTheMassPoint) {
 }
 
 TEST(Qef, TruncationDropsAnAlmostFlatDirection) {
-  // Two planes that differ by a thousandth of a radian meet in a line far away; truncated, the point stays near.
+  // Two planes that differ by a thousandth of a radian meet in a line far away; truncated, the point stays
+  // near.
   Qef qef(Vector3d::Zero());
   qef.add_plane(Vector3d(0.2, 0, 0.001), Vector3d(0.001, 0, 1).normalized());
   qef.add_plane(Vector3d(-0.2, 0, -0.001), Vector3d(-0.001, 0, 1).normalized());

@@ -45,7 +45,8 @@ void write_points(const BlockGrid& grid, std::int32_t index, const BlockOutput& 
   for (int axis = 0; axis < 3; ++axis)
     for_each_bit(output.edges[axis], [&](int sample) {
       const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
-      const auto end = grid.locate(index, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
+      const auto end =
+          grid.locate(index, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
       const double from = grid.signed_value(block, sample);
       const double to = grid.signed_value(grid.blocks()[end.block], end.sample);
       Eigen::Vector3d position;
@@ -95,8 +96,8 @@ PolygonMesh marching_cubes(const ExtractionInput& input) {
           before += static_cast<std::uint32_t>(std::popcount(output.edges[axis][word]));
         }
       points[i] = before;
-      for_each_active_cell(grid, index,
-                           [&](int, int, int, int pattern) { triangles[i] += kTriangulation[pattern].count; });
+      for_each_active_cell(
+          grid, index, [&](int, int, int, int pattern) { triangles[i] += kTriangulation[pattern].count; });
     });
   }
   PolygonMesh mesh;

@@ -6,14 +6,14 @@
 
 namespace hermesh {
 
-/// Crossings are held this far off the ends of their grid edge, in voxels. Two points of the mesh on neighbouring edges
-/// are thus at least this far apart, which single precision resolves up to 8,192 voxels from the mesh's origin, and no
-/// polygon degenerates however close a sample is to the isovalue.
+/// Crossings are held this far off the ends of their grid edge, in voxels. Two points of the mesh on
+/// neighbouring edges are thus at least this far apart, which single precision resolves up to 8,192 voxels
+/// from the mesh's origin, and no polygon degenerates however close a sample is to the isovalue.
 inline constexpr double kCrossingMargin = 1.0 / 1024.0;
 
-/// Triangles with one point on each crossing edge. Closed, manifold and oriented for every finite volume; neighbouring
-/// surface sheets within one cell may touch. No triangle degenerates: three points inside three edges of a cell lie on
-/// a line only if one edge holds two of them.
+/// Triangles with one point on each crossing edge. Closed, manifold and oriented for every finite volume;
+/// neighbouring surface sheets within one cell may touch. No triangle degenerates: three points inside three
+/// edges of a cell lie on a line only if one edge holds two of them.
 PolygonMesh marching_cubes(const ExtractionInput& input);
 
 }  // namespace hermesh

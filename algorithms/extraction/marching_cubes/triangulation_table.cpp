@@ -27,8 +27,9 @@ constexpr bool on_common_face(int a, int b) {
   return false;
 }
 
-/// For each crossing edge the next one on its loop, −1 elsewhere. On each face a segment runs from the edge where the
-/// walk about the face enters the inside to the edge where it leaves it again: that cuts off the inside corners.
+/// For each crossing edge the next one on its loop, −1 elsewhere. On each face a segment runs from the edge
+/// where the walk about the face enters the inside to the edge where it leaves it again: that cuts off the
+/// inside corners.
 constexpr std::array<int, 12> segments(int pattern) {
   std::array<int, 12> next{};
   next.fill(-1);
@@ -53,13 +54,15 @@ constexpr bool diagonal_allowed(const Loop& loop, int i, int j) {
   return apart == 1 || apart == loop.size - 1 || !on_common_face(loop.edges[i], loop.edges[j]);
 }
 
-/// Cuts the part of the loop from i to j into triangles, without the side from j to i; false if no way is allowed.
+/// Cuts the part of the loop from i to j into triangles, without the side from j to i; false if no way is
+/// allowed.
 constexpr bool triangulate(const Loop& loop, int i, int j, CellTriangles& result) {
   if (j - i < 2) return true;
   for (int k = i + 1; k < j; ++k) {
     if (!diagonal_allowed(loop, i, k) || !diagonal_allowed(loop, k, j)) continue;
     const int before = result.count;
-    result.triangles[result.count++] = {static_cast<std::uint8_t>(loop.edges[i]), static_cast<std::uint8_t>(loop.edges[k]),
+    result.triangles[result.count++] = {static_cast<std::uint8_t>(loop.edges[i]),
+                                        static_cast<std::uint8_t>(loop.edges[k]),
                                         static_cast<std::uint8_t>(loop.edges[j])};
     if (triangulate(loop, i, k, result) && triangulate(loop, k, j, result)) return true;
     result.count = static_cast<std::uint8_t>(before);
