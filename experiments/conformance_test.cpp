@@ -37,8 +37,12 @@ validation::MeshReport judge_counts(const MeshFile& mesh) {
 void expect_promises(const Extractor& extractor, const MeshFile& mesh) {
   if (mesh.triangle_count() == 0) return;
   const validation::MeshReport report = judge_counts(mesh);
-  if (extractor.promises.closed) EXPECT_EQ(report.boundary_edges, 0);
-  if (extractor.promises.oriented) EXPECT_EQ(report.inconsistent_edges, 0);
+  if (extractor.promises.closed) {
+    EXPECT_EQ(report.boundary_edges, 0);
+  }
+  if (extractor.promises.oriented) {
+    EXPECT_EQ(report.inconsistent_edges, 0);
+  }
   if (extractor.promises.manifold) {
     EXPECT_EQ(report.non_manifold_edges, 0);
     EXPECT_EQ(report.non_manifold_vertices, 0);
@@ -201,7 +205,7 @@ INSTANTIATE_TEST_SUITE_P(Ours, Conformance, testing::ValuesIn(table()), [](const
 });
 
 /// The whole million of random sign patterns, a tenth of which every run of the tests does.
-TEST(ConformanceSlow, MarchingCubesOnAMillionRandomPatterns) {
+TEST(Slow, MarchingCubesOnAMillionRandomPatterns) {
   const Extractor& extractor = find_variant(our_extractors(), "marching-cubes");
   std::mt19937 random(9);
   for (int batch = 0; batch < 16; ++batch)

@@ -66,10 +66,10 @@ class Field {
       : values_(grid.getConstAccessor()),
         transform_(frame.transform),
         isovalue_(isovalue),
+        inside_is_above_(frame.inside_is_above),
         context_(context) {}
 
-  /// −1 below the isovalue, 1 elsewhere: there are two sides and no third one of points exactly on the
-  /// surface.
+  /// −1 inside, 1 elsewhere: there are two sides and no third one of points exactly on the surface.
   double side(const Point& p) {
     if (++calls_ % 1024 == 0) context_.check();
     float value = 0.0f;
@@ -168,8 +168,8 @@ bool cell_inside(const Triangulation& triangulation, const Triangulation::Facet&
 PolygonMesh to_mesh(const Complex& complex, Field& field) {
   const Triangulation& triangulation = complex.triangulation();
   PolygonMesh mesh;
-  std::unordered_map<const void*, std::uint32_t>
-      number;  // looked up only; the order of points is that of use
+  // Looked up only: the order of the points is that of their first use.
+  std::unordered_map<const void*, std::uint32_t> number;
   for (auto facet = complex.facets_begin(); facet != complex.facets_end(); ++facet) {
     Triangulation::Facet side = *facet;
     if (triangulation.is_infinite(side.first)) side = triangulation.mirror_facet(side);
@@ -219,7 +219,9 @@ PolygonMesh cgal_surface_mesher(const ExtractionInput& input) {
     refine(mesher, triangulation, input);
     mesh = to_mesh(complex, field);
   } catch (const CGAL::Failure_exception& failure) {
-    throw Error("cgal-surface-mesher: CGAL gave up (" + failure.message() +
+    std::string reason = failure.message();
+    reason.resize(reason.find_last_not_of(". \n") + 1);
+    throw Error("cgal-surface-mesher: CGAL gave up (" + reason +
                 "); try a larger facet_size or facet_distance.");
   }
   mesh.origin = frame.origin;

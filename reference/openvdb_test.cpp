@@ -48,7 +48,7 @@ TEST(ReferenceExtractors, InsideIsTheSameForAll) {
   plain->setGridClass(openvdb::GRID_UNKNOWN);
   fog->setGridClass(openvdb::GRID_FOG_VOLUME);
   openvdb::tools::changeBackground(fog->tree(), -fog->background());
-  for (auto value = fog->beginValueAll(); value; ++value) value.setValue(-*value);
+  for (auto value = fog->beginValueOn(); value; ++value) value.setValue(-*value);
   for (const Extractor& extractor : reference_extractors())
     for (const LevelSet& volume : {level_set, make_level_set(plain), make_level_set(fog)}) {
       const PolygonMesh mesh = test::extract(extractor.name, volume);
@@ -75,12 +75,14 @@ TEST(ReferenceExtractors, PlateausAtTheIsovalueEndInAMeshOrAnError) {
   for (int x = 0; x < 10; ++x)
     for (int y = 0; y < 10; ++y)
       for (int z = 0; z < 10; ++z) values.setValue({x, y, z}, float(int(random() % 3) - 1));
-  for (const Extractor& extractor : reference_extractors()) try {
-      EXPECT_TRUE(test::closed_and_oriented(test::extract(extractor.name, make_level_set(grid))))
-          << extractor.name;
-    } catch (const Error& error) {
-      EXPECT_EQ(extractor.name, "cgal-surface-mesher") << error.what();
-    }
+  for (const char* extractor : {"openvdb", "marching-cubes-decimated"})
+    EXPECT_TRUE(test::closed_and_oriented(test::extract(extractor, make_level_set(grid)))) << extractor;
+  // The trilinear isosurface is no surface there. Refinement may end, and then the mesh is good.
+  try {
+    EXPECT_TRUE(test::closed_and_oriented(
+        test::extract("cgal-surface-mesher", make_level_set(grid), {{"max_points", "5000"}})));
+  } catch (const Error&) {
+  }
 }
 
 TEST(OpenvdbExtractor, FarFromTheOriginNothingIsLost) {

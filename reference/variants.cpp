@@ -42,7 +42,7 @@ std::span<const Extractor> reference_extractors() {
                     .minimum = 1.0,
                     .maximum = 1e6},
                    {.name = "max_points",
-                    .fallback = "2000000",
+                    .fallback = "500000",
                     .help = "the refinement fails beyond this many points",
                     .minimum = 4.0,
                     .maximum = 4e9}},

@@ -94,9 +94,10 @@ class MissingBlocks {
     check(0, 0, +1, any_inside, all_inside, kFirstZ << 7);
   }
 
-  /// A tile that is inside: wherever one outside touches it, both sides must become blocks.
+  /// A tile of the sign that the background has not: wherever one of the other sign touches it, both must become blocks.
   void beside_tile(Accessor& access, const openvdb::CoordBBox& tile, std::vector<Coord>& found) const {
     const Coord size = tile.dim();
+    const bool inside = !is_inside_(tree_.background());
     for (int axis = 0; axis < 3; ++axis) {
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       for (const int side : {-1, 1})
@@ -107,7 +108,7 @@ class MissingBlocks {
             if (side > 0) own[axis] += size[axis] - 8;
             Coord there = own;
             there[axis] += 8 * side;
-            if (access.probeConstLeaf(there) || is_inside_(access.getValue(there))) continue;
+            if (access.probeConstLeaf(there) || is_inside_(access.getValue(there)) == inside) continue;
             found.push_back(own);
             found.push_back(there);
           }
@@ -132,13 +133,15 @@ std::vector<Coord> collect(std::size_t n, F&& f) {
   return all;
 }
 
-/// Tiles of the tree that are inside, whatever their level.
-std::vector<openvdb::CoordBBox> inside_tiles(const Tree& tree, const std::function<bool(double)>& is_inside) {
+/// Tiles of the tree whose sign is not the background's, whatever their level. Where two tiles differ in sign, one of
+/// them is such; the others may fill space without end.
+std::vector<openvdb::CoordBBox> tiles_unlike_background(const Tree& tree, const std::function<bool(double)>& is_inside) {
+  const bool background = is_inside(tree.background());
   std::vector<openvdb::CoordBBox> tiles;
   Tree::ValueAllCIter it = tree.cbeginValueAll();
   it.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
-    if (is_inside(*it)) tiles.push_back(it.getBoundingBox());
+    if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
   return tiles;
 }
 
@@ -165,7 +168,7 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
     Accessor access(tree);
     missing.beside_leaf(access, blocks_[i], found);
   });
-  const std::vector<openvdb::CoordBBox> tiles = inside_tiles(tree, is_inside);
+  const std::vector<openvdb::CoordBBox> tiles = tiles_unlike_background(tree, is_inside);
   const std::vector<Coord> beside_tiles =
       collect(tiles.size(), [&](std::size_t i, std::vector<Coord>& found) {
         if (i % 64 == 0) context.check();

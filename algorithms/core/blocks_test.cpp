@@ -56,6 +56,23 @@ TEST(Blocks, AnActiveVoxelBesideATileOfTheOtherSign) {
   EXPECT_EQ(crossing_edges(BlockGrid(make_level_set(grid), 0.0, context)), 6u * 64u);
 }
 
+TEST(Blocks, AnIsovalueBeyondTheBackgroundHasNoSurfaceAndIsQuick) {
+  auto grid = outside_grid();
+  for (int i = 0; i < 100; ++i) grid->tree().setValue(Coord(1000 * i, -1000 * i, 0), -0.5f);
+  RunContext context;
+  EXPECT_EQ(crossing_edges(BlockGrid(make_level_set(grid), 1.5, context)), 0u);
+  EXPECT_EQ(crossing_edges(BlockGrid(make_level_set(grid), -1.5, context)), 0u);
+}
+
+TEST(Blocks, AnOutsideTileInAnInsideBackgroundIsWalledIn) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(-1.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->tree().addTile(2, Coord(0, 0, 0), 1.0f, true);
+  RunContext context;
+  EXPECT_EQ(crossing_edges(BlockGrid(make_level_set(grid), 0.0, context)), 6u * 128u * 128u);
+}
+
 TEST(Blocks, ASampleAtTheIsovalueIsOutside) {
   auto grid = outside_grid();
   grid->tree().setValue(Coord(3, 3, 3), 0.0f);

@@ -1,7 +1,10 @@
 #include "algorithms/core/vdb_file.h"
 
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <memory>
@@ -45,6 +48,29 @@ void check_is_vdb(const fs::path& path) {
   if (magic != kMagic) throw Error(path.string() + " is not a .vdb file");
 }
 
+/// Reads what stands before the grids, which names where each of them ends. OpenVDB itself takes the bytes that are
+/// missing at the end of a truncated file for zeros.
+class GridEnds : public openvdb::io::Archive {
+ public:
+  void check(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    readHeader(in);
+    openvdb::io::setVersion(in, libraryVersion(), fileVersion());  // the descriptors are read by it
+    openvdb::MetaMap metadata;
+    metadata.readMeta(in);
+    if (!inputHasGridOffsets()) return;
+    std::int64_t end = 0;
+    for (std::int32_t left = readGridCount(in); left > 0 && in; --left) {
+      openvdb::io::GridDescriptor descriptor;
+      descriptor.read(in);
+      end = std::max(end, descriptor.getEndPos());
+      descriptor.seekToEnd(in);
+    }
+    if (!in || end > static_cast<std::int64_t>(fs::file_size(path)))
+      throw Error(path.string() + " is truncated: its last grid ends beyond the end of the file");
+  }
+};
+
 std::string names_of(const openvdb::io::File& file) {
   std::string names;
   for (auto it = file.beginName(); it != file.endName(); ++it) names += (names.empty() ? "" : ", ") + *it;
@@ -78,6 +104,7 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
   initialize_openvdb();
   check_is_vdb(path);
   return about_file(path, [&] {
+    GridEnds().check(path);
     openvdb::io::File file(path.string());
     file.open(/*delayLoad=*/false);
     const std::string names = names_of(file);
@@ -120,6 +147,7 @@ std::vector<GridSummary> describe_vdb(const fs::path& path) {
   initialize_openvdb();
   check_is_vdb(path);
   return about_file(path, [&] {
+    GridEnds().check(path);
     openvdb::io::File file(path.string());
     file.open(/*delayLoad=*/false);
     std::vector<GridSummary> summaries;

@@ -79,10 +79,24 @@ TEST_F(VdbFile, ErrorsAreOneSentenceAboutTheFile) {
 TEST_F(VdbFile, EveryTruncationIsRefused) {
   write_level_set(folder_ / "a.vdb", ramp(), context_);
   const auto size = fs::file_size(folder_ / "a.vdb");
-  for (std::uintmax_t keep = 1; keep < size; keep += size / 40) {
+  std::vector<std::uintmax_t> lengths{size - 1, size - 7, size - 20, size - 200};
+  for (std::uintmax_t keep = 1; keep < size; keep += size / 40) lengths.push_back(keep);
+  for (const std::uintmax_t keep : lengths) {
     fs::copy_file(folder_ / "a.vdb", folder_ / "cut.vdb", fs::copy_options::overwrite_existing);
     fs::resize_file(folder_ / "cut.vdb", keep);
     EXPECT_NE(error_of(folder_ / "cut.vdb"), "no error") << keep << " of " << size;
+  }
+}
+
+TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
+  write_level_set(folder_ / "a.vdb", ramp(), context_);
+  std::ifstream in(folder_ / "a.vdb", std::ios::binary);
+  const std::string good((std::istreambuf_iterator<char>(in)), {});
+  for (std::size_t at = 0; at < good.size(); at += 1 + good.size() / 300) {
+    std::string bad = good;
+    bad[at] = static_cast<char>(bad[at] ^ 0xff);
+    std::ofstream(folder_ / "bad.vdb", std::ios::binary) << bad;
+    error_of(folder_ / "bad.vdb");  // must not crash, hang or throw anything else
   }
 }
 

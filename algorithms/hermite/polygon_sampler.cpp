@@ -202,10 +202,11 @@ class BlockHits {
                                 lower_[2] + (sample & 7));
     Eigen::Vector3d crossing = start;
     crossing[axis] += voxel.offset[axis];
+    const double outwards = voxel.inside ? 1.0 : -1.0;
     const IndexTriangle* nearest = nullptr;
     double least = kNearby * kNearby;
     for (const std::uint32_t t : nearby) {
-      if ((triangles[t].normal[axis] > 0) != voxel.inside) continue;
+      if (!(outwards * triangles[t].normal[axis] > 0)) continue;
       const double squared = (nearest_point(triangles[t], crossing) - crossing).squaredNorm();
       if (squared < least) least = squared, nearest = &triangles[t];
     }
