@@ -85,7 +85,7 @@ LoadedCase load_stand_in(const CaseRecipe& recipe, const std::string& reason, Ru
   PolygonMesh mesh = make_recipe(recipe.stand_in, {{"triangles", double(recipe.triangles)}}, context);
   const std::string sha256 = sha256_of_mesh(mesh);
   return {recipe.name, std::move(mesh),
-          "stand-in: " + recipe.stand_in + " of the same size, because " + reason, sha256};
+          "stand-in: " + recipe.stand_in + " of the same size, because " + reason, sha256, {}};
 }
 
 LoadedCase load_files(const CaseRecipe& recipe, RunContext& context) {
@@ -119,6 +119,8 @@ LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& rec
   if (recipe.close_holes_of.empty()) {
     result.mesh = make_recipe(recipe.recipe, recipe.parameters, context);
     result.origin = "generated";
+    if (const auto seed = recipe.parameters.find("seed"); seed != recipe.parameters.end())
+      result.seed = static_cast<std::uint64_t>(seed->second);
   } else {
     result = load_recipe(all, *std::ranges::find(all, recipe.close_holes_of, &CaseRecipe::name), context);
     result.mesh = close_holes(result.mesh);
@@ -142,7 +144,7 @@ LoadedCase load_case(const std::string& name, RunContext& context) {
   const std::vector<CaseRecipe> all = recipes_of_project();
   const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
   if (recipe != all.end()) return load_recipe(all, *recipe, context);
-  if (is_mesh_path(name)) return {name, read_mesh(name, context), "file", sha256_of_file(name)};
+  if (is_mesh_path(name)) return {name, read_mesh(name, context), "file", sha256_of_file(name), {}};
   std::string names;
   for (const CaseRecipe& each : all) names += (names.empty() ? "" : ", ") + each.name;
   throw Error("there is no case '" + name + "' and no mesh file of that name; the cases are: " + names);

@@ -2,7 +2,9 @@
 // names.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,7 @@ struct LoadedCase {
   PolygonMesh mesh;
   std::string origin;  ///< "data folder", "package registry", "generated", or "stand-in: …" with the reason
   std::string sha256;  ///< of the file's bytes, or of the generated mesh's arrays
+  std::optional<std::uint64_t> seed = {};  ///< of a generated case's random numbers, where it has any
 };
 
 /// All cases of cases.toml, in its order. @throws Error naming the file and line of a mistake.

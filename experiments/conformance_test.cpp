@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <ostream>
 #include <random>
 
 #include "algorithms/variants.h"
@@ -15,6 +16,10 @@
 #include "validation/mesh_report.h"
 
 namespace hermesh {
+
+/// How a test names its variant; GoogleTest would print the bytes of the structure.
+void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
+
 namespace {
 
 std::vector<Extractor> table() {

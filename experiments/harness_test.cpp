@@ -79,7 +79,7 @@ class Harness : public testing::Test {
     tables_.voxelizers = {voxelizers.begin(), voxelizers.end()};
     tables_.cases = {"ball"};
     tables_.load = [](const std::string& name, RunContext&) {
-      return LoadedCase{name, ball(), "generated", "0123456789abcdef"};
+      return LoadedCase{name, ball(), "generated", "0123456789abcdef", 42};
     };
     calls = 0;
   }
@@ -117,6 +117,7 @@ TEST_F(Harness, ARowHoldsEverythingThatTheCellIs) {
     EXPECT_TRUE(row.contains(key)) << key;
   EXPECT_EQ(row["case"]["origin"], "generated");
   EXPECT_EQ(row["case"]["sha256"], "0123456789abcdef");
+  EXPECT_EQ(row["case"]["seed"], 42);
   EXPECT_EQ(row["variant"]["options"], "size=2");
   EXPECT_EQ(row["resolution"], 12);
   EXPECT_DOUBLE_EQ(row["voxel_size"], 2.0 / 12);

@@ -128,6 +128,7 @@ class Group {
                         {"sha256", in_.input.sha256},
                         {"points", in_.input.mesh.points.size()},
                         {"triangles", in_.input.mesh.triangle_count()}};
+    if (in_.input.seed) cell.row["case"]["seed"] = *in_.input.seed;
     cell.row["resolution"] = in_.resolution;
     cell.row["voxel_size"] = voxel_size_;
     cell.row["samples"] = in_.tier.samples;
