@@ -16,6 +16,12 @@ namespace {
 /// coincide.
 constexpr double kCellMargin = 1.0 / 1024.0;
 
+/// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and
+/// root mean square: next to a feature that passes outside. On a turned cube 0.1 keeps the largest error at
+/// 0.1 voxel; letting every minimiser go makes it zero, but nearly doubles the self-intersections of a scan,
+/// whose minimisers leave for nothing.
+constexpr double kWorthLeaving = 0.1;
+
 /// What one block adds to the mesh, and where in it.
 struct BlockOutput {
   BlockMask active{};
@@ -134,12 +140,13 @@ class Contourer {
 
   Eigen::Vector3d place(const Qef& qef, const Eigen::Vector3d& corner) const {
     if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
+    const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
+    const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
+    if (options_.reach <= 0 || qef.error(held) <= kWorthLeaving * kWorthLeaving * qef.planes()) return held;
     const Eigen::Vector3d free = qef.minimiser(options_.truncation);
     const Eigen::Vector3d from_centre = free - corner - Eigen::Vector3d::Constant(0.5);
-    if (from_centre.cwiseAbs().maxCoeff() <= 0.5 + options_.reach - kCellMargin) return free;
-    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
-    return qef.minimiser_within(corner + margin, corner + Eigen::Vector3d::Ones() - margin,
-                                options_.truncation);
+    return from_centre.cwiseAbs().maxCoeff() <= 0.5 + options_.reach ? free : held;
   }
 
   void connect(std::int32_t b, PolygonMesh& mesh) const {

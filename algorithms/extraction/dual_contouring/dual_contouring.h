@@ -16,9 +16,8 @@ struct DualContouringOptions {
   /// Singular values below this share of the largest are dropped; larger is smoother and keeps fewer
   /// features.
   double truncation = 0.1;
-  /// How far a minimiser may lie outside its cell, in voxels. One that lies further is searched for within
-  /// the cell alone. Larger keeps more of a feature that passes just outside a cell; smaller folds the
-  /// surface less.
+  /// How far a point may leave its cell, in voxels, to meet a feature that passes outside: only where no place within
+  /// the cell comes near the planes. Larger keeps more of features; 0 holds every point in its cell.
   double reach = 1.0;
 };
 
