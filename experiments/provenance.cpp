@@ -108,7 +108,8 @@ std::string utc_now() {
 
 Json provenance(const std::filesystem::path& source_folder) {
   const auto commit = git(source_folder, "rev-parse --verify HEAD");
-  const auto changes = git(source_folder, "status --porcelain");
+  // Results of runs are no part of what is run.
+  const auto changes = git(source_folder, "status --porcelain -- ':(top)' ':(top,exclude)results'");
   return {{"commit", commit.value_or("unknown")},
           {"dirty", changes ? Json(!changes->empty()) : Json(nullptr)},
           {"date", utc_now()},
