@@ -88,6 +88,8 @@ TEST_F(VdbFile, EveryTruncationIsRefused) {
   }
 }
 
+// A flipped byte may be a size, and AddressSanitizer's operator new ends the process where the real one throws.
+#ifndef __SANITIZE_ADDRESS__
 TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
   write_level_set(folder_ / "a.vdb", ramp(), context_);
   std::ifstream in(folder_ / "a.vdb", std::ios::binary);
@@ -99,6 +101,7 @@ TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
     error_of(folder_ / "bad.vdb");  // must not crash, hang or throw anything else
   }
 }
+#endif
 
 TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
   initialize_openvdb();
