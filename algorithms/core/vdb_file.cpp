@@ -23,6 +23,8 @@ template <class F>
 auto about_file(const fs::path& path, F&& f) {
   try {
     return f();
+  } catch (const openvdb::LookupError& e) {
+    throw Error(path.string() + " holds a grid of a type that this program does not know (" + e.what() + ")");
   } catch (const openvdb::Exception& e) {
     throw Error(path.string() + " cannot be read as a .vdb file (" + e.what() + "); is it complete?");
   } catch (const std::bad_alloc&) {
@@ -154,14 +156,7 @@ std::vector<GridSummary> describe_vdb(const fs::path& path) {
     for (auto it = file.beginName(); it != file.endName(); ++it) {
       GridSummary& summary = summaries.emplace_back();
       summary.name = *it;
-      openvdb::GridBase::Ptr grid;
-      try {
-        grid = file.readGrid(*it);
-      } catch (const openvdb::LookupError& e) {
-        summary.readable = false;
-        summary.value_type = e.what();
-        continue;
-      }
+      const openvdb::GridBase::Ptr grid = file.readGrid(*it);
       summary.value_type = grid->type();
       summary.grid_class = openvdb::GridBase::gridClassToString(grid->getGridClass());
       summary.active_voxels = grid->activeVoxelCount();

@@ -27,10 +27,10 @@ struct GridSummary {
   std::array<int, 3> lower{}, upper{};  ///< active box, index space, inclusive
   double voxel_size = 0.0;              ///< world units
   double background = 0.0;              ///< of scalar grids
-  bool readable = true;                 ///< false for a grid type that this program does not know
 };
 
-/// What a .vdb holds. Grids of unknown types are listed by name and type without failing the file.
+/// What a .vdb holds. @throws Error as read_level_set() does, and for a file with a grid of an unknown type, which OpenVDB
+/// cannot step over.
 std::vector<GridSummary> describe_vdb(const std::filesystem::path& path);
 
 }  // namespace hermesh

@@ -32,9 +32,7 @@ void print_mesh(const std::filesystem::path& path, RunContext& context) {
 
 void print_grid(const GridSummary& grid) {
   std::cout << "grid           " << grid.name << "\n  values       " << grid.value_type;
-  if (!grid.readable) std::cout << " (a type that this program does not know)";
   std::cout << "\n  class        " << grid.grid_class << '\n';
-  if (!grid.readable) return;
   std::cout << "  voxel size   " << text(grid.voxel_size) << "\n  active       " << grid.active_voxels
             << " voxels";
   if (grid.active_voxels > 0)
