@@ -2,6 +2,7 @@
 
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
+#include "algorithms/voxelization/hermesh_voxelizer.h"
 
 namespace hermesh {
 
@@ -19,6 +20,16 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},
+  };
+  return table;
+}
+
+std::span<const Voxelizer> our_voxelizers() {
+  static const std::vector<Voxelizer> table = {
+      {.name = "hermesh",
+       .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",
+       .options = hermesh_voxelizer_options(),
+       .voxelize = hermesh_voxelizer},
   };
   return table;
 }

@@ -9,5 +9,6 @@
 namespace hermesh {
 
 std::span<const Extractor> our_extractors();
+std::span<const Voxelizer> our_voxelizers();
 
 }  // namespace hermesh

@@ -53,7 +53,7 @@ class ExperimentFile : public testing::Test {
   const std::vector<OptionSpec> options_ = {{"size", "1", "", {}, 0.0, 10.0},
                                             {"mode", "slow", "", {"slow", "fast"}}};
   const std::vector<Extractor> extractors_ = {{"toy", "a toy", {}, options_, nullptr}};
-  const std::vector<Voxelizer> voxelizers_ = {{"plain", "plain", nullptr}};
+  const std::vector<Voxelizer> voxelizers_ = {{"plain", "plain", {}, nullptr}};
 };
 
 TEST_F(ExperimentFile, ReadsEveryKey) {

@@ -13,8 +13,10 @@ std::vector<Extractor> all_extractors() {
 }
 
 std::vector<Voxelizer> all_voxelizers() {
-  const std::span<const Voxelizer> others = reference_voxelizers();
-  return {others.begin(), others.end()};
+  const std::span<const Voxelizer> ours = our_voxelizers(), others = reference_voxelizers();
+  std::vector<Voxelizer> all(ours.begin(), ours.end());
+  all.insert(all.end(), others.begin(), others.end());
+  return all;
 }
 
 }  // namespace hermesh

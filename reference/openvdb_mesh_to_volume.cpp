@@ -59,9 +59,10 @@ LevelSet openvdb_mesh_to_volume(const VoxelizationInput& input) {
   transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
 
   Interrupter interrupter{input.context};
+  const bool raw = input.options.is("renormalize", "no");
   const openvdb::FloatGrid::Ptr grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
       interrupter, Polygons(input.mesh, input.voxel_size), *transform, float(input.exterior_band),
-      float(input.interior_band));
+      float(input.interior_band), raw ? openvdb::tools::DISABLE_RENORMALIZATION : 0);
   input.context.check();
   grid->setName("sdf");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);

@@ -70,9 +70,17 @@ std::span<const Extractor> reference_extractors() {
 
 std::span<const Voxelizer> reference_voxelizers() {
   static const std::array<Voxelizer, 2> kTable = {{
-      {"openvdb", "OpenVDB's meshToVolume, default flags", openvdb_mesh_to_volume},
-      {"exact", "brute-force distances with a CGAL tree and signs by rays: the oracle for small grids",
-       exact_voxelizer},
+      {.name = "openvdb",
+       .summary = "OpenVDB's meshToVolume: flooded nearest polygons, signs by the surface's side",
+       .options = {{.name = "renormalize",
+                    .fallback = "yes",
+                    .help = "yes, as OpenVDB does by default, smooths the distances after the signs",
+                    .choices = {"yes", "no"}}},
+       .voxelize = openvdb_mesh_to_volume},
+      {.name = "exact",
+       .summary = "brute-force distances with a CGAL tree and signs by rays: the oracle for small grids",
+       .options = {},
+       .voxelize = exact_voxelizer},
   }};
   return kTable;
 }

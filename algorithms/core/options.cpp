@@ -82,6 +82,11 @@ const std::string& Options::text(std::string_view name) const {
   return entry->second;
 }
 
+bool Options::is(std::string_view name, std::string_view value) const {
+  const auto entry = values_.find(name);
+  return entry != values_.end() && entry->second == value;
+}
+
 std::string Options::canonical() const {
   std::string text;
   for (const auto& [name, value] : values_) text += (text.empty() ? "" : " ") + name + "=" + value;

@@ -30,6 +30,8 @@ class Options {
 
   double number(std::string_view name) const;
   const std::string& text(std::string_view name) const;
+  /// Whether the option was declared and has this value.
+  bool is(std::string_view name, std::string_view value) const;
   /// "key=value key=value" of all options in alphabetical order, the defaults included.
   std::string canonical() const;
 

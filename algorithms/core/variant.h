@@ -47,11 +47,13 @@ struct VoxelizationInput {
   double exterior_band = 3.0;  ///< voxels
   double interior_band = 3.0;  ///< voxels
   RunContext& context;
+  Options options = {};  ///< those that the variant declares, checked
 };
 
 struct Voxelizer {
   std::string name;
   std::string summary;
+  std::vector<OptionSpec> options;
   LevelSet (*voxelize)(const VoxelizationInput&);
 };
 

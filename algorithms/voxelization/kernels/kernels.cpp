@@ -1,0 +1,98 @@
+#include "algorithms/voxelization/kernels/kernels.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdlib>
+
+#include "algorithms/core/error.h"
+#include "algorithms/voxelization/kernels/constants.h"
+
+namespace hermesh::kernels {
+
+namespace sse2 {
+extern const Kernels kKernels;
+}
+namespace avx2 {
+extern const Kernels kKernels;
+}
+namespace avx512 {
+extern const Kernels kKernels;
+}
+
+namespace {
+
+struct Level {
+  const char* name;
+  const Kernels* kernels;
+  bool available;
+};
+
+std::array<Level, 3> all_levels() {
+  return {{{"sse2", &sse2::kKernels, true},
+           {"avx2", &avx2::kKernels, __builtin_cpu_supports("avx2") != 0},
+           {"avx512", &avx512::kKernels, __builtin_cpu_supports("avx512f") != 0}}};
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void put(Batch& batch, int row, int lane, const Eigen::Vector3d& v) {
+  for (int axis = 0; axis < 3; ++axis) batch.f[row + axis][lane] = float(v[axis]);
+}
+
+}  // namespace
+
+void set_up_segment(const Corners& corners, int triangle, Batch& batch) {
+  Eigen::Vector3d corner[3];
+  for (int i = 0; i < 3; ++i)
+    for (int axis = 0; axis < 3; ++axis) corner[i][axis] = corners.corner[3 * i + axis][triangle];
+  int longest = 0;
+  const auto side = [&](int i) -> Eigen::Vector3d { return corner[(i + 1) % 3] - corner[i]; };
+  for (int i = 1; i < 3; ++i)
+    if (side(i).squaredNorm() > side(longest).squaredNorm()) longest = i;
+  const Eigen::Vector3d& start = corner[longest];
+  const double length = side(longest).norm();
+  const Eigen::Vector3d along =
+      length > 0 ? Eigen::Vector3d(side(longest) / length) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d normal = along.unitOrthogonal(), across = along.cross(normal);
+  put(batch, Batch::kHeight, triangle, normal);
+  batch.f[Batch::kHeight + 3][triangle] = float(-normal.dot(start));
+  for (int i = 0; i < 3; ++i) {
+    const int edge = Batch::kEdge + Batch::kPerEdge * i;
+    const double turn = i == 2 ? -1.0 : 1.0;
+    put(batch, edge, triangle, turn * across);
+    batch.f[edge + 3][triangle] = float(-turn * across.dot(start));
+    put(batch, edge + Batch::kAlong, triangle, along);
+    batch.f[edge + Batch::kLow][triangle] = float(along.dot(start));
+    batch.f[edge + Batch::kHigh][triangle] = float(along.dot(start) + length);
+  }
+}
+
+std::vector<std::string> levels() {
+  std::vector<std::string> names;
+  for (const Level& level : all_levels())
+    if (level.available) names.push_back(level.name);
+  return names;
+}
+
+const Kernels& at_level(std::string_view name) {
+  for (const Level& level : all_levels()) {
+    if (name != level.name) continue;
+    if (!level.available)
+      throw Error("HERMESH_SIMD=" + std::string(name) + " asks for vector code that this machine cannot run; it has " +
+                  joined(levels()) + ".");
+    return *level.kernels;
+  }
+  throw Error("HERMESH_SIMD is '" + std::string(name) + "', which is no level of vector code; this machine has " +
+              joined(levels()) + ".");
+}
+
+const Kernels& chosen() {
+  const char* name = std::getenv("HERMESH_SIMD");
+  return at_level(name && *name ? std::string(name) : levels().back());
+}
+
+}  // namespace hermesh::kernels

@@ -1,0 +1,11 @@
+#include <immintrin.h>
+
+#include "algorithms/voxelization/kernels/constants.h"
+#include "algorithms/voxelization/kernels/kernels.h"
+
+namespace hermesh::kernels::avx512 {
+
+#include "algorithms/voxelization/kernels/simd.h"
+#include "algorithms/voxelization/kernels/kernels.inc"
+
+}  // namespace hermesh::kernels::avx512
