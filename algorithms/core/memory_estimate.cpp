@@ -1,5 +1,8 @@
 #include "algorithms/core/memory_estimate.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -7,9 +10,11 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <vector>
 
+#include "algorithms/core/block_table.h"
 #include "algorithms/core/error.h"
 
 namespace hermesh {
@@ -32,43 +37,84 @@ std::string format(const char* pattern, double value) {
 
 std::string gibibytes(double bytes) { return format("%.3g GiB", bytes / (1024.0 * 1024.0 * 1024.0)); }
 
+/// Items that one task goes through; fixed, so that sums do not depend on the number of threads.
+constexpr std::size_t kChunk = 1 << 16;
+
+template <class F>
+double sum_over(std::size_t n, F&& f) {
+  std::vector<double> sums((n + kChunk - 1) / kChunk);
+  tbb::parallel_for(std::size_t(0), sums.size(), [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) sums[chunk] += f(i);
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+Bounds joined(Bounds a, const Bounds& b) {
+  // Written so that a NaN of either stays.
+  const auto pick = [](double x, double y, bool first) { return std::isnan(x) || (first && !std::isnan(y)) ? x : y; };
+  for (int axis = 0; axis < 3; ++axis) {
+    a.lower[axis] = pick(a.lower[axis], b.lower[axis], a.lower[axis] < b.lower[axis]);
+    a.upper[axis] = pick(a.upper[axis], b.upper[axis], a.upper[axis] > b.upper[axis]);
+  }
+  return a;
+}
+
 double area(const PolygonMesh& mesh) {
   const auto triangle = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     const Eigen::Vector3d p = mesh.points[a].cast<double>();
     return 0.5 * (mesh.points[b].cast<double>() - p).cross(mesh.points[c].cast<double>() - p).norm();
   };
-  double sum = 0.0;
-  for (const Triangle& t : mesh.triangles) sum += triangle(t[0], t[1], t[2]);
-  for (const Quad& q : mesh.quads) sum += triangle(q[0], q[1], q[2]) + triangle(q[0], q[2], q[3]);
-  return sum;
+  const double triangles = sum_over(mesh.triangles.size(), [&](std::size_t i) {
+    const Triangle& t = mesh.triangles[i];
+    return triangle(t[0], t[1], t[2]);
+  });
+  return triangles + sum_over(mesh.quads.size(), [&](std::size_t i) {
+           const Quad& q = mesh.quads[i];
+           return triangle(q[0], q[1], q[2]) + triangle(q[0], q[2], q[3]);
+         });
 }
 
-template <typename Function>
-void for_each_corner(const PolygonMesh& mesh, const Function& function) {
-  for (const Triangle& t : mesh.triangles)
-    for (const std::uint32_t corner : t) function(mesh.points[corner]);
-  for (const Quad& q : mesh.quads)
-    for (const std::uint32_t corner : q) function(mesh.points[corner]);
+/// Box around the corners of the polygons, relative to the mesh's origin; not finite when a corner is not.
+Bounds box_of_corners(const PolygonMesh& mesh) {
+  const auto add = [&](Bounds box, const auto& polygons, const tbb::blocked_range<std::size_t>& range) {
+    bool finite = true;
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      for (const std::uint32_t corner : polygons[i]) {
+        finite = finite && mesh.points[corner].allFinite();
+        box.add(mesh.points[corner].template cast<double>());
+      }
+    if (!finite) box.upper.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return box;
+  };
+  const auto over = [&](const auto& polygons) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, polygons.size(), kChunk), Bounds(),
+        [&](const auto& range, const Bounds& box) { return add(box, polygons, range); }, joined);
+  };
+  return joined(over(mesh.triangles), over(mesh.quads));
 }
 
-/// Number of distinct blocks of `edge` voxels that hold a point. Stray points that no polygon uses count,
-/// too; there are few. Blocks are told apart by a 64-bit mix of their coordinates, where a rare collision
-/// does not matter.
-double blocks_with_points(const PolygonMesh& mesh, double voxel_size, double edge) {
-  std::vector<std::uint64_t> keys;
-  keys.reserve(mesh.points.size());
-  const double scale = 1.0 / (edge * voxel_size);
-  for (const Eigen::Vector3f& point : mesh.points) {
-    std::uint64_t key = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double block = std::clamp(std::floor(double(point[axis]) * scale), -kLargestIndex, kLargestIndex);
-      key = (key ^ std::uint64_t(std::int64_t(block))) * 0x9E3779B97F4A7C15ull;
-      key ^= key >> 29;
+/// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses count,
+/// too; there are few.
+std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
+  std::vector<BlockSet> parts((mesh.points.size() + kChunk - 1) / kChunk);
+  const double scale = 1.0 / (8.0 * voxel_size);
+  tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
+    for (std::size_t i = part * kChunk; i < std::min(mesh.points.size(), (part + 1) * kChunk); ++i) {
+      BlockAt block;
+      for (int axis = 0; axis < 3; ++axis)
+        block[std::size_t(axis)] = std::int32_t(
+            std::floor(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex)));
+      parts[part].insert(block);
     }
-    keys.push_back(key);
+  });
+  const BlockTable table(parts);
+  std::vector<BlockSet> coarse(2);
+  for (const BlockAt& block : table.blocks()) {
+    coarse[0].insert({block[0] >> 4, block[1] >> 4, block[2] >> 4});
+    coarse[1].insert({block[0] >> 9, block[1] >> 9, block[2] >> 9});
   }
-  std::sort(keys.begin(), keys.end());
-  return double(std::unique(keys.begin(), keys.end()) - keys.begin());
+  return {double(table.size()), double(BlockTable({coarse[0]}).size()), double(BlockTable({coarse[1]}).size())};
 }
 
 /// What the estimates of blocks of any size share.
@@ -85,12 +131,12 @@ struct Blocks {
 /// A plane layer of thickness t with unit normal n meets (e |n|₁ + t) / e³ blocks of edge e a unit of area,
 /// and |n|₁ is 3/2 on average over all directions. Blocks with points beyond those that the area explains are
 /// small scattered pieces, each of which costs as much as a point's ball. The box is the upper limit.
-Blocks count_blocks(const PolygonMesh& mesh, double voxel_size, const Extent& extent, double edge) {
+Blocks count_blocks(double with_points, const Extent& extent, double edge) {
   const double volume = edge * edge * edge;
   const double bare = extent.surface * 1.5 * edge / volume;
   Blocks blocks;
   blocks.along_surface = extent.surface * (1.5 * edge + extent.thickness) / volume;
-  blocks.scattered = std::max(0.0, blocks_with_points(mesh, voxel_size, edge) - bare);
+  blocks.scattered = std::max(0.0, with_points - bare);
   const double box = ((extent.sides / edge).array() + 1.0).prod();
   blocks.all =
       std::min(box, blocks.along_surface + blocks.scattered * std::pow(edge + extent.thickness, 3) / volume);
@@ -146,13 +192,10 @@ void check_arguments(double voxel_size, double exterior_band, double interior_ba
 
 void check_coordinates(const PolygonMesh& mesh, double voxel_size, double band) {
   if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
-  double largest = 0.0;
-  bool finite = mesh.origin.allFinite();
-  for_each_corner(mesh, [&](const Eigen::Vector3f& point) {
-    finite = finite && point.allFinite();
-    largest = std::max(largest, double(point.cwiseAbs().maxCoeff()));
-  });
-  if (!finite) throw Error("The mesh holds a coordinate that is not finite: repair it before voxelizing.");
+  const Bounds box = box_of_corners(mesh);
+  if (!mesh.origin.allFinite() || !box.lower.allFinite() || !box.upper.allFinite())
+    throw Error("The mesh holds a coordinate that is not finite: repair it before voxelizing.");
+  const double largest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
   if (largest / voxel_size + band > kLargestIndex)
     throw Error("A voxel size of " + format("%g", voxel_size) + " puts the mesh at voxel coordinates up to " +
                 format("%.3g", largest / voxel_size) +
@@ -164,14 +207,14 @@ void check_coordinates(const PolygonMesh& mesh, double voxel_size, double band) 
 
 BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                            double interior_band) {
-  Bounds box;
-  for_each_corner(mesh, [&](const Eigen::Vector3f& point) { box.add(point.cast<double>()); });
+  const Bounds box = box_of_corners(mesh);
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
   const Extent extent{area(mesh) / voxel_size / voxel_size, exterior_band + interior_band,
                       box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
 
   BandEstimate estimate;
-  const Blocks leaves = count_blocks(mesh, voxel_size, extent, 8.0);
+  const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
+  const Blocks leaves = count_blocks(small, extent, 8.0);
   estimate.leaves = leaves.all;
   // A piece far below a voxel is a ball of the exterior band's radius.
   const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
@@ -179,8 +222,8 @@ BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double ex
       {extent.sides.prod(), 512.0 * leaves.all, extent.thickness * extent.surface + leaves.scattered * ball});
   // Eight upper nodes meet at the grid's origin, where most meshes lie.
   estimate.grid_bytes = kLeafBytes * leaves.all +
-                        kMiddleBytes * count_blocks(mesh, voxel_size, extent, 128.0).all +
-                        kUpperBytes * (8.0 + count_blocks(mesh, voxel_size, extent, 4096.0).all);
+                        kMiddleBytes * count_blocks(middle, extent, 128.0).all +
+                        kUpperBytes * (8.0 + count_blocks(large, extent, 4096.0).all);
   estimate.peak_bytes = kPeakOverGrid * estimate.grid_bytes;
   return estimate;
 }

@@ -18,16 +18,35 @@ using kernels::Kernels;
 /// for its voxels. Where the two take equally long, measured.
 constexpr std::size_t kMany = 1500;
 
+/// Up to sixteen triangles on their way to the kernels.
+struct Pending {
+  kernels::MeshCorners corners;
+  std::int32_t id[kBatch];
+  int count = 0;
+
+  void add(const kernels::MeshCorners& from, int j, std::uint32_t triangle) {
+    for (int i = 0; i < 9; ++i) corners.corner[i][count] = from.corner[i][j];
+    id[count++] = std::int32_t(triangle);
+  }
+  /// Makes the unused places copies of the first triangle, so that they change nothing.
+  void fill() {
+    for (int j = count; j < kBatch; ++j) {
+      for (auto& row : corners.corner) row[j] = row[0];
+      id[j] = id[0];
+    }
+  }
+};
+
 /// One leaf at a time; its buffers serve the next.
 class LeafWork {
  public:
-  LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids, const RunContext& context)
-      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), context_(context), kernels_(kernels::chosen()) {}
+  LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids)
+      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), kernels_(kernels::chosen()) {}
 
   /// False when no voxel is within reach.
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
            kernels::EdgeBits& crossed) {
-    origin_ = {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0};
+    frame_ = {soup_.scale(), {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0}};
     for (float& d : distances_.squared) d = float(reach_ * reach_) * 2.0f;
     if (ids_) std::memset(distances_.id, 0xff, sizeof distances_.id);
     crossed = {};
@@ -36,10 +55,11 @@ class LeafWork {
     if (triangles_ > kMany)
       look_from_voxels();
     else
-      for (const TriangleBins::Cluster& cluster : clusters_)
-        for (const std::uint32_t t : cluster.triangles) add(t);
-    for (const std::uint32_t t : bins_.large(number)) add(t);
+      for (const TriangleBins::Cluster& cluster : clusters_) add(cluster.triangles);
+    const std::span<const std::uint32_t> large = bins_.large(number);
+    for (std::size_t i = 0; i < large.size(); i += kBatch) add(large.subspan(i, std::min<std::size_t>(kBatch, large.size() - i)));
     flush();
+    flush_crossing();
     return kernels_.finish(distances_, float(reach_), voxel_size, values, active);
   }
 
@@ -48,8 +68,8 @@ class LeafWork {
  private:
   double gap2(const VoxelBox& box) const {
     double sum = 0;
-    for (int a = 0; a < 3; ++a) {
-      const double gap = std::max({0.0, box.low[a] - (origin_[a] + 7.0), origin_[a] - box.high[a]});
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double gap = std::max({0.0, box.low[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.high[a]});
       sum += gap * gap;
     }
     return sum;
@@ -65,45 +85,59 @@ class LeafWork {
     });
   }
 
-  TriangleCorners local(std::uint32_t t) const {
-    TriangleCorners c = soup_.corners(t);
-    for (std::size_t i = 0; i < 9; ++i) c[i] -= origin_[i % 3];
-    return c;
+  /// At most 16.
+  void fetch(std::span<const std::uint32_t> triangles, kernels::MeshCorners& to) const {
+    for (std::size_t j = 0; j < triangles.size(); ++j) {
+      const Triangle t = soup_.triangle(triangles[j]);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Eigen::Vector3f& point = soup_.point(t[c]);
+        for (int a = 0; a < 3; ++a) to.corner[3 * c + std::size_t(a)][j] = point[a];
+      }
+    }
   }
 
-  static double gap(double a, double b, double c, double length) {
-    return std::max({0.0, std::min({a, b, c}) - length, -std::max({a, b, c})});
+  /// At most 16 triangles look for their voxels and edges.
+  void add(std::span<const std::uint32_t> triangles) {
+    fetch(triangles, fetched_);
+    const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
+    const unsigned there = (2u << (triangles.size() - 1)) - 1;
+    for (unsigned bits = near.within_reach & there; bits; bits &= bits - 1) {
+      const int j = __builtin_ctz(bits);
+      pending_.add(fetched_, j, triangles[std::size_t(j)]);
+      if (pending_.count == kBatch) flush();
+    }
+    add_crossing(near.at_edges & there, triangles);
   }
 
-  void put(const TriangleCorners& c, std::uint32_t t) {
-    for (std::size_t i = 0; i < 9; ++i) corners_.corner[i][count_] = c[i];
-    batch_.id[count_++] = std::int32_t(t);
-  }
-
-  /// A triangle looks for its voxels and edges, together with fifteen others.
-  void add(std::uint32_t t) {
-    const TriangleCorners c = local(t);
-    const double x = gap(c[0], c[3], c[6], 7.0), y = gap(c[1], c[4], c[7], 7.0), z = gap(c[2], c[5], c[8], 7.0);
-    if (x * x + y * y + z * z > reach_ * reach_) return;
-    put(c, t);
-    if (count_ == kBatch) flush();
+  void add_crossing(unsigned bits, std::span<const std::uint32_t> triangles) {
+    for (; bits; bits &= bits - 1) {
+      const int j = __builtin_ctz(bits);
+      crossing_.add(fetched_, j, triangles[std::size_t(j)]);
+      if (crossing_.count == kBatch) flush_crossing();
+    }
   }
 
   void flush() {
-    if (count_ == 0) return;
-    set_up(corners_, count_, batch_);
-    kernels_.update(batch_, count_, float(reach_), ids_, distances_);
-    kernels_.cross(corners_, count_, *crossed_);
-    count_ = 0;
+    if (pending_.count == 0) return;
+    set_up(pending_, batch_);
+    kernels_.update(batch_, pending_.count, float(reach_), ids_, distances_);
+    pending_.count = 0;
   }
 
-  void set_up(kernels::Corners& corners, int count, Batch& batch) const {
-    for (int j = count; j < kBatch; ++j) {
-      for (auto& row : corners.corner) row[j] = row[0];
-      batch.id[j] = batch.id[0];
-    }
-    for (unsigned thin = kernels_.set_up(corners, batch); thin; thin &= thin - 1)
-      kernels::set_up_segment(corners, __builtin_ctz(thin), batch);
+  void flush_crossing() {
+    if (crossing_.count == 0) return;
+    crossing_.fill();
+    kernels_.to_leaf(crossing_.corners, frame_, corners_);
+    kernels_.cross(corners_, crossing_.count, *crossed_);
+    crossing_.count = 0;
+  }
+
+  void set_up(Pending& triangles, Batch& batch) {
+    triangles.fill();
+    std::memcpy(batch.id, triangles.id, sizeof batch.id);
+    kernels_.to_leaf(triangles.corners, frame_, corners_);
+    for (unsigned thin = kernels_.set_up(corners_, batch); thin; thin &= thin - 1)
+      kernels::set_up_segment(corners_, __builtin_ctz(thin), batch);
   }
 
   void look_from_voxels() {
@@ -113,8 +147,12 @@ class LeafWork {
     used_ = 0;
     const kernels::LazyBatches lazy{boxes_.data(), pointers_.data(), int(clusters_.size()), &prepare, this};
     kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
-    for (const TriangleBins::Cluster& cluster : clusters_)
-      if (meets_edges(cluster.box)) cross(cluster);
+    for (const TriangleBins::Cluster& cluster : clusters_) {
+      if (!meets_edges(cluster.box)) continue;
+      fetch(cluster.triangles, fetched_);
+      const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
+      add_crossing(kernels_.near(fetched_, frame_, 1.0f).at_edges & there, cluster.triangles);
+    }
   }
 
   void set_box(std::size_t i) {
@@ -122,59 +160,51 @@ class LeafWork {
     for (std::size_t a = 0; a < 3; ++a) {
       const bool there = i < clusters_.size();
       // Rounding outwards by far more than single precision's error at this range.
-      boxes.side[a][0][i % kBatch] = there ? float(clusters_[i].box.low[a] - origin_[a]) - 1e-5f : 1e18f;
-      boxes.side[a][1][i % kBatch] = there ? float(clusters_[i].box.high[a] - origin_[a]) + 1e-5f : 1e18f;
+      boxes.side[a][0][i % kBatch] = there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
+      boxes.side[a][1][i % kBatch] = there ? float(clusters_[i].box.high[a] - frame_.origin[a]) + 1e-5f : 1e18f;
     }
   }
 
-  static const Batch* prepare(void* self, int i) { return static_cast<LeafWork*>(self)->prepare_batch(std::size_t(i)); }
+  static const Batch* prepare(void* self, int i) {
+    return static_cast<LeafWork*>(self)->prepare_batch(std::size_t(i));
+  }
 
   const Batch* prepare_batch(std::size_t i) {
     if (used_ == pool_.size()) pool_.emplace_back();
     Batch& batch = pool_[used_++];
-    fetch(clusters_[i], batch);
-    set_up(corners_, int(clusters_[i].triangles.size()), batch);
+    const std::span<const std::uint32_t> triangles = clusters_[i].triangles;
+    fetch(triangles, pending_.corners);
+    std::copy(triangles.begin(), triangles.end(), pending_.id);
+    pending_.count = int(triangles.size());
+    set_up(pending_, batch);
+    pending_.count = 0;
     return &batch;
-  }
-
-  void fetch(const TriangleBins::Cluster& cluster, Batch& batch) {
-    int j = 0;
-    for (const std::uint32_t t : cluster.triangles) {
-      const TriangleCorners c = local(t);
-      for (std::size_t i = 0; i < 9; ++i) corners_.corner[i][j] = c[i];
-      batch.id[j++] = std::int32_t(t);
-    }
   }
 
   /// Whether an edge of this leaf may meet the box: at least two of its sides must reach across a whole number.
   bool meets_edges(const VoxelBox& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double low = box.low[a] - origin_[a] - 1e-6, high = box.high[a] - origin_[a] + 1e-6;
+      const double low = box.low[a] - frame_.origin[a] - 1e-6, high = box.high[a] - frame_.origin[a] + 1e-6;
       if (high < 0.0 || low > 8.0) return false;
       across += std::floor(high) >= std::ceil(low) ? 1 : 0;
     }
     return across >= 2;
   }
 
-  void cross(const TriangleBins::Cluster& cluster) {
-    fetch(cluster, batch_);
-    kernels_.cross(corners_, int(cluster.triangles.size()), *crossed_);
-  }
-
   const IndexSoup& soup_;
   const TriangleBins& bins_;
   double reach_;
   bool ids_;
-  const RunContext& context_;
   const Kernels& kernels_;
-  std::array<double, 3> origin_{};
+  kernels::LeafFrame frame_{};
   std::vector<TriangleBins::Cluster> clusters_;
-  std::size_t triangles_ = 0;
+  std::size_t triangles_ = 0;  ///< in the clusters
   kernels::Distances distances_;
+  kernels::MeshCorners fetched_{};
+  Pending pending_, crossing_;
   kernels::Corners corners_;
   Batch batch_;
-  int count_ = 0;
   kernels::EdgeBits* crossed_ = nullptr;
   std::vector<kernels::Boxes> boxes_;
   std::vector<const Batch*> pointers_;
@@ -213,7 +243,7 @@ Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach,
   band.crossed.resize(n);
   if (nearest) band.nearest.resize(n);
   tbb::enumerable_thread_specific<LeafWork> works(
-      [&] { return LeafWork(soup, bins, reach, nearest, context); });
+      [&] { return LeafWork(soup, bins, reach, nearest); });
   // A part at a time, so that this thread can report between them.
   const std::size_t part = std::max<std::size_t>(1024, n / 64);
   for (std::size_t first = 0; first < n; first += part) {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "algorithms/voxelization/block_table.h"
+#include "algorithms/core/block_table.h"
 #include "algorithms/voxelization/kernels/kernels.h"
 
 namespace hermesh {

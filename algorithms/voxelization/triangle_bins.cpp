@@ -12,8 +12,6 @@ namespace {
 /// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for each, so
 /// small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
-/// A bin with more triangles than this has them sorted along a space-filling curve, so that clusters are compact.
-constexpr std::size_t kSorted = 64;
 constexpr std::uint32_t kLarge = BlockTable::kNone;
 
 std::int32_t block_of(double voxel) { return std::int32_t(std::floor(voxel)) >> 3; }
@@ -96,11 +94,30 @@ void parallel_chunks(const Chunks& chunks, const RunContext& context, F&& f) {
   });
 }
 
-std::uint32_t spread_bits(std::uint32_t v) {
-  v = (v | v << 16) & 0x030000FF;
-  v = (v | v << 8) & 0x0300F00F;
-  v = (v | v << 4) & 0x030C30C3;
-  return (v | v << 2) & 0x09249249;
+struct Centre {
+  Eigen::Vector3f at;
+  std::uint32_t triangle;
+};
+
+/// Orders triangles so that each sixteen in a row are close together: halves the longest side, again and again.
+void make_compact(std::span<Centre> centres) {
+  while (centres.size() > kClusterSize) {
+    Eigen::Vector3f low = centres[0].at, high = low;
+    for (const Centre& c : centres) {
+      low = low.cwiseMin(c.at);
+      high = high.cwiseMax(c.at);
+    }
+    int axis = 0;
+    (high - low).maxCoeff(&axis);
+    // Whole clusters on the lower side.
+    const std::size_t half = (centres.size() / 2 + kClusterSize - 1) / kClusterSize * kClusterSize;
+    std::nth_element(centres.begin(), centres.begin() + std::ptrdiff_t(half), centres.end(),
+                     [&](const Centre& a, const Centre& b) {
+                       return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.triangle < b.triangle;
+                     });
+    make_compact(centres.first(half));
+    centres = centres.subspan(half);
+  }
 }
 
 }  // namespace
@@ -179,24 +196,18 @@ void TriangleBins::make_clusters(RunContext& context) {
   clusters_.resize(total);
   const Chunks chunks(bins_.size(), 64);
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> keyed;
+    std::vector<Centre> centres;
     for (std::size_t bin = chunks.begin(chunk); bin < chunks.end(chunk); ++bin) {
       context.check();
       const std::span<std::uint32_t> triangles(order_.data() + first_[bin], first_[bin + 1] - first_[bin]);
-      if (triangles.size() > kSorted) {
-        keyed.clear();
+      if (triangles.size() > kClusterSize) {
+        centres.clear();
         for (const std::uint32_t t : triangles) {
-          const VoxelBox box = in_voxels(box_of(t));
-          std::uint32_t key = 0;
-          for (int a = 0; a < 3; ++a) {
-            // The centre's place within its block in 1024ths.
-            const double centre = 0.5 * (box.low[a] + box.high[a]) / 8.0;
-            key |= spread_bits(std::uint32_t((centre - std::floor(centre)) * 1023.0)) << a;
-          }
-          keyed.emplace_back(key, t);
+          const FloatBox box = box_of(t);
+          centres.push_back({box.low + box.high, t});
         }
-        std::sort(keyed.begin(), keyed.end());
-        std::transform(keyed.begin(), keyed.end(), triangles.begin(), [](const auto& k) { return k.second; });
+        make_compact(centres);
+        std::transform(centres.begin(), centres.end(), triangles.begin(), [](const Centre& c) { return c.triangle; });
       }
       FloatBox* cluster = clusters_.data() + first_cluster_[bin];
       for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++cluster) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/core/run_context.h"
-#include "algorithms/voxelization/block_table.h"
+#include "algorithms/core/block_table.h"
 #include "algorithms/voxelization/index_soup.h"
 
 namespace hermesh {

@@ -18,6 +18,23 @@ struct Corners {
   alignas(64) double corner[9][kBatch];
 };
 
+/// Corners as the mesh has them, in its single precision: [3 · corner + axis][triangle].
+struct MeshCorners {
+  alignas(64) float corner[9][kBatch];
+};
+
+/// From the mesh's units to voxels relative to a leaf's first voxel: corner · scale − origin.
+struct LeafFrame {
+  double scale;
+  double origin[3];
+};
+
+/// Which of 16 triangles matter to a leaf, as bits.
+struct Near {
+  unsigned within_reach;  ///< the box is, by a margin for rounding
+  unsigned at_edges;      ///< the box touches a grid edge that the leaf owns, by the same margin
+};
+
 /// A triangle as linear functions of position x (voxels, relative to a leaf's first voxel), so that a distance is a few
 /// additions a voxel. With n the unit normal, and for edge i with unit direction e and in-plane outward normal m:
 ///   height  n·x + c                  signed distance to the plane
@@ -65,6 +82,10 @@ struct EdgeBits {
 };
 
 struct Kernels {
+  /// By the boxes of 16 triangles.
+  Near (*near)(const MeshCorners&, const LeafFrame&, float reach);
+  /// All 16 to voxels.
+  void (*to_leaf)(const MeshCorners&, const LeafFrame&, Corners&);
   /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel, call
   /// set_up_segment().
   unsigned (*set_up)(const Corners&, Batch&);

@@ -1,4 +1,4 @@
-#include "algorithms/voxelization/block_table.h"
+#include "algorithms/core/block_table.h"
 
 #include <algorithm>
 
