@@ -3,6 +3,7 @@
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
+#include "algorithms/voxelization/thesis_voxelizer.h"
 
 namespace hermesh {
 
@@ -30,6 +31,25 @@ std::span<const Voxelizer> our_voxelizers() {
        .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",
        .options = hermesh_voxelizer_options(),
        .voxelize = hermesh_voxelizer},
+      {.name = "thesis",
+       .summary = "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
+       .options = {{.name = "sign_angle",
+                    .fallback = "90",
+                    .help = "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
+                            "larger makes more outside",
+                    .minimum = 1e-6,
+                    .maximum = 180.0},
+                   {.name = "shuffle_seed",
+                    .fallback = "0",
+                    .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
+                    .maximum = 1e15}},
+       .voxelize =
+           [](const VoxelizationInput& input) {
+             ThesisVoxelizerOptions options;
+             options.sign_angle = input.options.number("sign_angle");
+             options.shuffle_seed = std::uint64_t(input.options.number("shuffle_seed"));
+             return thesis_voxelizer(input, options);
+           }},
   };
   return table;
 }

@@ -40,8 +40,10 @@ struct Pending {
 /// One leaf at a time; its buffers serve the next.
 class LeafWork {
  public:
-  LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids)
-      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), kernels_(kernels::chosen()) {}
+  /// `without`: triangles to leave out, ascending; may be null.
+  LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids,
+           const std::vector<std::uint32_t>* without = nullptr)
+      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(kernels::chosen()) {}
 
   /// False when no voxel is within reach.
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
@@ -52,7 +54,7 @@ class LeafWork {
     crossed = {};
     crossed_ = &crossed;
     gather(block);
-    if (triangles_ > kMany)
+    if (triangles_ > kMany && !without_)
       look_from_voxels();
     else
       for (const TriangleBins::Cluster& cluster : clusters_) add(cluster.triangles);
@@ -100,7 +102,10 @@ class LeafWork {
   void add(std::span<const std::uint32_t> triangles) {
     fetch(triangles, fetched_);
     const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
-    const unsigned there = (2u << (triangles.size() - 1)) - 1;
+    unsigned there = (2u << (triangles.size() - 1)) - 1;
+    if (without_)
+      for (std::size_t j = 0; j < triangles.size(); ++j)
+        if (std::binary_search(without_->begin(), without_->end(), triangles[j])) there &= ~(1u << j);
     for (unsigned bits = near.within_reach & there; bits; bits &= bits - 1) {
       const int j = __builtin_ctz(bits);
       pending_.add(fetched_, j, triangles[std::size_t(j)]);
@@ -196,6 +201,7 @@ class LeafWork {
   const TriangleBins& bins_;
   double reach_;
   bool ids_;
+  const std::vector<std::uint32_t>* without_;
   const Kernels& kernels_;
   kernels::LeafFrame frame_{};
   std::vector<TriangleBins::Cluster> clusters_;
@@ -261,6 +267,32 @@ Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach,
     });
   }
   return band;
+}
+
+std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(const IndexSoup& soup, const TriangleBins& bins,
+                                                         const Band& band, const std::vector<std::uint32_t>& blocks,
+                                                         const std::vector<std::uint32_t>& without, double reach,
+                                                         double voxel_size,
+                                                         std::vector<std::unique_ptr<LeafTriangles>>* nearest,
+                                                         RunContext& context) {
+  std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
+  if (nearest) nearest->resize(blocks.size());
+  tbb::enumerable_thread_specific<LeafWork> works(
+      [&] { return LeafWork(soup, bins, reach, nearest != nullptr, &without); });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 8), [&](const auto& range) {
+    LeafWork& work = works.local();
+    alignas(64) float values[512];
+    std::uint64_t active[8];
+    kernels::EdgeBits crossed;
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      context.check();
+      const BlockAt& at = band.blocks[blocks[i]];
+      if (!work.run(at, blocks[i], float(voxel_size), values, active, crossed)) continue;
+      leaves[i] = make_leaf(at, values, active);
+      if (nearest) (*nearest)[i] = nearest_triangles(work.distances());
+    }
+  });
+  return leaves;
 }
 
 }  // namespace hermesh

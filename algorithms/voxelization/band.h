@@ -31,4 +31,13 @@ struct Band {
 Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size, bool nearest,
                   RunContext& context);
 
+/// The leaves of some of the band's blocks once more, without some of the triangles (ascending numbers). Leaves that
+/// have no voxel left are null; `nearest` is filled if it is not null.
+std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(const IndexSoup& soup, const TriangleBins& bins,
+                                                         const Band& band, const std::vector<std::uint32_t>& blocks,
+                                                         const std::vector<std::uint32_t>& without, double reach,
+                                                         double voxel_size,
+                                                         std::vector<std::unique_ptr<LeafTriangles>>* nearest,
+                                                         RunContext& context);
+
 }  // namespace hermesh

@@ -8,8 +8,6 @@
 namespace hermesh {
 namespace {
 
-/// Voxels (y, z) of a word whose upper neighbour in y or z is in the same word.
-constexpr std::uint64_t kBelowTopY = 0x00FFFFFFFFFFFFFFull, kBelowTopZ = 0x7F7F7F7F7F7F7F7Full;
 constexpr std::uint64_t kBottomZ = 0x0101010101010101ull;
 
 /// Where one may step from each voxel of a block to its upper neighbour within the block.
@@ -83,21 +81,6 @@ void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& 
     components.push_back(reach_from_first(free, steps));
     for (std::size_t x = 0; x < 8; ++x) free[x] &= ~components.back()[x];
   }
-}
-
-/// The 64 voxels of one side: 0 lower, 1 upper. Bits in the order of the two other axes.
-std::uint64_t face(const VoxelBits& bits, int axis, int side) {
-  if (axis == 0) return bits[side ? 7 : 0];
-  std::uint64_t result = 0;
-  for (std::size_t x = 0; x < 8; ++x) {
-    if (axis == 1) {
-      result |= (bits[x] >> (side ? 56 : 0) & 255u) << (8 * x);
-    } else {
-      const std::uint64_t column = bits[x] >> (side ? 7 : 0) & kBottomZ;
-      result |= (column * 0x0102040810204080ull >> 56) << (8 * x);
-    }
-  }
-  return result;
 }
 
 class UnionFind {
@@ -263,6 +246,35 @@ class Hierarchy {
 };
 
 }  // namespace
+
+std::uint64_t face(const VoxelBits& bits, int axis, int side) {
+  if (axis == 0) return bits[side ? 7 : 0];
+  std::uint64_t result = 0;
+  for (std::size_t x = 0; x < 8; ++x) {
+    if (axis == 1) {
+      result |= (bits[x] >> (side ? 56 : 0) & 255u) << (8 * x);
+    } else {
+      const std::uint64_t column = bits[x] >> (side ? 7 : 0) & kBottomZ;
+      result |= (column * 0x0102040810204080ull >> 56) << (8 * x);
+    }
+  }
+  return result;
+}
+
+VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis) {
+  VoxelBits result;
+  for (std::size_t x = 0; x < 8; ++x) {
+    std::uint64_t next;
+    if (axis == 0)
+      next = x < 7 ? bits[x + 1] : upper[0];
+    else if (axis == 1)
+      next = bits[x] >> 8 | upper[x] << 56;
+    else
+      next = (bits[x] >> 1 & kBelowTopZ) | (upper[x] & kBottomZ) << 7;
+    result[x] = bits[x] ^ next;
+  }
+  return result;
+}
 
 Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed,
                      const RunContext& context) {

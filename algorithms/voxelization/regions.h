@@ -31,6 +31,15 @@ struct Regions {
   std::uint32_t count = 0;  ///< of regions; numbered in the order of their first component
 };
 
+/// Upper neighbours in y and z of voxels (y, z) that are in the same word of a block's bits.
+inline constexpr std::uint64_t kBelowTopY = 0x00FFFFFFFFFFFFFFull, kBelowTopZ = 0x7F7F7F7F7F7F7F7Full;
+
+/// The 64 voxels of one side of a block, 0 lower and 1 upper, as bits in the order of the two other axes.
+std::uint64_t face(const VoxelBits& bits, int axis, int side);
+
+/// Bits of the voxels whose upper neighbour along the axis (in `upper`, beyond the block) differs from them.
+VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis);
+
 /// `table` numbers the blocks, `crossed` has an entry for each. @throws Cancelled.
 Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed,
                      const RunContext& context);

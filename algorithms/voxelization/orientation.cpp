@@ -1,0 +1,278 @@
+#include "algorithms/voxelization/orientation.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+/// Share of the area beyond which faces that tell no side leave the whole mesh without one.
+constexpr double kMost = 0.5;
+/// An open sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
+constexpr double kNoVolume = 1e-6;
+
+/// Calls f for each range of equal items in a sorted sequence.
+template <class T, class Equal, class F>
+void for_groups(std::span<const T> items, Equal&& equal, F&& f) {
+  for (std::size_t begin = 0, end; begin < items.size(); begin = end) {
+    for (end = begin + 1; end < items.size() && equal(items[begin], items[end]);) ++end;
+    f(items.subspan(begin, end - begin));
+  }
+}
+
+/// The triangles with each point replaced by the lowest number of a point at the same position.
+std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
+                                   std::span<const Triangle> triangles) {
+  struct Place {
+    float x, y, z;
+    std::uint32_t point;
+  };
+  std::vector<Place> places(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    places[i] = {points[i][0], points[i][1], points[i][2], static_cast<std::uint32_t>(i)};
+  tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.x, a.y, a.z, a.point) < std::tie(b.x, b.y, b.z, b.point);
+  });
+  std::vector<std::uint32_t> first(points.size());
+  for_groups(
+      std::span<const Place>(places),
+      [](const Place& a, const Place& b) { return a.x == b.x && a.y == b.y && a.z == b.z; },
+      [&](std::span<const Place> same) {
+        for (const Place& place : same) first[place.point] = same[0].point;
+      });
+  std::vector<Triangle> merged(triangles.begin(), triangles.end());
+  for (Triangle& t : merged)
+    for (std::uint32_t& point : t) point = first[point];
+  return merged;
+}
+
+bool is_degenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+class Orienter {
+ public:
+  Orienter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
+      : points_(points), triangles_(merge_points(points, triangles)) {
+    result_.turns.assign(triangles_.size(), 1);
+  }
+
+  Orientation run() {
+    drop_duplicates();
+    measure();
+    if (area_ > 0) {
+      link_neighbours();
+      agree();
+    }
+    for (const std::int8_t turn : result_.turns) result_.flipped += turn < 0;
+    if (!(area_ > 0))
+      result_.verdict = Orientation::Verdict::no_area;
+    else if (cancelling_area_ > kMost * area_)
+      result_.verdict = Orientation::Verdict::cancelling;
+    else if (one_sided_area_ > kMost * area_)
+      result_.verdict = Orientation::Verdict::not_orientable;
+    return std::move(result_);
+  }
+
+ private:
+  static constexpr std::uint32_t kDisagrees = 1;
+
+  struct Edge {
+    std::uint32_t low, high;
+    std::uint32_t face_and_way;  ///< twice the face's number, plus 1 if it runs from high to low
+    bool operator<(const Edge& o) const {
+      return std::tie(low, high, face_and_way) < std::tie(o.low, o.high, o.face_and_way);
+    }
+  };
+  struct Patch {
+    std::size_t begin = 0, end = 0;  ///< in queue_
+    bool consistent = true, orientable = true, closed = true;
+    double given = 0.0, turned = 0.0;  ///< area that keeps the given winding, and that does not
+    double volume = 0.0;               ///< after the turns
+  };
+
+  Eigen::Vector3d corner(std::size_t face, int c) const {
+    return points_[triangles_[face][c]].cast<double>();
+  }
+  Eigen::Vector3d area_vector(std::size_t face) const {
+    const Eigen::Vector3d a = corner(face, 0);
+    return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
+  }
+
+  void drop_duplicates() {
+    struct Face {
+      Triangle points;  ///< sorted
+      std::uint32_t number;
+    };
+    std::vector<Face> faces(triangles_.size());
+    tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
+      faces[i] = {triangles_[i], static_cast<std::uint32_t>(i)};
+      std::sort(faces[i].points.begin(), faces[i].points.end());
+    });
+    tbb::parallel_sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) {
+      return std::tie(a.points, a.number) < std::tie(b.points, b.number);
+    });
+    for_groups(
+        std::span<const Face>(faces), [](const Face& a, const Face& b) { return a.points == b.points; },
+        [&](std::span<const Face> same) {
+          if (same.size() == 1 || is_degenerate(same[0].points)) return;
+          std::ptrdiff_t net = 0;
+          for (const Face& face : same) net += same_winding(triangles_[face.number], face.points) ? 1 : -1;
+          if (net == 0) cancelling_area_ += area_vector(same[0].number).norm();
+          for (const Face& face : same.subspan(1)) result_.turns[face.number] = 0;
+          result_.duplicates += same.size() - 1;
+        });
+  }
+
+  static bool same_winding(const Triangle& t, const Triangle& sorted) {
+    const std::size_t start = std::find(t.begin(), t.end(), sorted[0]) - t.begin();
+    return t[(start + 1) % 3] == sorted[1];
+  }
+
+  /// The area, and its centre, about which volumes are taken.
+  void measure() {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      if (result_.turns[face] == 0) continue;
+      const double area = area_vector(face).norm();
+      area_ += area;
+      sum += area / 3 * (corner(face, 0) + corner(face, 1) + corner(face, 2));
+    }
+    if (area_ > 0) centre_ = sum / area_;
+  }
+
+  void link_neighbours() {
+    std::vector<Edge> edges;
+    edges.reserve(3 * triangles_.size());
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      const Triangle& t = triangles_[face];
+      if (result_.turns[face] == 0 || is_degenerate(t)) continue;
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t from = t[k], to = t[(k + 1) % 3];
+        edges.push_back({std::min(from, to), std::max(from, to),
+                         static_cast<std::uint32_t>(2 * face + (from > to ? 1 : 0))});
+      }
+    }
+    tbb::parallel_sort(edges.begin(), edges.end());
+    neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
+    for_groups(
+        std::span<const Edge>(edges),
+        [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
+        [&](std::span<const Edge> same) {
+          if (same.size() == 1) ++result_.boundary_edges;
+          if (same.size() > 2) ++result_.non_manifold_edges;
+          if (same.size() == 2) link(same[0].face_and_way, same[1].face_and_way);
+        });
+  }
+
+  /// Two faces agree if they run along their edge in opposite ways.
+  void link(std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t disagrees = (a & 1) == (b & 1) ? kDisagrees : 0;
+    const auto add = [](std::array<std::uint32_t, 3>& list, std::uint32_t entry) {
+      *std::find(list.begin(), list.end(), kNone) = entry;
+    };
+    add(neighbours_[a >> 1], (b & ~1u) | disagrees);
+    add(neighbours_[b >> 1], (a & ~1u) | disagrees);
+  }
+
+  /// Turns patch by patch, each from its lowest face on.
+  void agree() {
+    std::vector<std::int8_t> turns(triangles_.size(), 0);  // 0: not met yet
+    std::vector<Patch> patches;
+    double given_volume = 0.0;
+    queue_.reserve(triangles_.size());
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      if (turns[face] != 0 || result_.turns[face] == 0 || is_degenerate(triangles_[face])) continue;
+      Patch patch = spread(static_cast<std::uint32_t>(face), turns);
+      if (patch.turned > patch.given) turn_over(patch, turns);
+      given_volume += patch.volume;
+      if (!follows_given(patch) && patch.volume < 0) turn_over(patch, turns);
+      patches.push_back(patch);
+    }
+    const bool inside_out = given_volume < -kNoVolume * std::pow(area_, 1.5);
+    for (Patch& patch : patches) {
+      if (inside_out && follows_given(patch)) turn_over(patch, turns);
+      result_.non_orientable_patches += !patch.orientable;
+      if (!patch.orientable) one_sided_area_ += patch.given + patch.turned;
+    }
+    result_.patches = patches.size();
+    for (const std::uint32_t face : queue_) result_.turns[face] = turns[face];
+  }
+
+  /// Walks over a patch breadth first and turns its faces to agree with its first.
+  Patch spread(std::uint32_t seed, std::vector<std::int8_t>& turns) {
+    Patch patch;
+    patch.begin = queue_.size();
+    turns[seed] = 1;
+    queue_.push_back(seed);
+    for (std::size_t at = patch.begin; at < queue_.size(); ++at) {
+      const std::uint32_t face = queue_[at];
+      const Eigen::Vector3d n = area_vector(face);
+      (turns[face] > 0 ? patch.given : patch.turned) += n.norm();
+      patch.volume += turns[face] * n.dot(corner(face, 0) - centre_) / 3;
+      for (const std::uint32_t entry : neighbours_[face]) {
+        if (entry == kNone) {
+          patch.closed = false;
+          continue;
+        }
+        const bool disagrees = entry & kDisagrees;
+        const auto turn = static_cast<std::int8_t>(disagrees ? -turns[face] : turns[face]);
+        if (disagrees) patch.consistent = false;
+        std::int8_t& known = turns[entry >> 1];
+        if (known == 0) queue_.push_back(entry >> 1);
+        if (known == -turn) patch.orientable = false;
+        if (known == 0) known = turn;
+      }
+    }
+    patch.end = queue_.size();
+    return patch;
+  }
+
+  /// Whether the winding is that of the file, and not that of the volume.
+  static bool follows_given(const Patch& patch) {
+    return patch.consistent || !patch.closed || !patch.orientable;
+  }
+  void turn_over(Patch& patch, std::vector<std::int8_t>& turns) const {
+    std::swap(patch.given, patch.turned);
+    patch.volume = -patch.volume;
+    for (std::size_t i = patch.begin; i < patch.end; ++i) turns[queue_[i]] = -turns[queue_[i]];
+  }
+
+  std::span<const Eigen::Vector3f> points_;
+  std::vector<Triangle> triangles_;  ///< of merged points
+  /// Per face its neighbours over edges of two faces: twice the number, plus kDisagrees.
+  std::vector<std::array<std::uint32_t, 3>> neighbours_;
+  std::vector<std::uint32_t> queue_;  ///< faces patch by patch
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  double area_ = 0.0, cancelling_area_ = 0.0, one_sided_area_ = 0.0;
+  Orientation result_;
+};
+
+}  // namespace
+
+Orientation orient_faces(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles) {
+  return Orienter(points, triangles).run();
+}
+
+const char* explanation(Orientation::Verdict verdict) {
+  switch (verdict) {
+    case Orientation::Verdict::usable:
+      break;
+    case Orientation::Verdict::no_area:
+      return "every polygon is degenerate, so there is no inside";
+    case Orientation::Verdict::cancelling:
+      return "most polygons are there with both windings and cancel, so there is no inside";
+    case Orientation::Verdict::not_orientable:
+      return "most of the surface has one side only, like a Möbius strip, so there is no inside";
+  }
+  return "";
+}
+
+}  // namespace hermesh

@@ -1,0 +1,252 @@
+#include "algorithms/voxelization/orientation.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+using Verdict = Orientation::Verdict;
+
+struct Soup {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<Triangle> triangles;
+
+  Orientation orient() const { return orient_faces(points, triangles); }
+  void add(const Soup& other) {
+    const auto shift = static_cast<std::uint32_t>(points.size());
+    points.insert(points.end(), other.points.begin(), other.points.end());
+    for (const Triangle& t : other.triangles) triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  }
+  void flip(std::size_t face) { std::swap(triangles[face][1], triangles[face][2]); }
+  void flip_all() {
+    for (std::size_t i = 0; i < triangles.size(); ++i) flip(i);
+  }
+};
+
+Soup cube(float half, const Eigen::Vector3f& centre = Eigen::Vector3f::Zero()) {
+  Soup box;
+  for (int i = 0; i < 8; ++i)
+    box.points.push_back(centre + half * Eigen::Vector3f(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
+  box.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                   {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return box;
+}
+
+/// Every triangle with points of its own.
+Soup unwelded(const Soup& soup) {
+  Soup result;
+  for (const Triangle& t : soup.triangles) {
+    const auto first = static_cast<std::uint32_t>(result.points.size());
+    for (const std::uint32_t p : t) result.points.push_back(soup.points[p]);
+    result.triangles.push_back({first, first + 1, first + 2});
+  }
+  return result;
+}
+
+/// A strip of quads around a circle that turns by as many half turns.
+Soup strip(int half_turns, int quads = 20) {
+  Soup soup;
+  for (int i = 0; i < quads; ++i) {
+    const double around = 2 * std::numbers::pi * i / quads, turn = half_turns * around / 2;
+    for (const double side : {-1.0, 1.0}) {
+      const double r = 5 + side * std::cos(turn);
+      soup.points.push_back(
+          Eigen::Vector3d(r * std::cos(around), r * std::sin(around), side * std::sin(turn)).cast<float>());
+    }
+  }
+  const bool crossed = half_turns % 2 != 0;
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(quads); ++i) {
+    const bool last = i + 1 == static_cast<std::uint32_t>(quads);
+    const std::uint32_t next = last ? 0 : 2 * i + 2, swap = last && crossed ? 1 : 0;
+    soup.triangles.push_back({2 * i, 2 * i + 1, next + (1 ^ swap)});
+    soup.triangles.push_back({2 * i, next + (1 ^ swap), next + swap});
+  }
+  return soup;
+}
+
+double volume(const Soup& soup, const std::vector<std::int8_t>& turns) {
+  double sum = 0;
+  for (std::size_t i = 0; i < soup.triangles.size(); ++i) {
+    const auto& [a, b, c] = soup.triangles[i];
+    Eigen::Matrix3d m;
+    m << soup.points[a].cast<double>(), soup.points[b].cast<double>(), soup.points[c].cast<double>();
+    sum += turns[i] * m.determinant() / 6;
+  }
+  return sum;
+}
+
+TEST(Orientation, LeavesAGoodMeshAlone) {
+  const Orientation found = cube(1).orient();
+  EXPECT_EQ(found.turns, std::vector<std::int8_t>(12, 1));
+  EXPECT_EQ(found.patches, 1u);
+  EXPECT_EQ(found.flipped + found.duplicates + found.boundary_edges + found.non_manifold_edges, 0u);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+  EXPECT_STREQ(explanation(found.verdict), "");
+}
+
+TEST(Orientation, TurnsAnInvertedMeshOver) {
+  Soup box = cube(1, {100, 0, 0});
+  box.flip_all();
+  const Orientation found = box.orient();
+  EXPECT_EQ(found.turns, std::vector<std::int8_t>(12, -1));
+  EXPECT_EQ(found.flipped, 12u);
+}
+
+TEST(Orientation, MakesRandomlyFlippedFacesAgree) {
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    Soup box = cube(1, {3, -20, 7});
+    std::size_t flips = 0;
+    for (std::size_t i = 0; i < 12; ++i)
+      if (random() % 2) box.flip(i), ++flips;
+    for (const Soup& soup : {box, unwelded(box)}) {
+      const Orientation found = soup.orient();
+      EXPECT_NEAR(volume(soup, found.turns), 8, 1e-4);
+      EXPECT_EQ(found.flipped, flips);
+      EXPECT_EQ(found.patches, 1u);
+      EXPECT_EQ(found.boundary_edges, 0u);
+    }
+  }
+}
+
+TEST(Orientation, KeepsNestedShellsAsTheyWereGiven) {
+  Soup shell = cube(3), hole = cube(1);
+  hole.flip_all();
+  shell.add(hole);
+  EXPECT_EQ(shell.orient().flipped, 0u);
+  EXPECT_EQ(shell.orient().patches, 2u);
+  shell.flip_all();
+  EXPECT_EQ(shell.orient().flipped, 24u);
+  EXPECT_NEAR(volume(shell, shell.orient().turns), 216 - 8, 1e-9);
+}
+
+TEST(Orientation, GivesOnlyRepairedPatchesTheirOrientationByVolume) {
+  Soup shell = cube(3), hole = cube(1);
+  hole.flip_all();
+  shell.flip(0);
+  shell.add(hole);
+  const Orientation found = shell.orient();
+  EXPECT_EQ(found.flipped, 1u);
+  EXPECT_EQ(found.turns[0], -1);
+  shell.flip_all();
+  EXPECT_EQ(shell.orient().flipped, 23u);
+  EXPECT_NEAR(volume(shell, shell.orient().turns), 216 - 8, 1e-9);
+}
+
+TEST(Orientation, IgnoresDuplicatesOfEitherWinding) {
+  Soup box = cube(1);
+  box.triangles.push_back({2, 3, 0});
+  box.triangles.push_back({4, 7, 5});
+  box.triangles.push_back({7, 5, 4});
+  const Orientation found = box.orient();
+  EXPECT_EQ(found.duplicates, 3u);
+  EXPECT_EQ(found.patches, 1u);
+  EXPECT_EQ(found.boundary_edges + found.non_manifold_edges, 0u);
+  EXPECT_NEAR(volume(box, found.turns), 8, 1e-12);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+}
+
+TEST(Orientation, TellsFacesThatCancel) {
+  Soup box = cube(1), other = cube(1);
+  other.flip_all();
+  box.add(other);
+  const Orientation found = box.orient();
+  EXPECT_EQ(found.duplicates, 12u);
+  EXPECT_EQ(found.verdict, Verdict::cancelling);
+  EXPECT_STRNE(explanation(found.verdict), "");
+}
+
+TEST(Orientation, TakesAMeshThatIsThereTwiceOnce) {
+  Soup box = cube(1);
+  box.add(cube(1));
+  const Orientation found = box.orient();
+  EXPECT_EQ(found.duplicates, 12u);
+  EXPECT_NEAR(volume(box, found.turns), 8, 1e-12);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+}
+
+TEST(Orientation, TellsAMoebiusStrip) {
+  const Orientation twisted = strip(1).orient();
+  EXPECT_EQ(twisted.non_orientable_patches, 1u);
+  EXPECT_EQ(twisted.patches, 1u);
+  EXPECT_EQ(twisted.boundary_edges, 40u);
+  EXPECT_EQ(twisted.verdict, Verdict::not_orientable);
+  EXPECT_EQ(strip(0).orient().verdict, Verdict::usable);
+  EXPECT_EQ(strip(2).orient().non_orientable_patches, 0u);
+  EXPECT_EQ(strip(3).orient().verdict, Verdict::not_orientable);
+}
+
+TEST(Orientation, SurvivesASmallMoebiusStripBesideALargeMesh) {
+  Soup soup = cube(30, {100, 0, 0});
+  soup.add(strip(1));
+  const Orientation found = soup.orient();
+  EXPECT_EQ(found.non_orientable_patches, 1u);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+}
+
+TEST(Orientation, TellsThatThereIsNoArea) {
+  const Soup line{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}, {0, 0, 1}, {1, 1, 1}}};
+  EXPECT_EQ(line.orient().verdict, Verdict::no_area);
+  EXPECT_EQ(Soup().orient().verdict, Verdict::no_area);
+}
+
+TEST(Orientation, OfAnOpenPatchFollowsTheLargerArea) {
+  Soup open = cube(1);
+  open.triangles.resize(10);
+  open.flip(3);
+  open.flip(5);
+  const Orientation most = open.orient();
+  EXPECT_EQ(most.flipped, 2u);
+  EXPECT_EQ(most.turns[3], -1);
+  EXPECT_EQ(most.turns[5], -1);
+  EXPECT_EQ(most.boundary_edges, 4u);
+  // Once most of the area is inside out, so is the volume, and all is turned over.
+  open.flip_all();
+  EXPECT_EQ(open.orient().flipped, 8u);
+}
+
+TEST(Orientation, LeavesAFlatSheetAlone) {
+  const Soup sheet{{{0, 0, 5}, {1, 0, 5}, {1, 1, 5}, {0, 1, 5}}, {{0, 2, 1}, {0, 3, 2}}};
+  EXPECT_EQ(sheet.orient().flipped, 0u);
+}
+
+TEST(Orientation, DoesNotJoinFacesOverEdgesOfMoreThanTwo) {
+  Soup fan;
+  fan.points = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}};
+  fan.triangles = {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}};
+  const Orientation found = fan.orient();
+  EXPECT_EQ(found.patches, 3u);
+  EXPECT_EQ(found.non_manifold_edges, 1u);
+  EXPECT_EQ(found.boundary_edges, 6u);
+  EXPECT_EQ(found.non_orientable_patches, 0u);
+}
+
+TEST(Orientation, IsTheSameForEveryNumberOfThreads) {
+  std::mt19937 random(2);
+  Soup soup;
+  for (int i = 0; i < 3000; ++i) {
+    Soup box = cube(1, {static_cast<float>(2 * (i % 60)), static_cast<float>(2 * (i / 60)), 0});
+    for (std::size_t k = 0; k < 12; ++k)
+      if (random() % 4 == 0) box.flip(k);
+    soup.add(box);
+  }
+  std::vector<Orientation> found;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    found.push_back(soup.orient());
+    EXPECT_EQ(found[0].turns, found.back().turns);
+    EXPECT_EQ(found[0].patches, found.back().patches);
+  }
+  EXPECT_GT(found[0].duplicates, 0u);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,56 @@
+// What the nearest triangle knows of each voxel's closest point: where it is, and the mesh's attributes
+// there. Heavy (OpenVDB): include it from .cpp files.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+struct TransferRequest {
+  bool closest_point = false;
+  std::vector<const MeshAttribute*> attributes;
+};
+
+/// Point of a triangle.
+struct TrianglePoint {
+  Eigen::Vector3d position;
+  Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
+};
+
+/// The one nearest to p; of a degenerate triangle that of its segments, or the point that it is.
+TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                            const Eigen::Vector3d& c);
+
+/// Grids over the voxels of `nearest` (the triangle of each, as triangulated() numbers them; voxels that have
+/// none, −1, stay inactive), in the order of the request and with its transform, which is the voxel size and
+/// the mesh's origin:
+///
+/// - "closest-point": world coordinates in double precision, computed relative to the mesh's origin, so that
+/// far from
+///   the origin as little is lost as the mesh lost.
+/// - Each attribute under its name ("attribute-NAME" where an output of the voxelizer is called NAME): floats
+/// of points
+///   and corners with the closest point's barycentric weights, whole numbers from the corner with the largest
+///   weight, those of polygons as they are. One component becomes a float or int32 grid, two a vec3s grid
+///   whose z is 0, three a vec3s grid, and four a vec3s grid and a float grid "NAME-alpha". Normals (3
+///   components, name "normal" or ending in
+///   "-normal") get unit length; where they cancel out, the triangle's own is taken. Labels are kept as
+///   metadata "label_0", ….
+///
+/// Backgrounds are 0, and −1 for whole numbers. The same bytes at any thread count.
+/// @throws Error for an attribute whose values are not finite or not as many as the mesh has elements;
+/// Cancelled.
+std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mesh,
+                                                          const openvdb::Int32Grid& nearest,
+                                                          double voxel_size, const TransferRequest& request,
+                                                          RunContext& context);
+
+/// Bytes a voxel of the attribute's grids.
+std::size_t bytes_per_voxel(const MeshAttribute& attribute);
+
+}  // namespace hermesh

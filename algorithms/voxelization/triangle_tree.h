@@ -1,0 +1,95 @@
+// Bounding volume hierarchy over a triangle soup: a packed R-tree along the Hilbert curve (Kamel & Faloutsos,
+// Hilbert R-tree: An Improved R-tree Using Fractals, VLDB 1994).
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+
+namespace hermesh {
+
+/// What a nearest-triangle query found.
+struct NearestTriangle {
+  double squared;          ///< squared distance in voxels², the given bound if nothing is within it
+  std::uint32_t triangle;  ///< its number, TriangleTree::kNone if nothing is within the bound
+};
+
+/// Triangles are sorted along the Hilbert curve through the centres of their boxes; every eight consecutive
+/// ones make a leaf, and every four consecutive boxes of a level make a box of the level above. So there are
+/// no links, and the tree is the same for every number of threads. Points, and with them boxes, are single
+/// precision in the caller's units; index space is point * scale, rounded once to double precision, so that
+/// a scaled box holds its scaled points without any slack.
+///
+/// Refers to the caller's arrays, which have to outlive it. About 8 bytes a triangle, and while it is built
+/// about 16 more.
+class TriangleTree {
+ public:
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t kLeafSize = 8, kFan = 4;
+
+  /// Four sibling boxes in the caller's units. Those past the end of a level are empty: lower > upper.
+  struct BoxPack {
+    float lower[3][kFan], upper[3][kFan];
+  };
+  /// A box by its number (pack * kFan + lane) and its level; boxes of level 0 are the leaves.
+  struct BoxRef {
+    std::uint32_t box, level;
+  };
+
+  /// @param scale voxels per unit of the points, positive. Points have to be finite; fewer than 2^32 − 1
+  /// triangles.
+  TriangleTree(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles, double scale);
+
+  /// The triangle nearest to p, in index space, that is no farther than the bound; the lowest number where
+  /// several are equally near. The distance is that to the triangles with each corner moved by a few units in
+  /// the last place of the longest side, whatever their shape: slivers, segments and points are triangles
+  /// too.
+  NearestTriangle nearest(const Eigen::Vector3d& p,
+                          double upper_bound_squared = std::numeric_limits<double>::infinity()) const;
+
+  double scale() const { return scale_; }
+  std::size_t triangle_count() const { return triangles_.size(); }
+  std::size_t byte_size() const {
+    return packs_.size() * sizeof(BoxPack) + order_.size() * sizeof(std::uint32_t);
+  }
+  /// Corner of a triangle in index space.
+  Eigen::Vector3d corner(std::uint32_t triangle, int c) const {
+    return points_[triangles_[triangle][c]].cast<double>() * scale_;
+  }
+
+  // What other hierarchical methods walk over.
+  std::span<const BoxPack> packs() const { return packs_; }
+  std::size_t level_count() const { return first_.size(); }
+  /// First pack of a level; the packs of a level are consecutive, level 0 first, the root's pack last.
+  std::size_t first_pack(std::size_t level) const { return first_[level]; }
+  /// The pack that holds the children of a box above level 0.
+  std::size_t child_pack(BoxRef ref) const {
+    return first_[ref.level - 1] + (ref.box - first_[ref.level] * kFan);
+  }
+  /// Numbers of the triangles in a leaf; none for one past the end.
+  std::span<const std::uint32_t> leaf(std::size_t box) const {
+    const std::size_t first = std::min(box * kLeafSize, order_.size());
+    return {order_.data() + first, std::min(kLeafSize, order_.size() - first)};
+  }
+
+ private:
+  void build_boxes();
+
+  std::span<const Eigen::Vector3f> points_;
+  std::span<const Triangle> triangles_;
+  double scale_;
+  std::vector<std::uint32_t> order_;  ///< triangle numbers along the curve
+  std::vector<BoxPack> packs_;
+  std::vector<std::size_t> first_;
+};
+
+/// Squared distance from p to the triangle abc, which may be degenerate.
+double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                        const Eigen::Vector3d& c);
+
+}  // namespace hermesh
