@@ -17,8 +17,10 @@ using Eigen::Vector3d;
 
 /// How far off a side the way to a voxel starts, in voxels: beyond rounding and beyond doubled faces.
 constexpr double kOff = 1e-3;
-/// Size of the pieces along a seam, and of those that four places stand for, in voxels.
-constexpr double kFine = 0.1, kCoarse = 1.0;
+/// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that four places
+/// can stand for.
+constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
+constexpr std::size_t kKept = 4;  ///< neighbourhoods that a thread keeps
 
 struct Piece {
   Vector3d corner[3];
@@ -69,6 +71,7 @@ using Voxel = std::array<std::int32_t, 3>;
 /// The triangles of one block of cells, by cell.
 struct Neighbourhood {
   std::vector<Piece> pieces;
+  std::vector<std::array<Vector3d, 2>> boxes;                 ///< of the pieces
   std::array<std::vector<std::uint32_t>, 512> cells;  ///< numbers of those that touch the cell up from each voxel
 
   Neighbourhood(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& block) {
@@ -79,6 +82,18 @@ struct Neighbourhood {
     });
     if (const std::uint32_t i = bins.blocks().find(block); i != BlockTable::kNone)
       for (const std::uint32_t t : bins.large(i)) add(piece_of(soup.corners(t)), block);
+  }
+
+  /// Whether a triangle of the cell is in the way.
+  bool blocked(const Vector3d& from, const Vector3d& to, unsigned cell) const {
+    const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
+    for (const std::uint32_t i : cells[cell]) {
+      const auto& [box_low, box_high] = boxes[i];
+      if (low[0] <= box_high[0] && low[1] <= box_high[1] && low[2] <= box_high[2] && high[0] >= box_low[0] &&
+          high[1] >= box_low[1] && high[2] >= box_low[2] && meeting(from, to, pieces[i]) >= 0)
+        return true;
+    }
+    return false;
   }
 
  private:
@@ -93,11 +108,18 @@ struct Neighbourhood {
     }
     const std::uint32_t number = std::uint32_t(pieces.size());
     pieces.push_back(piece);
+    const Vector3d margin = Vector3d::Constant(1e-6);
+    boxes.push_back({piece.corner[0].cwiseMin(piece.corner[1]).cwiseMin(piece.corner[2]) - margin,
+                     piece.corner[0].cwiseMax(piece.corner[1]).cwiseMax(piece.corner[2]) + margin});
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
         for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
   }
 };
+
+/// What is certain about a place of the surface, or just off it: the outside is next to it, only the inside is, or
+/// neither can be told, as in a crevice narrower than a voxel.
+enum class Side { outer, inner, unknown };
 
 /// Asks what is where; each thread has its own.
 class Prober {
@@ -106,9 +128,12 @@ class Prober {
          const std::vector<VoxelBits>& suspicious)
       : soup_(soup), bins_(bins), inside_(inside), suspicious_(suspicious), finder_(bins.blocks()) {}
 
-  /// Whether the solid is certainly on both sides of the surface at q with this unit normal.
-  bool inner(const Vector3d& q, const Vector3d& normal) {
-    return sees_inside(q + kOff * normal) && sees_inside(q - kOff * normal);
+  /// Whether the solid is on both sides of the surface at q with this unit normal.
+  Side side(const Vector3d& q, const Vector3d& normal) {
+    const Side above = seen_from(q + kOff * normal);
+    if (above == Side::outer) return above;
+    const Side below = seen_from(q - kOff * normal);
+    return below == Side::inner ? above : below;
   }
 
   /// How many sheets cross the grid edge up from a voxel; doubled faces count once.
@@ -148,7 +173,6 @@ class Prober {
     if (last_ && block == last_block_) return *last_;
     auto known = blocks_.find(block);
     if (known == blocks_.end()) {
-      constexpr std::size_t kKept = 16;
       if (blocks_.size() >= kKept) blocks_.clear();
       known = blocks_.emplace(block, std::make_unique<Neighbourhood>(soup_, bins_, block)).first;
     }
@@ -165,24 +189,21 @@ class Prober {
     return int(bits[block][place >> 6] >> (place & 63) & 1);
   }
 
-  bool sees_inside(const Vector3d& p) {
+  Side seen_from(const Vector3d& p) {
     Voxel lower;
     for (int a = 0; a < 3; ++a) lower[std::size_t(a)] = std::int32_t(std::floor(p[a]));
     const Neighbourhood& triangles = around(lower);
-    const std::vector<std::uint32_t>& near = triangles.cells[place_in_tile(lower)];
     bool inside_seen = false;
     for (int i = 0; i < 8; ++i) {
       const Voxel voxel{lower[0] + (i >> 2), lower[1] + (i >> 1 & 1), lower[2] + (i & 1)};
       const int inside = bit_of(inside_, voxel);
       if (inside == 2 || (inside == 1 && inside_seen)) continue;
       const Vector3d to(voxel[0], voxel[1], voxel[2]);
-      if (std::any_of(near.begin(), near.end(),
-                      [&](std::uint32_t t) { return meeting(p, to, triangles.pieces[t]) >= 0; }))
-        continue;
-      if (inside == 0) return false;  // out in the open
+      if (triangles.blocked(p, to, place_in_tile(lower))) continue;
+      if (inside == 0) return Side::outer;
       inside_seen = true;
     }
-    return inside_seen;
+    return inside_seen ? Side::inner : Side::unknown;
   }
 
   const IndexSoup& soup_;
@@ -214,17 +235,19 @@ void cut(const Piece& piece, const Vector3d& normal, Prober& prober, Remains& re
     for (const Piece& half : piece.halves()) cut(half, normal, prober, remains);
     return;
   }
-  int inner = prober.inner(centroid, normal) ? 1 : 0, asked = 1;
+  std::array<int, 3> places{};  // by Side
+  ++places[std::size_t(prober.side(centroid, normal))];
   if (size > kFine)
-    for (; asked < 4; ++asked)
-      inner += prober.inner(0.98 * piece.corner[asked - 1] + 0.02 * centroid, normal) ? 1 : 0;
-  if (inner == 0) {
-    remains.outer.push_back(piece);
-  } else if (inner == asked) {
-    remains.some_inner = true;
-  } else {
+    for (const Vector3d& corner : piece.corner)
+      ++places[std::size_t(prober.side(0.98 * corner + 0.02 * centroid, normal))];
+  const auto [outer, inner, unknown] = places;
+  const bool seam = inner > 0 && (outer > 0 || (unknown > 0 && size > kMiddle));
+  if (seam && size > kFine)
     for (const Piece& half : piece.halves()) cut(half, normal, prober, remains);
-  }
+  else if (inner > unknown)
+    remains.some_inner = true;
+  else
+    remains.outer.push_back(piece);
 }
 
 class Finder {

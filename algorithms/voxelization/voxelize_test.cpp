@@ -1,0 +1,422 @@
+#include "algorithms/voxelization/voxelize.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/ValueTransformer.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <numbers>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/voxelization/kernels/kernels.h"
+#include "algorithms/voxelization/triangle_tree.h"
+#include "algorithms/voxelization/winding_number.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+void add_triangle(PolygonMesh& mesh, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const std::uint32_t n = std::uint32_t(mesh.points.size());
+  for (const Vector3d& p : {a, b, c}) mesh.points.push_back(p.cast<float>());
+  mesh.triangles.push_back({n, n + 1, n + 2});
+}
+
+/// Sphere of latitudes and longitudes, the faces outwards.
+PolygonMesh sphere(const Vector3d& centre, double radius, int n = 24) {
+  PolygonMesh mesh;
+  const auto at = [&](int i, int j) {
+    const double theta = std::numbers::pi * i / n, phi = std::numbers::pi * (j % (2 * n)) / n;
+    // Both poles exactly on the axis, so that the mesh is closed.
+    const double r = i == 0 || i == n ? 0.0 : std::sin(theta);
+    return Vector3d(centre + radius * Vector3d(r * std::cos(phi), r * std::sin(phi), i == n ? -1.0 : std::cos(theta)));
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < 2 * n; ++j) {
+      if (i > 0) add_triangle(mesh, at(i, j), at(i + 1, j), at(i, j + 1));
+      if (i < n - 1) add_triangle(mesh, at(i, j + 1), at(i + 1, j), at(i + 1, j + 1));
+    }
+  return mesh;
+}
+
+PolygonMesh box(const Vector3d& low, const Vector3d& high) {
+  PolygonMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.points.push_back(
+        Vector3d(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()).cast<float>());
+  mesh.quads = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  return mesh;
+}
+
+void append(PolygonMesh& mesh, const PolygonMesh& other, bool turned = false) {
+  const std::uint32_t n = std::uint32_t(mesh.points.size());
+  mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());
+  for (const Triangle& t : triangulated(other))
+    mesh.triangles.push_back(turned ? Triangle{t[0] + n, t[2] + n, t[1] + n} : Triangle{t[0] + n, t[1] + n, t[2] + n});
+}
+
+Voxelization run(const PolygonMesh& mesh, VoxelizeOptions options = {}) {
+  RunContext context;
+  return voxelize(mesh, options, context);
+}
+
+double at(const Voxelization& v, int x, int y, int z) { return v.distance->tree().getValue(openvdb::Coord(x, y, z)); }
+
+struct Errors {
+  double worst = 0;        ///< of a magnitude, voxels
+  std::size_t active = 0;  ///< voxels whose state is wrong by more than the tolerance
+  std::size_t checked = 0;
+};
+
+/// Every voxel of the box against the tree: exact in double precision, and independent of blocks and vector code.
+Errors compare(const PolygonMesh& mesh, const Voxelization& v, double voxel_size, double band, int margin) {
+  const std::vector<Triangle> triangles = triangulated(mesh);
+  const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
+  const Bounds bounds = hermesh::bounds(mesh);
+  Errors errors;
+  const auto accessor = v.distance->getConstAccessor();
+  Eigen::Vector3i low, high;
+  for (int a = 0; a < 3; ++a) {
+    low[a] = int(std::floor((bounds.lower[a] - mesh.origin[a]) / voxel_size)) - margin;
+    high[a] = int(std::ceil((bounds.upper[a] - mesh.origin[a]) / voxel_size)) + margin;
+  }
+  for (int x = low[0]; x <= high[0]; ++x)
+    for (int y = low[1]; y <= high[1]; ++y)
+      for (int z = low[2]; z <= high[2]; ++z) {
+        const double truth = std::sqrt(tree.nearest(Vector3d(x, y, z)).squared);
+        float value;
+        const bool on = accessor.probeValue({x, y, z}, value);
+        ++errors.checked;
+        if (on) errors.worst = std::max(errors.worst, std::abs(std::abs(value) / voxel_size - truth));
+        errors.active += on ? truth > band + 1e-4 : truth < band - 1e-4;
+      }
+  return errors;
+}
+
+TEST(Voxelize, BoxByHand) {
+  // Faces at ±10, so that distances are whole numbers.
+  const Voxelization v = run(box({-10, -10, -10}, {10, 10, 10}));
+  EXPECT_EQ(v.distance->getName(), "sdf");
+  EXPECT_TRUE(v.is_signed);
+  EXPECT_FLOAT_EQ(at(v, 12, 0, 0), 2.0f);
+  EXPECT_FLOAT_EQ(at(v, 8, 0, 0), -2.0f);
+  EXPECT_FLOAT_EQ(at(v, 10, 3, 3), 0.0f);
+  EXPECT_NEAR(at(v, 11, 11, 0), std::sqrt(2.0), 1e-6);
+  EXPECT_NEAR(at(v, 11, 11, 11), std::sqrt(3.0), 1e-6);
+  EXPECT_FLOAT_EQ(at(v, 0, 0, 0), -3.0f) << "the inside beyond the band";
+  EXPECT_FLOAT_EQ(at(v, 20, 0, 0), 3.0f);
+  EXPECT_FALSE(v.distance->tree().isValueOn({13, 0, 0})) << "at the width, not below it";
+  EXPECT_TRUE(v.distance->tree().isValueOn({12, 0, 0}));
+}
+
+TEST(Voxelize, ExactOnSpheresOfAnySize) {
+  for (const double radius : {0.01, 0.7, 5.0, 23.0})
+    for (const double band : {1.0, 3.0, 5.5}) {
+      const PolygonMesh mesh = sphere({0.3, -0.2, 0.1}, radius);
+      const Voxelization v = run(mesh, {.exterior_band = band, .interior_band = band});
+      const Errors errors = compare(mesh, v, 1.0, band, int(band) + 3);
+      EXPECT_LT(errors.worst, 1e-5) << radius << ' ' << band;
+      EXPECT_EQ(errors.active, 0u) << radius << ' ' << band;
+    }
+}
+
+TEST(Voxelize, ManySmallTrianglesAreExact) {
+  // 80,000 triangles over some 300 voxels of surface, where voxels look for triangles.
+  const PolygonMesh mesh = sphere({0, 0, 0}, 5.0, 140);
+  const Voxelization v = run(mesh, {.nearest = true});
+  const Errors errors = compare(mesh, v, 1.0, 3.0, 6);
+  EXPECT_LT(errors.worst, 1e-5);
+  EXPECT_EQ(errors.active, 0u);
+  for (auto voxel = v.nearest->cbeginValueOn(); voxel; ++voxel) {
+    const Triangle t = mesh.triangles.at(std::size_t(*voxel));
+    const openvdb::Coord c = voxel.getCoord();
+    const double d = std::sqrt(squared_distance({double(c.x()), double(c.y()), double(c.z())},
+                                                mesh.points[t[0]].cast<double>(), mesh.points[t[1]].cast<double>(),
+                                                mesh.points[t[2]].cast<double>()));
+    ASSERT_NEAR(d, std::abs(v.distance->tree().getValue(c)), 1e-5);
+  }
+}
+
+TEST(Voxelize, BandsOfDifferentWidths) {
+  const Voxelization v =
+      run(sphere({0, 0, 0}, 20.0, 48), {.voxel_size = 1.0, .exterior_band = 1.5, .interior_band = 6.0});
+  EXPECT_FLOAT_EQ(v.distance->background(), 1.5f);
+  EXPECT_TRUE(v.distance->tree().isValueOn({15, 0, 0}));
+  EXPECT_NEAR(at(v, 15, 0, 0), -5.0, 0.05);
+  EXPECT_FALSE(v.distance->tree().isValueOn({22, 0, 0}));
+  EXPECT_FLOAT_EQ(at(v, 22, 0, 0), 1.5f);
+  EXPECT_FLOAT_EQ(at(v, 0, 0, 0), -6.0f);
+}
+
+TEST(Voxelize, FarFromTheOrigin) {
+  PolygonMesh mesh = sphere({0, 0, 0}, 0.5);
+  mesh.origin = Vector3d(1e6, -1e6, 1e6);
+  const Voxelization v = run(mesh, {.voxel_size = 0.02});
+  const Errors errors = compare(mesh, v, 0.02, 3.0, 6);
+  EXPECT_LT(errors.worst, 1e-5);
+  const openvdb::Vec3d world = v.distance->transform().indexToWorld(openvdb::Vec3d(0, 0, 0));
+  EXPECT_EQ(world, openvdb::Vec3d(1e6, -1e6, 1e6));
+}
+
+TEST(Voxelize, TurnedDoubledAndShuffledFacesChangeNothing) {
+  PolygonMesh mesh = sphere({0.1, 0.2, 0.3}, 12.0);
+  const Voxelization plain = run(mesh);
+  std::mt19937 random(7);
+  PolygonMesh dirty = mesh;
+  dirty.triangles.insert(dirty.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+  for (Triangle& t : dirty.triangles)
+    if (random() % 2) std::swap(t[1], t[2]);
+  std::shuffle(dirty.triangles.begin(), dirty.triangles.end(), random);
+  const Voxelization v = run(dirty);
+  std::size_t different = 0;
+  for (auto voxel = plain.distance->cbeginValueAll(); voxel; ++voxel)
+    different += std::abs(*voxel - v.distance->tree().getValue(voxel.getCoord())) > 1e-5f ? 1 : 0;
+  EXPECT_EQ(different, 0u);
+  EXPECT_EQ(plain.distance->activeVoxelCount(), v.distance->activeVoxelCount());
+}
+
+TEST(Voxelize, UnionOfOverlappingSpheres) {
+  // Every triangle twice, in random orientation; the truth is analytic but for the facets.
+  const double radius = 20.0, apart = 12.0;
+  PolygonMesh mesh;
+  append(mesh, sphere({-apart, 0, 0}, radius, 64));
+  append(mesh, sphere({apart, 0, 0}, radius, 64), true);
+  std::vector<Triangle> twice = mesh.triangles;
+  std::mt19937 random(11);
+  for (Triangle& t : twice)
+    if (random() % 2) std::swap(t[1], t[2]);
+  mesh.triangles.insert(mesh.triangles.end(), twice.begin(), twice.end());
+  const Voxelization v = run(mesh);
+  std::size_t wrong_signs = 0, stray = 0;
+  double worst = 0;
+  for (auto voxel = v.distance->cbeginValueOn(); voxel; ++voxel) {
+    const openvdb::Coord c = voxel.getCoord();
+    const double x = std::abs(c.x()), rho = std::hypot(double(c.y()), double(c.z()));
+    const double outside = std::hypot(x - apart, rho) - radius;
+    // Inside, the nearest place is on the sphere of this half space, or on the circle where the spheres meet.
+    const double seam = std::hypot(x, rho - std::sqrt(radius * radius - apart * apart));
+    const bool sphere_is_nearest = std::hypot(x - apart, rho) > 0 && x * radius >= apart * (radius - std::hypot(x - apart, rho));
+    const double truth = outside > 0 ? outside : -(sphere_is_nearest ? -outside : seam);
+    wrong_signs += std::abs(truth) > 0.05 && (truth < 0) != (*voxel < 0) ? 1 : 0;
+    stray += truth < -3.2 ? 1 : 0;
+    worst = std::max(worst, std::abs(*voxel - truth));
+  }
+  EXPECT_EQ(wrong_signs, 0u);
+  EXPECT_EQ(stray, 0u);
+  EXPECT_LT(worst, 0.15) << "facets are 0.03 off the spheres, and seams may be 0.1 off";
+}
+
+TEST(Voxelize, NestedShellsAreFilledOrKept) {
+  PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
+  append(mesh, sphere({0, 0, 0}, 10.0), true);
+  const Voxelization filled = run(mesh, {.signs = SignRule::flood_fill});
+  EXPECT_FLOAT_EQ(at(filled, 0, 0, 0), -3.0f);
+  EXPECT_FALSE(filled.distance->tree().isValueOn({10, 0, 0})) << "the wall of a filled cavity bounds nothing";
+  const Voxelization kept = run(mesh, {.signs = SignRule::winding_number});
+  EXPECT_FLOAT_EQ(at(kept, 0, 0, 0), 3.0f);
+  EXPECT_LT(at(kept, 12, 0, 0), 0.0);
+  EXPECT_GT(at(kept, 8, 0, 0), 0.0);
+}
+
+/// A sphere without its cap above z = `cut`.
+PolygonMesh opened(double radius, double cut) {
+  PolygonMesh mesh = sphere({0, 0, 0}, radius, 48);
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    return mesh.points[t[0]].z() > cut && mesh.points[t[1]].z() > cut && mesh.points[t[2]].z() > cut;
+  });
+  return mesh;
+}
+
+TEST(Voxelize, AutomaticSignsCloseAHole) {
+  const PolygonMesh mesh = opened(20.0, 15.0);
+  RunContext context;
+  const Voxelization v = voxelize(mesh, {}, context);
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_NE(context.notes[0].find("leaks"), std::string::npos);
+  EXPECT_FLOAT_EQ(at(v, 0, 0, 0), -3.0f);
+  EXPECT_FLOAT_EQ(at(v, 0, 0, 24), 3.0f);
+  // Signs as the exact winding number has them, and a surface across the hole with a band around it.
+  for (int z = 8; z < 22; ++z)
+    for (int x = -6; x < 6; ++x) {
+      const double w = exact_winding_number(mesh.points, mesh.triangles, 1.0, Vector3d(x, 1, z));
+      if (std::abs(w - 0.5) > 0.02) {
+        EXPECT_EQ(at(v, x, 1, z) < 0, w > 0.5) << x << ' ' << z << ' ' << w;
+      }
+      if (at(v, x, 1, z) < 0 && at(v, x, 1, z + 1) > 0) {
+        EXPECT_LT(at(v, x, 1, z + 1) - at(v, x, 1, z), 1.6);
+      }
+    }
+}
+
+TEST(Voxelize, FloodFillStaysAFloodFillWhenAsked) {
+  RunContext context;
+  const Voxelization v = voxelize(opened(20.0, 15.0), {.signs = SignRule::flood_fill}, context);
+  EXPECT_GT(at(v, 0, 0, 0), 0.0) << "the outside gets in through the hole";
+}
+
+TEST(Voxelize, AThinPlateIsNoLeak) {
+  RunContext context;
+  const Voxelization v = voxelize(box({-20, -20, 0.4}, {20, 20, 0.6}), {}, context);
+  EXPECT_TRUE(v.is_signed);
+  EXPECT_EQ(context.notes.size(), 0u) << context.notes[0];
+  EXPECT_NEAR(at(v, 0, 0, 0), 0.4, 1e-6);
+}
+
+TEST(Voxelize, WithoutAnInsideThereIsNoSign) {
+  PolygonMesh strip;  // Möbius
+  constexpr int n = 60;
+  for (int i = 0; i < n; ++i) {
+    const double phi = 2 * std::numbers::pi * i / n;
+    for (const double s : {-4.0, 4.0})
+      strip.points.push_back(Vector3d((15 + s * std::cos(phi / 2)) * std::cos(phi),
+                                      (15 + s * std::cos(phi / 2)) * std::sin(phi), s * std::sin(phi / 2))
+                                 .cast<float>());
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t a = 2 * i, b = a + 1;
+    const std::uint32_t c = i + 1 < n ? a + 2 : 1, d = i + 1 < n ? a + 3 : 0;
+    strip.triangles.push_back({a, b, c});
+    strip.triangles.push_back({c, b, d});
+  }
+  RunContext context;
+  const Voxelization v = voxelize(strip, {}, context);
+  EXPECT_FALSE(v.is_signed);
+  EXPECT_EQ(v.distance->getName(), "udf");
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_LT(compare(strip, v, 1.0, 3.0, 5).worst, 1e-5);
+}
+
+// ---- Random soups: slivers, coincident and degenerate faces, needles, points, far from the origin.
+
+class Soups {
+ public:
+  explicit Soups(std::uint64_t seed) : random_(seed) {}
+
+  PolygonMesh next() {
+    PolygonMesh mesh;
+    const int kind = int(random_() % 8), n = 1 + int(random_() % 24);
+    for (int i = 0; i < n; ++i) {
+      const Vector3d a = point(12), b = kind == 3 ? a : Vector3d(a + point(kind == 5 ? 60 : 6));
+      Vector3d c = a + point(6);
+      if (kind == 1) c = 0.5 * (a + b) + 1e-4 * point(1);           // slivers
+      if (kind == 2) c = a + 0.3 * (b - a);                         // segments
+      if (kind == 3) c = a;                                         // points
+      if (kind == 4) c = a + 1e-6 * point(1);                       // needles
+      if (kind == 6) {
+        for (const Vector3d& v : {a, b, c}) add_whole(mesh, v);  // corners on voxels
+      }
+      if (kind != 6) add_triangle(mesh, a, b, c);
+      if (kind == 7) add_triangle(mesh, a, c, b);                   // coincident
+    }
+    if (kind == 6) {
+      mesh.triangles.clear();
+      for (std::uint32_t i = 0; i + 2 < mesh.points.size(); i += 3) mesh.triangles.push_back({i, i + 1, i + 2});
+    }
+    if (random_() % 4 == 0) mesh.origin = Vector3d(1e7, -3e8, 12345.678);
+    return mesh;
+  }
+  double band() { return std::array{1.0, 1.5, 3.0, 4.25}[random_() % 4]; }
+  double voxel_size() { return std::array{1.0, 0.37, 2.9}[random_() % 3]; }
+
+ private:
+  Vector3d point(double size) {
+    std::uniform_real_distribution<double> uniform(-size, size);
+    const double x = uniform(random_), y = uniform(random_);
+    return {x, y, uniform(random_)};
+  }
+  static void add_whole(PolygonMesh& mesh, const Vector3d& v) { mesh.points.push_back(v.array().round().matrix().cast<float>()); }
+  std::mt19937_64 random_;
+};
+
+TEST(Voxelize, TwoThousandSoupsAreExact) {
+  Soups soups(20111);
+  std::size_t checked = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const PolygonMesh mesh = soups.next();
+    const double band = soups.band(), voxel_size = soups.voxel_size();
+    const Voxelization v =
+        run(mesh, {.voxel_size = voxel_size, .exterior_band = band, .interior_band = band, .signs = SignRule::none});
+    // A random sample of the box, or the whole of it where it is small, keeps this to seconds.
+    const std::vector<Triangle> triangles = triangulated(mesh);
+    const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
+    const auto accessor = v.distance->getConstAccessor();
+    std::size_t looked = 0;
+    for (auto voxel = v.distance->cbeginValueAll(); voxel && looked < 60000; ++voxel) {
+      if (!voxel.isVoxelValue()) continue;
+      if (++looked % 37 != std::size_t(i % 37)) continue;
+      const openvdb::Coord c = voxel.getCoord();
+      const double truth = std::sqrt(tree.nearest(Vector3d(c.x(), c.y(), c.z())).squared);
+      ++checked;
+      if (voxel.isValueOn()) {
+        ASSERT_NEAR(*voxel / voxel_size, truth, 1e-5) << "soup " << i << " at " << c;
+      } else {
+        ASSERT_GT(truth, band - 1e-4) << "soup " << i << " at " << c;
+      }
+    }
+    // And every leaf is there: around each corner the band is active.
+    for (const Triangle& t : triangles)
+      for (const std::uint32_t p : t) {
+        const Vector3d at = mesh.points[p].cast<double>() / voxel_size;
+        const openvdb::Coord c(int(std::lround(at.x())), int(std::lround(at.y())), int(std::lround(at.z())));
+        ASSERT_TRUE(accessor.isValueOn(c)) << "soup " << i;
+      }
+  }
+  EXPECT_GT(checked, 100000u);
+}
+
+// ---- The same bytes.
+
+std::vector<float> bytes_of(const PolygonMesh& mesh, SignRule signs) {
+  const Voxelization v = run(mesh, {.signs = signs});
+  std::vector<float> result;
+  for (auto leaf = v.distance->tree().cbeginLeaf(); leaf; ++leaf) {
+    for (int a = 0; a < 3; ++a) result.push_back(float(leaf->origin()[a]));
+    result.insert(result.end(), leaf->buffer().data(), leaf->buffer().data() + 512);
+  }
+  return result;
+}
+
+PolygonMesh mixed() {
+  PolygonMesh mesh = opened(18.0, 12.0);
+  append(mesh, sphere({12, 3, 1}, 4.0, 90));
+  append(mesh, box({-30, -2.3, -2.1}, {5, 2.2, 2.4}));
+  return mesh;
+}
+
+TEST(Voxelize, SameBytesAtAnyThreadCount) {
+  const PolygonMesh mesh = mixed();
+  const std::vector<float> reference = bytes_of(mesh, SignRule::automatic);
+  ASSERT_GT(reference.size(), 10000u);
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    EXPECT_TRUE(bytes_of(mesh, SignRule::automatic) == reference) << threads << " threads";
+  }
+}
+
+TEST(Voxelize, SameBytesAtAnyLevelOfVectorCode) {
+  const PolygonMesh mesh = mixed();
+  const std::vector<float> reference = bytes_of(mesh, SignRule::automatic);
+  for (const std::string& level : kernels::levels()) {
+    setenv("HERMESH_SIMD", level.c_str(), 1);
+    EXPECT_TRUE(bytes_of(mesh, SignRule::automatic) == reference) << level;
+  }
+  setenv("HERMESH_SIMD", "mmx", 1);
+  EXPECT_THROW(bytes_of(mesh, SignRule::automatic), Error);
+  unsetenv("HERMESH_SIMD");
+}
+
+TEST(Voxelize, CancelEndsIt) {
+  const std::atomic<bool> cancel = true;
+  RunContext context;
+  context.cancel = &cancel;
+  EXPECT_THROW(voxelize(sphere({0, 0, 0}, 30), {}, context), Cancelled);
+}
+
+}  // namespace
+}  // namespace hermesh
