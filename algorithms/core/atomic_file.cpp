@@ -83,10 +83,35 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::commit() {
   const std::lock_guard lock(unfinished().mutex);
+  rename();
+}
+
+void AtomicFile::rename() {
   if (::rename(temporary_.c_str(), target_.c_str()) != 0)
     throw Error("cannot write '" + target_.string() + "': " + std::strerror(errno));
   unfinished().paths.erase(temporary_.string());
   committed_ = true;
+}
+
+void commit_together(AtomicFile& first, AtomicFile& second) {
+  // Held all the time, so that a signal's end of the process comes before or after both.
+  const std::lock_guard lock(unfinished().mutex);
+  const fs::path older = temporary_name(first.target_);
+  std::error_code no_links;
+  const bool replaces = fs::exists(first.target_);
+  if (replaces) fs::create_hard_link(first.target_, older, no_links);
+  if (no_links) fs::copy_file(first.target_, older);
+  try {
+    first.rename();
+    second.rename();
+  } catch (...) {
+    if (replaces)
+      ::rename(older.c_str(), first.target_.c_str());
+    else if (first.committed_)
+      ::unlink(first.target_.c_str());
+    throw;
+  }
+  if (replaces) ::unlink(older.c_str());
 }
 
 void remove_unfinished_files() noexcept {

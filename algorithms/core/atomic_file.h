@@ -20,9 +20,15 @@ class AtomicFile {
   void commit();
 
  private:
+  friend void commit_together(AtomicFile& first, AtomicFile& second);
+  void rename();
   std::filesystem::path target_, temporary_;
   bool committed_ = false;
 };
+
+/// Both or neither: if the second cannot be renamed, the first target holds again what it held, or nothing.
+/// @throws Error as commit() does.
+void commit_together(AtomicFile& first, AtomicFile& second);
 
 /// Removes the temporary files of every AtomicFile that is still open. For the moment before a process ends
 /// itself.

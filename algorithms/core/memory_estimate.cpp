@@ -1,7 +1,6 @@
 #include "algorithms/core/memory_estimate.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,7 +9,6 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <string>
 #include <vector>
 
@@ -40,15 +38,6 @@ std::string gibibytes(double bytes) { return format("%.3g GiB", bytes / (1024.0 
 /// Items that one task goes through; fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kChunk = 1 << 16;
 
-template <class F>
-double sum_over(std::size_t n, F&& f) {
-  std::vector<double> sums((n + kChunk - 1) / kChunk);
-  tbb::parallel_for(std::size_t(0), sums.size(), [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) sums[chunk] += f(i);
-  });
-  return std::accumulate(sums.begin(), sums.end(), 0.0);
-}
-
 Bounds joined(Bounds a, const Bounds& b) {
   // Written so that a NaN of either stays.
   const auto pick = [](double x, double y, bool first) { return std::isnan(x) || (first && !std::isnan(y)) ? x : y; };
@@ -59,39 +48,40 @@ Bounds joined(Bounds a, const Bounds& b) {
   return a;
 }
 
-double area(const PolygonMesh& mesh) {
-  const auto triangle = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    const Eigen::Vector3d p = mesh.points[a].cast<double>();
-    return 0.5 * (mesh.points[b].cast<double>() - p).cross(mesh.points[c].cast<double>() - p).norm();
-  };
-  const double triangles = sum_over(mesh.triangles.size(), [&](std::size_t i) {
-    const Triangle& t = mesh.triangles[i];
-    return triangle(t[0], t[1], t[2]);
-  });
-  return triangles + sum_over(mesh.quads.size(), [&](std::size_t i) {
-           const Quad& q = mesh.quads[i];
-           return triangle(q[0], q[1], q[2]) + triangle(q[0], q[2], q[3]);
-         });
-}
+/// What one pass over the polygons tells.
+struct Measured {
+  Bounds box;       ///< of the corners, relative to the mesh's origin; not finite when a corner is not
+  double area = 0;  ///< world units
+};
 
-/// Box around the corners of the polygons, relative to the mesh's origin; not finite when a corner is not.
-Bounds box_of_corners(const PolygonMesh& mesh) {
-  const auto add = [&](Bounds box, const auto& polygons, const tbb::blocked_range<std::size_t>& range) {
+Measured measure(const PolygonMesh& mesh) {
+  const std::size_t triangles = mesh.triangles.size(), n = mesh.triangle_count();
+  std::vector<Measured> parts((n + kChunk - 1) / kChunk);
+  tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
+    Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
     bool finite = true;
-    for (std::size_t i = range.begin(); i != range.end(); ++i)
-      for (const std::uint32_t corner : polygons[i]) {
-        finite = finite && mesh.points[corner].allFinite();
-        box.add(mesh.points[corner].template cast<double>());
-      }
-    if (!finite) box.upper.setConstant(std::numeric_limits<double>::quiet_NaN());
-    return box;
-  };
-  const auto over = [&](const auto& polygons) {
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, polygons.size(), kChunk), Bounds(),
-        [&](const auto& range, const Bounds& box) { return add(box, polygons, range); }, joined);
-  };
-  return joined(over(mesh.triangles), over(mesh.quads));
+    for (std::size_t i = part * kChunk; i < std::min(n, (part + 1) * kChunk); ++i) {
+      const Quad* quad = i < triangles ? nullptr : &mesh.quads[(i - triangles) / 2];
+      const bool second = quad && (i - triangles) % 2 == 1;
+      const Eigen::Vector3f& a = mesh.points[quad ? (*quad)[0] : mesh.triangles[i][0]];
+      const Eigen::Vector3f& b = mesh.points[quad ? (*quad)[second ? 2 : 1] : mesh.triangles[i][1]];
+      const Eigen::Vector3f& c = mesh.points[quad ? (*quad)[second ? 3 : 2] : mesh.triangles[i][2]];
+      finite = finite && a.allFinite() && b.allFinite() && c.allFinite();
+      low = low.cwiseMin(a).cwiseMin(b).cwiseMin(c);
+      high = high.cwiseMax(a).cwiseMax(b).cwiseMax(c);
+      const Eigen::Vector3d p = a.cast<double>();
+      parts[part].area += 0.5 * (b.cast<double>() - p).cross(c.cast<double>() - p).norm();
+    }
+    if (!finite) high.setConstant(std::numeric_limits<float>::quiet_NaN());
+    parts[part].box.lower = low.cast<double>();
+    parts[part].box.upper = high.cast<double>();
+  });
+  Measured all;
+  for (const Measured& part : parts) {
+    all.box = joined(all.box, part.box);
+    all.area += part.area;
+  }
+  return all;
 }
 
 /// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses count,
@@ -190,9 +180,7 @@ void check_arguments(double voxel_size, double exterior_band, double interior_ba
                   ".");
 }
 
-void check_coordinates(const PolygonMesh& mesh, double voxel_size, double band) {
-  if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
-  const Bounds box = box_of_corners(mesh);
+void check_coordinates(const PolygonMesh& mesh, const Bounds& box, double voxel_size, double band) {
   if (!mesh.origin.allFinite() || !box.lower.allFinite() || !box.upper.allFinite())
     throw Error("The mesh holds a coordinate that is not finite: repair it before voxelizing.");
   const double largest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
@@ -203,14 +191,11 @@ void check_coordinates(const PolygonMesh& mesh, double voxel_size, double band) 
                 "--voxel-size.");
 }
 
-}  // namespace
-
-BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
-                           double interior_band) {
-  const Bounds box = box_of_corners(mesh);
+BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size, double exterior_band,
+                      double interior_band) {
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
-  const Extent extent{area(mesh) / voxel_size / voxel_size, exterior_band + interior_band,
-                      box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
+  const Extent extent{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
+                      measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
 
   BandEstimate estimate;
   const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
@@ -228,6 +213,13 @@ BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double ex
   return estimate;
 }
 
+}  // namespace
+
+BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
+                           double interior_band) {
+  return estimate(mesh, measure(mesh), voxel_size, exterior_band, interior_band);
+}
+
 std::optional<std::uint64_t> available_memory() {
   std::optional<std::uint64_t> available = field_of("/proc/meminfo", "MemAvailable");
   if (available) *available *= 1024;
@@ -243,12 +235,14 @@ std::optional<std::uint64_t> available_memory() {
 void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                              double interior_band) {
   check_arguments(voxel_size, exterior_band, interior_band);
-  check_coordinates(mesh, voxel_size, std::max(exterior_band, interior_band));
-  const BandEstimate estimate = estimate_band(mesh, voxel_size, exterior_band, interior_band);
+  if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
+  const Measured measured = measure(mesh);
+  check_coordinates(mesh, measured.box, voxel_size, std::max(exterior_band, interior_band));
+  const BandEstimate estimated = estimate(mesh, measured, voxel_size, exterior_band, interior_band);
   const std::optional<std::uint64_t> available = available_memory();
-  if (available && estimate.peak_bytes > double(*available))
+  if (available && estimated.peak_bytes > double(*available))
     throw Error("A voxel size of " + format("%g", voxel_size) + " would need about " +
-                gibibytes(estimate.peak_bytes) + " for " + format("%.3g", estimate.active_voxels) +
+                gibibytes(estimated.peak_bytes) + " for " + format("%.3g", estimated.active_voxels) +
                 " active voxels, and " + gibibytes(double(*available)) +
                 " are available: choose a larger --voxel-size or narrower bands.");
 }

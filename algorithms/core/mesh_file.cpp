@@ -124,6 +124,7 @@ void MeshBuilder::fail_index(std::size_t polygon, std::int64_t corner) const {
 
 void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   const std::size_t polygon = polygons_++;
+  if (attributes_) attributes_->add_polygon(corners.size());
   for (const std::int64_t corner : corners) {
     if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
     if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
@@ -165,10 +166,12 @@ MeshFile MeshBuilder::finish() {
   if (dropped_ > 0)
     context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
                   " polygons with fewer than three corners were dropped");
+  if (attributes_) mesh.attributes = attributes_->finish(context_);
   return std::move(mesh);
 }
 
-MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context) {
+MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
+                    const ReadOptions& options) {
   const std::optional<Format> content = format_of_content(bytes);
   const std::string is_named =
       in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
@@ -176,7 +179,7 @@ MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& fil
   // An OBJ file may begin with any of dozens of words, and a damaged binary STL file with any byte.
   if (!content && (named == Format::ply || named == Format::off))
     throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
-  MeshBuilder builder(file, context);
+  MeshBuilder builder(file, context, options);
   switch (named) {
     case Format::ply:
       read_ply(bytes, builder);
@@ -200,12 +203,21 @@ bool is_mesh_path(const std::filesystem::path& path) {
   return mesh_formats::parse_mesh_path(path).has_value();
 }
 
-MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context) {
+MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
   const Stage stage(context, "read");
   const std::optional<mesh_formats::MeshPath> named = mesh_formats::parse_mesh_path(path);
   if (!named && std::filesystem::is_regular_file(path)) mesh_formats::throw_unknown_extension(path);
   const std::string bytes = mesh_formats::load_bytes(path, context);
-  return mesh_formats::parse_mesh(bytes, named->format, path.string(), context);
+  return mesh_formats::parse_mesh(bytes, named->format, path.string(), context, options);
+}
+
+PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
+  MeshFile file = read_mesh_file(path, context, options);
+  std::vector<MeshAttribute> attributes = std::move(file.attributes);
+  file.attributes.clear();
+  PolygonMesh mesh = to_polygon_mesh(file);
+  mesh.attributes = std::move(attributes);
+  return mesh;
 }
 
 PolygonMesh to_polygon_mesh(const MeshFile& file) {
@@ -218,6 +230,7 @@ PolygonMesh to_polygon_mesh(const MeshFile& file) {
   mesh.origin = file.origin ? *file.origin : choose_origin(box);
   mesh.triangles = file.triangles;
   mesh.quads = file.quads;
+  mesh.attributes = file.attributes;
   mesh.points.reserve(file.points.size());
   for (const Eigen::Vector3d& point : file.points) {
     const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();

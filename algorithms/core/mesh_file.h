@@ -17,6 +17,7 @@ struct MeshFile {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
   std::vector<Quad> quads;
+  std::vector<MeshAttribute> attributes;  ///< only where ReadOptions asked for them
   /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading
   /// back gives the same points.
   std::optional<Eigen::Vector3d> origin;
@@ -24,25 +25,45 @@ struct MeshFile {
   std::size_t triangle_count() const { return triangles.size() + 2 * quads.size(); }
 };
 
+/// Attributes take time and memory, so they are passed over unless asked for. Then these are read:
+///
+/// | file          | what                                                     | attribute                            |
+/// | ------------- | -------------------------------------------------------- | ------------------------------------ |
+/// | PLY vertices, | nx ny nz                                                 | "normal"                             |
+/// | PLY faces     | red green blue [alpha], whole numbers brought to 0 … 1   | "colour", 3 or 4 components          |
+/// |               | u v, s t, texture_u texture_v                            | "uv"                                 |
+/// |               | any other number                                         | by its name; whole numbers as such   |
+/// | PLY faces     | list texcoord or texture_uv                              | "uv" of corners                      |
+/// | OBJ           | vn, vt (the first two numbers)                           | "normal", "uv" of corners            |
+/// |               | r g b behind the coordinates of a point                  | "colour" of points                   |
+/// |               | usemtl                                                   | "material" of polygons, with labels  |
+///
+/// A fan takes its corners' values along, and each of its triangles its polygon's; a polygon that is dropped drops its
+/// values. Degenerate polygons and points that no polygon uses keep theirs; nothing is welded in these formats. Where
+/// only some elements have a value, the others get 0, or −1 where the values are whole numbers, and a note says so. A
+/// name that is taken gets the domain in front ("polygon-quality"). OFF and STL give none.
+struct ReadOptions {
+  bool attributes = false;
+};
+
 /// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, or holds an index
-/// out of range, a coordinate that is not finite, or no polygon; the sentence names the file.
-MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context);
+/// out of range, a coordinate or attribute that is not finite, a whole number of an attribute beyond 32 bits, or no
+/// polygon; the sentence names the file.
+MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options = {});
 
 /// Single precision relative to the file's own origin, or to choose_origin() of its bounds.
 PolygonMesh to_polygon_mesh(const MeshFile& file);
 /// Double precision world coordinates of a mesh, what write_mesh() would put into a file.
 MeshFile to_mesh_file(const PolygonMesh& mesh);
 
-inline PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context) {
-  return to_polygon_mesh(read_mesh_file(path, context));
-}
+PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, const ReadOptions& options = {});
 
 /// Writes beside the path and renames, so that no half-written file stands there. Every point is stored as
 /// world() has it: binary PLY in single precision where that loses nothing and in double precision otherwise,
 /// OBJ and OFF in the shortest text of the double, STL in single precision only, with a note that says what
 /// that cost. Reading the file back gives the same double positions, and the same PolygonMesh bit for bit
 /// wherever the sums origin + point are exact in double precision: always where the origin is 0, and as long
-/// as a point's last bit is at least 2^-52 of its distance from 0.
+/// as a point's last bit is at least 2^-52 of its distance from 0. Attributes are not written.
 /// @throws Error for an unknown extension or a path that cannot be written.
 void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
 

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/core/mesh_file_attributes.h"
 
 namespace hermesh::mesh_formats {
 
@@ -56,12 +57,17 @@ class PointMerger {
 /// Collects what a parser finds and checks it as a whole.
 class MeshBuilder {
  public:
-  MeshBuilder(std::string file, RunContext& context) : file_(std::move(file)), context_(context) {}
+  MeshBuilder(std::string file, RunContext& context, const ReadOptions& options = {})
+      : file_(std::move(file)), context_(context) {
+    if (options.attributes) attributes_.emplace(file_);
+  }
 
   MeshFile mesh;
 
   const std::string& file() const { return file_; }
   RunContext& context() { return context_; }
+  /// Null where nobody asked for attributes.
+  AttributeBuilder* attributes() { return attributes_ ? &*attributes_ : nullptr; }
 
   /// Once for every line, point or polygon: cancellation and progress at next to no cost.
   void tick(std::size_t done, std::size_t total) {
@@ -81,6 +87,7 @@ class MeshBuilder {
   [[noreturn]] void fail_index(std::size_t polygon, std::int64_t corner) const;
   std::string file_;
   RunContext& context_;
+  std::optional<AttributeBuilder> attributes_;
   std::size_t ticks_ = 0, polygons_ = 0, dropped_ = 0, polygon_of_largest_ = 0;
   std::int64_t largest_ = -1;
 };
@@ -129,7 +136,7 @@ class TextCursor {
 
   /// The number that starts here; what ends it is not looked at.
   template <class T>
-  T leading_number(const char* what) {
+  [[gnu::always_inline]] T leading_number(const char* what) {
     const char* start = at_;
     if (start != end_ && *start == '+') ++start;
     T value{};
@@ -148,9 +155,9 @@ class TextCursor {
     at_ = stop;
     return value;
   }
-  /// The number that is the next word.
+  /// The number that is the next word. Inlined by order: a seventh of the time that text takes.
   template <class T>
-  T number(const char* what) {
+  [[gnu::always_inline]] T number(const char* what) {
     const char* const start = at_;
     const T value = leading_number<T>(what);
     if (at_ != end_ && !is_space(*at_)) {
@@ -169,7 +176,8 @@ class TextCursor {
 };
 
 /// The mesh in the bytes of a file that is named as of this format. @throws Error
-MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context);
+MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
+                    const ReadOptions& options = {});
 
 void read_ply(std::string_view bytes, MeshBuilder& builder);
 void read_obj(std::string_view bytes, MeshBuilder& builder);

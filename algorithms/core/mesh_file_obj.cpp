@@ -1,9 +1,26 @@
-// OBJ (Wavefront): lines of points (v) and polygons (f); everything else is passed over.
+// OBJ (Wavefront): lines of points (v) and polygons (f), and where attributes are asked for, colours behind
+// the points, normals (vn), texture coordinates (vt) and materials (usemtl); everything else is passed over.
+#include <map>
+
 #include "algorithms/core/mesh_file_formats.h"
 
 namespace hermesh::mesh_formats {
 
 namespace {
+
+constexpr std::int64_t kNone = -1;
+
+/// A list that corners refer to by number, vt or vn: which of its values each corner of the file has.
+struct CornerList {
+  const char* attribute;
+  const char* what;  ///< for complaints
+  int components;
+  std::vector<float> values = {};
+  std::vector<std::int64_t> corners = {};  ///< from 0, or kNone
+  bool used = false;
+
+  std::int64_t size() const { return static_cast<std::int64_t>(values.size()) / components; }
+};
 
 class ObjReader {
  public:
@@ -13,10 +30,11 @@ class ObjReader {
   void read() {
     while (true) {
       cursor_.skip_space();
-      if (cursor_.at_end()) return;
+      if (cursor_.at_end()) break;
       builder_.tick(cursor_.offset(), total_);
       read_line();
     }
+    if (builder_.attributes()) finish_attributes();
   }
 
  private:
@@ -32,6 +50,12 @@ class ObjReader {
       read_point();
     } else if (keyword == "f") {
       read_polygon();
+    } else if (builder_.attributes() && keyword == "vt") {
+      read_value(uvs_, 1);
+    } else if (builder_.attributes() && keyword == "vn") {
+      read_value(normals_, 3);
+    } else if (builder_.attributes() && keyword == "usemtl") {
+      read_material();
     } else if ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z')) {
       skip_continued_line();
     } else {
@@ -73,7 +97,42 @@ class ObjReader {
         cursor_.fail("a coordinate is not a number");
     }
     builder_.mesh.points.push_back(point);
+    if (builder_.attributes()) read_colour();
     skip_continued_line();
+  }
+
+  /// Three numbers, or the last three of four: the first is then a weight.
+  void read_colour() {
+    AttributeBuilder& attributes = *builder_.attributes();
+    attributes.begin(AttributeDomain::point);
+    std::array<double, 4> numbers{};
+    std::size_t count = 0;
+    for (skip_blanks(); count < 4 && !cursor_.at_line_end() && cursor_.peek() != '#'; skip_blanks())
+      numbers[count++] = cursor_.number<double>("a weight or a colour");
+    if (count < 3) return;
+    if (!colour_) colour_ = attributes.add("colour", AttributeDomain::point, 3, false);
+    for (int i = 0; i < 3; ++i) attributes.set(*colour_, i, numbers[count - 3 + static_cast<std::size_t>(i)]);
+  }
+
+  /// A line of vt or vn, of which `least` numbers must be there.
+  void read_value(CornerList& list, int least) {
+    skip_blanks();
+    for (int i = 0; i < list.components; ++i, skip_blanks()) {
+      const bool missing = i >= least && (cursor_.at_line_end() || cursor_.peek() == '#');
+      list.values.push_back(missing ? 0.0f : cursor_.number<float>("a number"));
+    }
+    skip_continued_line();
+  }
+
+  void read_material() {
+    AttributeBuilder& attributes = *builder_.attributes();
+    skip_blanks();
+    const std::string name(cursor_.rest_of_line());
+    if (!material_attribute_)
+      material_attribute_ = attributes.add("material", AttributeDomain::polygon, 1, true);
+    const auto [entry, added] = material_numbers_.emplace(name, static_cast<int>(materials_.size()));
+    if (added) materials_.push_back(name);
+    material_ = entry->second;
   }
 
   /// Corners are v, v/vt, v//vn or v/vt/vn; a negative v counts back from the latest point.
@@ -87,6 +146,10 @@ class ObjReader {
         cursor_.fail("a polygon refers to point " + std::to_string(index) + ", but there are only " +
                      std::to_string(points) + " points before it");
       corners_.push_back(index > 0 ? index - 1 : points + index);
+      if (builder_.attributes()) {
+        read_corner_value(uvs_);
+        read_corner_value(normals_);
+      }
       if (cursor_.peek() == '/') {
         while (!is_space(cursor_.peek()) && cursor_.peek() != '\\' && !cursor_.at_end()) cursor_.advance();
       } else if (!is_space(cursor_.peek()) && cursor_.peek() != '\\' && !cursor_.at_end()) {
@@ -95,12 +158,63 @@ class ObjReader {
     }
     cursor_.rest_of_line();
     builder_.add_polygon(corners_);
+    if (AttributeBuilder* attributes = builder_.attributes()) {
+      attributes->begin(AttributeDomain::polygon);
+      if (material_ >= 0) attributes->set(*material_attribute_, 0, material_);
+    }
+  }
+
+  /// The number behind the next slash, if there is one, counted as that of a point is.
+  void read_corner_value(CornerList& list) {
+    list.corners.push_back(kNone);
+    if (cursor_.peek() != '/') return;
+    cursor_.advance();
+    if (cursor_.peek() == '/' || is_space(cursor_.peek()) || cursor_.at_end()) return;
+    const auto index = cursor_.leading_number<std::int64_t>(list.what);
+    if (index == 0 || index < -list.size()) fail_index(list, index);
+    list.corners.back() = index > 0 ? index - 1 : list.size() + index;
+    list.used = true;
+  }
+
+  [[noreturn]] void fail_index(const CornerList& list, std::int64_t index) {
+    cursor_.fail("a polygon refers to " + std::string(list.what) + " " + std::to_string(index) +
+                 ", but the file has " + std::to_string(list.size()) + " and counts them from 1");
+  }
+
+  void finish_attributes() {
+    AttributeBuilder& attributes = *builder_.attributes();
+    if (material_attribute_) attributes.set_labels(*material_attribute_, materials_);
+    std::vector<std::pair<std::size_t, const CornerList*>> lists;
+    for (const CornerList* list : {&uvs_, &normals_})
+      if (list->used)
+        lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),
+                           list);
+    if (lists.empty()) return;
+    for (std::size_t corner = 0; corner < uvs_.corners.size(); ++corner) {
+      attributes.begin(AttributeDomain::corner);
+      for (const auto& [attribute, list] : lists)
+        set_corner(attributes, attribute, *list, list->corners[corner]);
+    }
+  }
+
+  void set_corner(AttributeBuilder& attributes, std::size_t attribute, const CornerList& list,
+                  std::int64_t index) {
+    if (index == kNone) return;
+    if (index >= list.size()) fail_index(list, index + 1);
+    for (int i = 0; i < list.components; ++i)
+      attributes.set(attribute, i, list.values[static_cast<std::size_t>(index * list.components + i)]);
   }
 
   TextCursor cursor_;
   MeshBuilder& builder_;
   std::size_t total_;
   std::vector<std::int64_t> corners_;
+  // Attributes, where they are asked for.
+  CornerList uvs_{"uv", "texture coordinate", 2}, normals_{"normal", "normal", 3};
+  std::optional<std::size_t> colour_, material_attribute_;
+  std::vector<std::string> materials_;
+  std::map<std::string, int> material_numbers_;
+  int material_ = static_cast<int>(kNone);
 };
 
 }  // namespace

@@ -1,148 +1,14 @@
 // PLY (Turk 1994): a header that declares elements and their properties, then the elements in that order.
-#include <array>
-#include <bit>
+#include "algorithms/core/mesh_file_ply.h"
 
-#include "algorithms/core/mesh_file_formats.h"
+#include <bit>
+#include <map>
 
 namespace hermesh::mesh_formats {
 
+using namespace ply;
+
 namespace {
-
-enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
-constexpr std::array<std::size_t, 8> size_of = {1, 1, 2, 2, 4, 4, 4, 8};
-/// Both generations of names.
-constexpr std::array<std::array<std::string_view, 2>, 8> type_names = {{{"char", "int8"},
-                                                                        {"uchar", "uint8"},
-                                                                        {"short", "int16"},
-                                                                        {"ushort", "uint16"},
-                                                                        {"int", "int32"},
-                                                                        {"uint", "uint32"},
-                                                                        {"float", "float32"},
-                                                                        {"double", "float64"}}};
-
-enum class Role { ignored, x, y, z, corners };
-
-struct Property {
-  std::string_view name;
-  Type type;
-  std::optional<Type> list_count;  ///< type of the number of items, where the property is a list
-  Role role = Role::ignored;
-};
-
-struct Element {
-  std::string_view name;
-  std::uint64_t count;
-  std::vector<Property> properties;
-};
-
-enum class Encoding { ascii, little_endian, big_endian };
-
-struct Header {
-  Encoding encoding = Encoding::ascii;
-  std::vector<Element> elements;
-  std::size_t length = 0;  ///< bytes, up to the first element
-};
-
-class HeaderParser {
- public:
-  HeaderParser(std::string_view bytes, MeshBuilder& builder) : bytes_(bytes), builder_(builder) {
-    // Lines end in "\n", "\r\n" or, on old Macs, "\r"; the first line tells which. Binary data may follow, so
-    // a lone
-    // "\r" must not swallow a first data byte that happens to be "\n".
-    line_end_ = bytes.starts_with("ply\r\n") ? "\r\n" : bytes.starts_with("ply\r") ? "\r" : "\n";
-  }
-
-  Header parse() {
-    next_line();
-    bool format_known = false;
-    while (true) {
-      next_line();
-      const std::string_view keyword = next_word();
-      if (keyword == "end_header") break;
-      if (keyword == "format") {
-        header_.encoding = encoding();
-        format_known = true;
-      } else if (keyword == "comment") {
-        builder_.add_comment(line_);
-      } else if (keyword == "element") {
-        add_element();
-      } else if (keyword == "property") {
-        add_property();
-      } else if (keyword != "obj_info" && !keyword.empty()) {
-        fail(in_quotes(std::string(keyword.substr(0, 40))) + " is no keyword of a PLY header");
-      }
-    }
-    if (!format_known) fail("the header has no line 'format'");
-    header_.length = position_;
-    return std::move(header_);
-  }
-
- private:
-  void next_line() {
-    const std::size_t end = bytes_.find(line_end_, position_);
-    if (end == std::string_view::npos) builder_.fail("the file is truncated: its PLY header has no end");
-    line_ = bytes_.substr(position_, end - position_);
-    position_ = end + line_end_.size();
-    ++line_number_;
-  }
-  std::string_view next_word() {
-    line_.remove_prefix(std::min(line_.find_first_not_of(" \t\r"), line_.size()));
-    const std::string_view word = line_.substr(0, line_.find_first_of(" \t\r"));
-    line_.remove_prefix(word.size());
-    return word;
-  }
-  Encoding encoding() {
-    const std::string_view word = next_word();
-    if (word == "ascii") return Encoding::ascii;
-    if (word == "binary_little_endian") return Encoding::little_endian;
-    if (word == "binary_big_endian") return Encoding::big_endian;
-    fail(in_quotes(std::string(word)) + " is no PLY format");
-  }
-  Type type(std::string_view word) {
-    for (std::size_t i = 0; i < type_names.size(); ++i)
-      if (word == type_names[i][0] || word == type_names[i][1]) return static_cast<Type>(i);
-    fail(in_quotes(std::string(word.substr(0, 40))) + " is no type of a PLY property");
-  }
-  void add_element() {
-    const std::string_view name = next_word(), count = next_word();
-    Element element{name, 0, {}};
-    const auto [stop, status] = std::from_chars(count.begin(), count.end(), element.count);
-    if (status != std::errc() || stop != count.end()) fail("the count of an element is not a number");
-    header_.elements.push_back(std::move(element));
-  }
-  void add_property() {
-    if (header_.elements.empty()) fail("a property comes before the first element");
-    Property property{};
-    std::string_view word = next_word();
-    if (word == "list") {
-      property.list_count = type(next_word());
-      if (*property.list_count >= Type::float32)
-        fail("the length of a list cannot be a floating-point number");
-      word = next_word();
-    }
-    property.type = type(word);
-    property.name = next_word();
-    property.role = role(header_.elements.back().name, property);
-    header_.elements.back().properties.push_back(property);
-  }
-  static Role role(std::string_view element, const Property& property) {
-    const bool list = property.list_count.has_value();
-    if (element == "vertex" && !list && property.name == "x") return Role::x;
-    if (element == "vertex" && !list && property.name == "y") return Role::y;
-    if (element == "vertex" && !list && property.name == "z") return Role::z;
-    if (element == "face" && list && (property.name == "vertex_indices" || property.name == "vertex_index"))
-      return Role::corners;
-    return Role::ignored;
-  }
-  [[noreturn]] void fail(const std::string& what) {
-    throw Error(in_quotes(builder_.file()) + ", line " + std::to_string(line_number_) + ": " + what);
-  }
-
-  std::string_view bytes_, line_, line_end_;
-  MeshBuilder& builder_;
-  Header header_;
-  std::size_t position_ = 0, line_number_ = 0;
-};
 
 /// Where the elements' values come from, when they are text. A float is rounded as the header declares it.
 class AsciiValues {
@@ -243,7 +109,8 @@ class BinaryValues {
   const MeshBuilder& builder_;
 };
 
-template <class Values>
+/// The parameter keeps all thought of attributes out of the loops of those who want none.
+template <class Values, bool with_attributes>
 class ElementReader {
  public:
   ElementReader(std::string_view bytes, const Header& header, MeshBuilder& builder)
@@ -275,6 +142,10 @@ class ElementReader {
       builder_.fail("the file is truncated: its header declares " + std::to_string(element.count) +
                     " of element '" + std::string(element.name) + "', for which it is too short");
     if (least == 0) return;
+    if (AttributeBuilder* attributes = builder_.attributes()) {
+      if (element.name == "vertex") attributes->reserve(AttributeDomain::point, element.count);
+      if (element.name == "face") attributes->reserve(AttributeDomain::polygon, element.count);
+    }
     if (element.name == "vertex") builder_.mesh.points.reserve(builder_.mesh.points.size() + element.count);
     if (element.name == "face")
       builder_.mesh.triangles.reserve(builder_.mesh.triangles.size() + element.count);
@@ -282,16 +153,51 @@ class ElementReader {
 
   void read_one(const Element& element) {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
+    if constexpr (with_attributes) begin_attributes(element);
     for (const Property& property : element.properties) {
       if (property.list_count) {
         read_list(property);
       } else if (property.role == Role::ignored) {
         values_.skip(property.type);
+      } else if (with_attributes && property.role == Role::value) {
+        builder_.attributes()->set(property.attribute, property.component, number(property) / property.unit);
       } else {
         point[static_cast<int>(property.role) - static_cast<int>(Role::x)] = values_.real(property.type);
       }
     }
     if (element.name == "vertex") builder_.mesh.points.push_back(point);
+    if (with_attributes && element.name == "face") end_corners();
+  }
+
+  double number(const Property& property) {
+    return property.type >= Type::float32 ? values_.real(property.type)
+                                          : static_cast<double>(values_.integer(property.type));
+  }
+
+  void begin_attributes(const Element& element) {
+    if (element.name == "vertex") builder_.attributes()->begin(AttributeDomain::point);
+    if (element.name == "face") builder_.attributes()->begin(AttributeDomain::polygon);
+    corners_.clear();
+    for (auto& [property, values] : corner_values_) values.clear();
+  }
+
+  /// The lists of a polygon may stand before its corners, so they are looked at when all have been read.
+  void end_corners() {
+    if (corner_values_.empty()) return;
+    for (const auto& [property, values] : corner_values_)
+      if (!values.empty() && values.size() != corners_.size() * static_cast<std::size_t>(property->component))
+        builder_.fail("the list " + in_quotes(property->name) + " of a polygon has " +
+                      std::to_string(values.size()) + " numbers, but the polygon has " +
+                      std::to_string(corners_.size()) + " corners and each takes " +
+                      std::to_string(property->component));
+    for (std::size_t corner = 0; corner < corners_.size(); ++corner) {
+      builder_.attributes()->begin(AttributeDomain::corner);
+      for (const auto& [property, values] : corner_values_)
+        for (int i = 0; i < property->component && !values.empty(); ++i)
+          builder_.attributes()->set(
+              property->attribute, i,
+              values[corner * static_cast<std::size_t>(property->component) + static_cast<std::size_t>(i)]);
+    }
   }
 
   void read_list(const Property& property) {
@@ -304,6 +210,11 @@ class ElementReader {
       for (std::int64_t i = 0; i < count; ++i) values_.skip(property.type);
       return;
     }
+    if (with_attributes && property.role == Role::corner_values) {
+      std::vector<double>& values = corner_values_[&property];
+      for (std::int64_t i = 0; i < count; ++i) values.push_back(number(property));
+      return;
+    }
     corners_.resize(static_cast<std::size_t>(count));
     for (std::int64_t& corner : corners_) corner = values_.integer(property.type);
     builder_.add_polygon(corners_);
@@ -313,11 +224,12 @@ class ElementReader {
   Values values_;
   MeshBuilder& builder_;
   std::size_t total_;
-  std::vector<std::int64_t> corners_;
+  std::vector<std::int64_t> corners_;  ///< of the latest polygon
+  std::map<const Property*, std::vector<double>> corner_values_;
 };
 
 void check_roles(const Header& header, const MeshBuilder& builder) {
-  std::array<bool, 5> found{};
+  std::array<bool, 7> found{};  // by role
   for (const Element& element : header.elements)
     for (const Property& property : element.properties) found[static_cast<std::size_t>(property.role)] = true;
   for (const Role role : {Role::x, Role::y, Role::z})
@@ -326,18 +238,26 @@ void check_roles(const Header& header, const MeshBuilder& builder) {
     builder.fail("it holds no polygon: there is no element 'face' with a list 'vertex_indices'");
 }
 
+template <class Values>
+void read_elements(std::string_view bytes, const Header& header, MeshBuilder& builder) {
+  if (builder.attributes())
+    ElementReader<Values, true>(bytes, header, builder).read();
+  else
+    ElementReader<Values, false>(bytes, header, builder).read();
+}
+
 }  // namespace
 
 void read_ply(std::string_view bytes, MeshBuilder& builder) {
-  const Header header = HeaderParser(bytes, builder).parse();
+  const Header header = parse_header(bytes, builder);
   check_roles(header, builder);
   constexpr bool big_machine = std::endian::native == std::endian::big;
   if (header.encoding == Encoding::ascii)
-    ElementReader<AsciiValues>(bytes, header, builder).read();
+    read_elements<AsciiValues>(bytes, header, builder);
   else if ((header.encoding == Encoding::big_endian) == big_machine)
-    ElementReader<BinaryValues<false>>(bytes, header, builder).read();
+    read_elements<BinaryValues<false>>(bytes, header, builder);
   else
-    ElementReader<BinaryValues<true>>(bytes, header, builder).read();
+    read_elements<BinaryValues<true>>(bytes, header, builder);
 }
 
 }  // namespace hermesh::mesh_formats

@@ -8,6 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "algorithms/core/mesh_attribute.h"
+
 namespace hermesh {
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -20,6 +22,7 @@ struct PolygonMesh {
   std::vector<Eigen::Vector3f> points;               ///< world units, relative to origin
   std::vector<Triangle> triangles;
   std::vector<Quad> quads;
+  std::vector<MeshAttribute> attributes;  ///< of different names; read_mesh() reads them where asked to
 
   /// Position of a point in world units. This double is the point's position: a writer stores it without
   /// loss.

@@ -49,10 +49,10 @@ class TriangleSlab {
     const Eigen::Map<const Eigen::Vector3d> p0(c.data()), p1(c.data() + 3), p2(c.data() + 6);
     const Eigen::Vector3d normal = (p1 - p0).cross(p2 - p0);
     if (!(normal.squaredNorm() > 0)) return;
-    add(normal.normalized(), p0, true);
+    add(normal.normalized(), p0);
     for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) {
       const Eigen::Vector3d outward = (b - a).cross(normal);
-      if (outward.squaredNorm() > 0) add(outward.normalized(), a, false);
+      if (outward.squaredNorm() > 0) add(outward.normalized(), a);
     }
   }
   bool near(const BlockAt& block, double reach) const {
@@ -65,7 +65,7 @@ class TriangleSlab {
   }
 
  private:
-  void add(const Eigen::Vector3d& normal, const Eigen::Vector3d& point, bool) {
+  void add(const Eigen::Vector3d& normal, const Eigen::Vector3d& point) {
     normal_[count_] = normal;
     offset_[count_] = normal.dot(point);
     // Half the extent of a block's voxels along the normal, and some for rounding.
@@ -148,6 +148,7 @@ void TriangleBins::file_small(RunContext& context) {
   const Chunks chunks(soup_.size());
   std::vector<BlockSet> sets(chunks.count);
   std::vector<std::uint32_t> keys(soup_.size());
+  all_large_.resize(chunks.count);
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
       const VoxelBox box = in_voxels(box_of(t));
@@ -158,6 +159,7 @@ void TriangleBins::file_small(RunContext& context) {
         centre[a] = block_of(0.5 * (box.low[a] + box.high[a]));
       }
       keys[t] = longest > kLargest ? kLarge : sets[chunk].insert(centre);
+      if (longest > kLargest) all_large_[chunk].push_back(std::uint32_t(t));
     }
   });
   bins_ = BlockTable(sets);
@@ -223,8 +225,8 @@ void TriangleBins::make_clusters(RunContext& context) {
 }
 
 void TriangleBins::choose_blocks(RunContext& context) {
-  const Chunks bins(bins_.size(), 64), triangles(soup_.size());
-  std::vector<BlockSet> sets(bins.count + triangles.count);
+  const Chunks bins(bins_.size(), 64);
+  std::vector<BlockSet> sets(bins.count + all_large_.size());
   parallel_chunks(bins, context, [&](std::size_t chunk) {
     const std::size_t end = first_cluster_[bins.end(chunk)];
     for (std::size_t c = first_cluster_[bins.begin(chunk)]; c < end; ++c)
@@ -233,28 +235,24 @@ void TriangleBins::choose_blocks(RunContext& context) {
   });
   // Pairs of a block and a large triangle near it.
   using Pair = std::pair<std::uint32_t, std::uint32_t>;
-  std::vector<std::vector<Pair>> pairs(triangles.count);
-  parallel_chunks(triangles, context, [&](std::size_t chunk) {
+  std::vector<std::vector<Pair>> pairs(all_large_.size());
+  tbb::parallel_for(std::size_t(0), all_large_.size(), [&](std::size_t chunk) {
     BlockSet& set = sets[bins.count + chunk];
-    for (std::size_t t = triangles.begin(chunk); t < triangles.end(chunk); ++t) {
+    for (const std::uint32_t t : all_large_[chunk]) {
       const VoxelBox box = in_voxels(box_of(t));
-      double longest = 0;
-      for (int a = 0; a < 3; ++a) longest = std::max(longest, box.high[a] - box.low[a]);
-      if (longest <= kLargest) continue;
       context.check();
       const TriangleSlab slab(soup_.corners(t));
       for_each_block_near(box, reach_, [&](const BlockAt& block) {
-        if (slab.near(block, reach_)) pairs[chunk].emplace_back(set.insert(block), std::uint32_t(t));
+        if (slab.near(block, reach_)) pairs[chunk].emplace_back(set.insert(block), t);
       });
     }
   });
   blocks_ = BlockTable(sets);
   first_large_.assign(blocks_.size() + 1, 0);
-  std::vector<std::vector<std::uint32_t>> translations(triangles.count);
-  for (std::size_t chunk = 0; chunk < triangles.count; ++chunk) {
-    translations[chunk] = blocks_.translation(sets[bins.count + chunk]);
+  for (std::size_t chunk = 0; chunk < pairs.size(); ++chunk) {
+    const std::vector<std::uint32_t> translation = blocks_.translation(sets[bins.count + chunk]);
     for (Pair& pair : pairs[chunk])
-      ++first_large_[pair.first = blocks_.number(translations[chunk], pair.first)];
+      ++first_large_[pair.first = blocks_.number(translation, pair.first)];
   }
   std::uint64_t total = 0;
   for (std::uint64_t& count : first_large_) total += std::exchange(count, total);

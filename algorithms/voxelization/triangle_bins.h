@@ -57,6 +57,7 @@ class TriangleBins {
   std::vector<std::uint32_t> first_cluster_;
   std::vector<FloatBox> clusters_;
   BlockTable blocks_;
+  std::vector<std::vector<std::uint32_t>> all_large_;  ///< large triangles, by piece of the work
   std::vector<std::uint64_t> first_large_;
   std::vector<std::uint32_t> large_;
 };

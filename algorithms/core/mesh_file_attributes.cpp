@@ -1,0 +1,167 @@
+#include "algorithms/core/mesh_file_attributes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "algorithms/core/mesh_file_formats.h"
+
+namespace hermesh::mesh_formats {
+
+namespace {
+
+constexpr std::array<const char*, 3> domain_names = {"point", "corner", "polygon"};
+constexpr std::array<const char*, 3> domain_plurals = {"points", "corners", "polygons"};
+
+const char* name_of(AttributeDomain domain) { return domain_names[static_cast<std::size_t>(domain)]; }
+
+/// For each element of the mesh its number in the file.
+using Order = std::vector<std::size_t>;
+
+/// As MeshBuilder::add_polygon() cuts and drops: triangles and fans first, then the quads.
+Order polygon_order(const std::vector<std::uint32_t>& sizes) {
+  Order order, quads;
+  for (std::size_t polygon = 0; polygon < sizes.size(); ++polygon) {
+    if (sizes[polygon] == 4) quads.push_back(polygon);
+    if (sizes[polygon] == 3 || sizes[polygon] > 4) order.insert(order.end(), sizes[polygon] - 2, polygon);
+  }
+  order.insert(order.end(), quads.begin(), quads.end());
+  return order;
+}
+
+Order corner_order(const std::vector<std::uint32_t>& sizes) {
+  Order order, quads;
+  std::size_t first = 0;
+  for (const std::uint32_t size : sizes) {
+    if (size == 4) quads.insert(quads.end(), {first, first + 1, first + 2, first + 3});
+    if (size != 4)
+      for (std::uint32_t i = 2; i < size; ++i) order.insert(order.end(), {first, first + i - 1, first + i});
+    first += size;
+  }
+  order.insert(order.end(), quads.begin(), quads.end());
+  return order;
+}
+
+template <class T>
+void reorder(std::vector<T>& values, std::size_t components, const Order& order) {
+  std::vector<T> moved;
+  moved.reserve(order.size() * components);
+  for (const std::size_t element : order) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(element * components);
+    moved.insert(moved.end(), first, first + static_cast<std::ptrdiff_t>(components));
+  }
+  values = std::move(moved);
+}
+
+bool is_identity(const Order& order, std::size_t elements) {
+  if (order.size() != elements) return false;
+  for (std::size_t i = 0; i < elements; ++i)
+    if (order[i] != i) return false;
+  return true;
+}
+
+void reorder(MeshAttribute& attribute, const Order& order, std::size_t elements) {
+  if (is_identity(order, elements)) return;
+  std::visit([&](auto& values) { reorder(values, static_cast<std::size_t>(attribute.components), order); },
+             attribute.values);
+}
+
+}  // namespace
+
+void AttributeBuilder::fail(const Gathered& gathered, const std::string& what) {
+  const MeshAttribute& attribute = gathered.result;
+  throw Error(in_quotes(file_) + ": the attribute " + in_quotes(attribute.name) + " of " +
+              name_of(attribute.domain) + " " + std::to_string(begun(attribute.domain) - 1) +
+              " (counting from 0) " + what);
+}
+
+std::string AttributeBuilder::unused_name(std::string name, AttributeDomain domain) const {
+  const auto taken = [&](const std::string& text) {
+    return std::ranges::any_of(gathered_, [&](const Gathered& other) { return other.result.name == text; });
+  };
+  if (taken(name)) name = std::string(name_of(domain)) + "-" + name;
+  std::string unused = name;
+  for (int i = 2; taken(unused); ++i) unused = name + "-" + std::to_string(i);
+  return unused;
+}
+
+std::size_t AttributeBuilder::add(std::string name, AttributeDomain domain, int components, bool whole) {
+  Gathered& gathered = gathered_.emplace_back();
+  gathered.result = {"", domain, components, std::vector<float>(), {}};
+  if (whole) gathered.result.values = std::vector<std::int32_t>();
+  gathered.result.name = unused_name(std::move(name), domain);
+  grow(gathered);
+  return gathered_.size() - 1;
+}
+
+void AttributeBuilder::grow(Gathered& gathered) {
+  const std::size_t size =
+      begun(gathered.result.domain) * static_cast<std::size_t>(gathered.result.components);
+  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&gathered.result.values))
+    whole->resize(size, -1);
+  else
+    std::get<std::vector<float>>(gathered.result.values).resize(size, 0.0f);
+}
+
+void AttributeBuilder::reserve(AttributeDomain domain, std::size_t elements) {
+  for (Gathered& gathered : gathered_)
+    if (gathered.result.domain == domain)
+      std::visit(
+          [&](auto& values) {
+            values.reserve(values.size() + elements * static_cast<std::size_t>(gathered.result.components));
+          },
+          gathered.result.values);
+}
+
+void AttributeBuilder::begin(AttributeDomain domain) {
+  ++begun(domain);
+  for (Gathered& gathered : gathered_)
+    if (gathered.result.domain == domain) grow(gathered);
+}
+
+void AttributeBuilder::set(std::size_t attribute, int component, double value) {
+  Gathered& gathered = gathered_[attribute];
+  if (component == 0) ++gathered.given;
+  const auto place = [&](auto& values) { return values.end() - gathered.result.components + component; };
+  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&gathered.result.values)) {
+    using Limits = std::numeric_limits<std::int32_t>;
+    if (!(value >= Limits::min() && value <= Limits::max()))
+      fail(gathered, "does not fit into 32 bits with a sign");
+    *place(*whole) = static_cast<std::int32_t>(value);
+    return;
+  }
+  const auto single = static_cast<float>(value);
+  if (!std::isfinite(single)) fail(gathered, "is not a finite number in single precision");
+  *place(std::get<std::vector<float>>(gathered.result.values)) = single;
+}
+
+void AttributeBuilder::note_missing(const Gathered& gathered, RunContext& context) {
+  const MeshAttribute& attribute = gathered.result;
+  const std::size_t missing = begun(attribute.domain) - gathered.given;
+  if (missing == 0) return;
+  const bool whole = std::holds_alternative<std::vector<std::int32_t>>(attribute.values);
+  context.note(in_quotes(file_) + ": " + std::to_string(missing) + " of " +
+               std::to_string(begun(attribute.domain)) + " " +
+               domain_plurals[static_cast<std::size_t>(attribute.domain)] + " have no " +
+               in_quotes(attribute.name) + " and get " + (whole ? "-1" : "0"));
+}
+
+std::vector<MeshAttribute> AttributeBuilder::finish(RunContext& context) {
+  const auto any_of = [&](AttributeDomain domain) {
+    return std::ranges::any_of(gathered_, [&](const Gathered& g) { return g.result.domain == domain; });
+  };
+  const Order polygons = any_of(AttributeDomain::polygon) ? polygon_order(polygon_sizes_) : Order();
+  const Order corners = any_of(AttributeDomain::corner) ? corner_order(polygon_sizes_) : Order();
+  std::vector<MeshAttribute> attributes;
+  for (Gathered& gathered : gathered_) {
+    context.check();
+    note_missing(gathered, context);
+    const AttributeDomain domain = gathered.result.domain;
+    if (domain == AttributeDomain::polygon) reorder(gathered.result, polygons, begun(domain));
+    if (domain == AttributeDomain::corner) reorder(gathered.result, corners, begun(domain));
+    attributes.push_back(std::move(gathered.result));
+  }
+  return attributes;
+}
+
+}  // namespace hermesh::mesh_formats
