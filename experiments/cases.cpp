@@ -84,8 +84,11 @@ std::optional<LoadedCase> find_in(const fs::path& folder, const CaseRecipe& reci
 LoadedCase load_stand_in(const CaseRecipe& recipe, const std::string& reason, RunContext& context) {
   PolygonMesh mesh = make_recipe(recipe.stand_in, {{"triangles", double(recipe.triangles)}}, context);
   const std::string sha256 = sha256_of_mesh(mesh);
-  return {recipe.name, std::move(mesh),
-          "stand-in: " + recipe.stand_in + " of the same size, because " + reason, sha256, {}};
+  return {recipe.name,
+          std::move(mesh),
+          "stand-in: " + recipe.stand_in + " of the same size, because " + reason,
+          sha256,
+          {}};
 }
 
 LoadedCase load_files(const CaseRecipe& recipe, RunContext& context) {
@@ -131,6 +134,12 @@ LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& rec
   return result;
 }
 
+std::string names_of(const std::vector<CaseRecipe>& recipes) {
+  std::string names;
+  for (const CaseRecipe& each : recipes) names += (names.empty() ? "" : ", ") + each.name;
+  return names;
+}
+
 }  // namespace
 
 std::vector<CaseInfo> list_cases() {
@@ -145,9 +154,27 @@ LoadedCase load_case(const std::string& name, RunContext& context) {
   const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
   if (recipe != all.end()) return load_recipe(all, *recipe, context);
   if (is_mesh_path(name)) return {name, read_mesh(name, context), "file", sha256_of_file(name), {}};
-  std::string names;
-  for (const CaseRecipe& each : all) names += (names.empty() ? "" : ", ") + each.name;
-  throw Error("there is no case '" + name + "' and no mesh file of that name; the cases are: " + names);
+  throw Error("there is no case '" + name +
+              "' and no mesh file of that name; the cases are: " + names_of(all));
+}
+
+LoadedCase load_changed_case(const std::string& name, const std::map<std::string, double>& changes,
+                             RunContext& context) {
+  const std::vector<CaseRecipe> all = recipes_of_project();
+  const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
+  if (recipe == all.end()) throw Error("there is no case '" + name + "'; the cases are: " + names_of(all));
+  if (recipe->recipe.empty())
+    throw Error("the case '" + name + "' has no recipe, and so no parameters to change");
+  RecipeParameters parameters = recipe->parameters;
+  for (const auto& [key, value] : changes) parameters[key] = value;
+  LoadedCase result;
+  result.name = name;
+  result.mesh = make_recipe(recipe->recipe, parameters, context);
+  result.origin = "generated";
+  result.sha256 = sha256_of_mesh(result.mesh);
+  if (const auto seed = parameters.find("seed"); seed != parameters.end())
+    result.seed = static_cast<std::uint64_t>(seed->second);
+  return result;
 }
 
 fs::path experiments_folder() {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,11 @@ std::vector<CaseInfo> list_cases();
 /// file.
 /// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
 LoadedCase load_case(const std::string& name, RunContext& context);
+
+/// A case made by its recipe with some parameters changed. @throws Error for an unknown name, a case that is
+/// not made by a recipe, an unknown parameter, or a value out of range.
+LoadedCase load_changed_case(const std::string& name, const std::map<std::string, double>& changes,
+                             RunContext& context);
 
 /// Where the experiments and the recipes are: $HERMESH_EXPERIMENTS, else the source tree that the program was
 /// built from.

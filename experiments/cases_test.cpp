@@ -98,6 +98,36 @@ TEST(Recipes, HaveTheGenusOfTheirShapes) {
   EXPECT_EQ(euler_characteristic(make("nested-spheres")), 6);
 }
 
+TEST(Recipes, ClusterMayBeDoubledAndTurned) {
+  const PolygonMesh once = make("sphere-cluster", {{"cuts", 8}});
+  EXPECT_EQ(once.triangle_count(), 8u * 8 * 64);
+  EXPECT_NEAR(volume(once), 8 * 4 * pi / 3, 1.0);  // flat triangles lack a little
+  const PolygonMesh shuffled = make("sphere-cluster", {{"cuts", 8}, {"copies", 2}, {"turned", 1}});
+  EXPECT_EQ(shuffled.points, once.points);
+  EXPECT_EQ(shuffled.triangle_count(), 2 * once.triangle_count());
+  EXPECT_LT(std::abs(volume(shuffled)), 0.2 * volume(once));
+}
+
+TEST(Recipes, HoleHasItsDiameter) {
+  const RecipeParameters parameters = {{"radius", 40}, {"hole", 2}};
+  RecipeParameters open_parameters = parameters;
+  open_parameters["open"] = 1;
+  const PolygonMesh closed = make("holed-sphere", parameters), open = make("holed-sphere", open_parameters);
+  EXPECT_NEAR(volume(closed), 4 * pi / 3 * 64000, 600);
+  EXPECT_FALSE(closed_and_oriented(open));
+  ASSERT_EQ(closed.triangle_count(), open.triangle_count() + 128);
+  // The last ring, before the pole that the open one lacks.
+  const Eigen::Vector3d pole = closed.world(closed.points.size() - 1).normalized();
+  for (std::size_t i = open.points.size() - 128; i < open.points.size(); ++i)
+    EXPECT_NEAR(open.world(i).cross(pole).norm(), 1.0, 1e-4);
+}
+
+TEST(Recipes, SheetsAreApart) {
+  const PolygonMesh mesh = make("sheets", {{"plates", 3}, {"width", 4}, {"thickness", 0.5}, {"gap", 0.25}});
+  EXPECT_NEAR(volume(mesh), 3 * 4 * 4 * 0.5, 1e-5);
+  EXPECT_NEAR(bounds(mesh).size().z(), 3 * 0.5 + 2 * 0.25, 1e-6);
+}
+
 TEST(Recipes, TurnTheCubeAboutXThenYThenZ) {
   const PolygonMesh cube = make("turned-cube", {{"about_x", 20}, {"about_y", 30}, {"about_z", 40}});
   const auto turn = [](double degrees, const Eigen::Vector3d& axis) {
@@ -262,6 +292,16 @@ TEST_F(CasesTest, GeneratedCasesHaveTheStatedHash) {
     ++generated;
   }
   EXPECT_GE(generated, 9u);
+}
+
+TEST_F(CasesTest, ParametersOfAGeneratedCaseMayBeChanged) {
+  const LoadedCase thin = load_changed_case("plate", {{"thickness", 0.5}}, context);
+  EXPECT_EQ(thin.origin, "generated");
+  EXPECT_NEAR(volume(thin.mesh), 80 * 80 * 0.5, 0.1);
+  EXPECT_NE(thin.sha256, load_case("plate", context).sha256);
+  EXPECT_THROW(load_changed_case("plate", {{"thicknes", 0.5}}, context), Error);
+  EXPECT_THROW(load_changed_case("dragon", {{"radius", 1}}, context), Error);
+  EXPECT_THROW(load_changed_case("nothing", {}, context), Error);
 }
 
 TEST_F(CasesTest, TakesTheFileOfTheDataFolder) {

@@ -1,135 +1,12 @@
 #include "experiments/experiment_file.h"
 
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <set>
-#include <sstream>
-#include <string_view>
+
+#include "experiments/toml_section.h"
 
 namespace hermesh {
 namespace {
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
-/// A table of the file that insists on every key being known and asked for. Its messages begin with
-/// "file:line: ".
-class Section {
- public:
-  Section(std::string file, const toml::table& table, std::string what, std::vector<std::string> known)
-      : file_(std::move(file)), table_(table), what_(std::move(what)) {
-    for (const auto& [key, value] : table_)
-      if (std::find(known.begin(), known.end(), key.str()) == known.end())
-        fail(key.source().begin.line,
-             "unknown key \"" + std::string(key.str()) + "\" in " + what_ + "; it takes " + joined(known));
-  }
-
-  [[noreturn]] void fail(toml::source_index line, const std::string& sentence) const {
-    throw Error(file_ + ":" + std::to_string(std::max<toml::source_index>(line, 1)) + ": " + sentence);
-  }
-  [[noreturn]] void fail_at(const std::string& key, const std::string& sentence) const {
-    const toml::node* node = table_.get(key);
-    fail(node ? node->source().begin.line : line(), sentence);
-  }
-  toml::source_index line() const { return table_.source().begin.line; }
-  const std::string& file() const { return file_; }
-  bool has(const std::string& key) const { return table_.contains(key); }
-
-  std::string text(const std::string& key) const {
-    const toml::node& node = required(key);
-    if (const auto* value = node.as_string(); value && !value->get().empty()) return value->get();
-    fail(node.source().begin.line, "\"" + key + "\" must be a text that is not empty");
-  }
-  std::string text_or(const std::string& key, const std::string& fallback) const {
-    return has(key) ? text(key) : fallback;
-  }
-  bool flag_or(const std::string& key, bool fallback) const {
-    if (!has(key)) return fallback;
-    if (const auto* value = table_.get(key)->as_boolean()) return value->get();
-    fail_at(key, "\"" + key + "\" must be true or false");
-  }
-  double number_or(const std::string& key, double fallback, double lower, double upper) const {
-    return has(key) ? number(*table_.get(key), key, lower, upper) : fallback;
-  }
-  std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t lower,
-                          std::int64_t upper) const {
-    return has(key) ? integer(*table_.get(key), key, lower, upper) : fallback;
-  }
-
-  double number(const toml::node& node, const std::string& key, double lower, double upper) const {
-    const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (value && *value >= lower && *value <= upper) return *value;
-    std::ostringstream range;
-    range << "\"" << key << "\" must be a number from " << lower << " to " << upper;
-    fail(node.source().begin.line, range.str());
-  }
-  std::int64_t integer(const toml::node& node, const std::string& key, std::int64_t lower,
-                       std::int64_t upper) const {
-    if (const auto* value = node.as_integer(); value && value->get() >= lower && value->get() <= upper)
-      return value->get();
-    fail(node.source().begin.line, "\"" + key + "\" must be a whole number from " + std::to_string(lower) +
-                                       " to " + std::to_string(upper));
-  }
-
-  const toml::array& list(const std::string& key) const {
-    const toml::node& node = required(key);
-    if (const auto* array = node.as_array(); array && !array->empty()) return *array;
-    fail(node.source().begin.line, "\"" + key + "\" must be a list [ … ] that is not empty");
-  }
-  /// Names out of `known`, each at most once.
-  std::vector<std::string> names(const std::string& key, const std::string& kind,
-                                 const std::vector<std::string>& known) const {
-    std::vector<std::string> result;
-    for (const toml::node& node : list(key)) {
-      const auto* value = node.as_string();
-      if (!value) fail(node.source().begin.line, "\"" + key + "\" must be a list of texts");
-      const std::string name = value->get();
-      if (std::find(known.begin(), known.end(), name) == known.end())
-        fail(node.source().begin.line,
-             "there is no " + kind + " \"" + name + "\"; there are " + joined(known));
-      if (std::find(result.begin(), result.end(), name) != result.end())
-        fail(node.source().begin.line, "the " + kind + " \"" + name + "\" is named twice");
-      result.push_back(name);
-    }
-    return result;
-  }
-  const toml::table& table(const toml::node& node, const std::string& what) const {
-    if (const auto* value = node.as_table()) return *value;
-    fail(node.source().begin.line, what + " must be a table");
-  }
-  const toml::table* optional_table(const std::string& key) const {
-    const toml::node* node = table_.get(key);
-    return node ? &table(*node, "\"" + key + "\"") : nullptr;
-  }
-
- private:
-  const toml::node& required(const std::string& key) const {
-    const toml::node* node = table_.get(key);
-    if (!node) fail(line(), what_ + " needs the key \"" + key + "\"");
-    return *node;
-  }
-
-  std::string file_;
-  const toml::table& table_;
-  std::string what_;
-};
-
-toml::table parse(const std::filesystem::path& path) {
-  const std::string file = path.filename().string();
-  if (!std::filesystem::is_regular_file(path))
-    throw Error("there is no experiment file " + path.string() +
-                "; `hermesh list` names those that there are");
-  try {
-    return toml::parse_file(path.string());
-  } catch (const toml::parse_error& error) {
-    throw Error(file + ":" + std::to_string(std::max<toml::source_index>(error.source().begin.line, 1)) +
-                ": " + std::string(error.description()));
-  }
-}
 
 template <class Entry>
 std::vector<std::string> names_of(std::span<const Entry> table) {
@@ -160,17 +37,19 @@ std::string option_text(const Section& section, const std::string& key, const to
   return text.str();
 }
 
-VariantEntry read_variant(const Section& file, const toml::node& node,
-                          std::span<const Extractor> extractors) {
-  const Section section(file.file(), file.table(node, "a variant"), "a variant",
+/// A variant by its table of `options` in the file, checked against the declarations.
+template <class Entry>
+VariantEntry read_variant(const Section& file, const toml::node& node, const std::string& kind,
+                          std::span<const Entry> table) {
+  const Section section(file.file(), file.table(node, "a " + kind), "a " + kind,
                         {"name", "label", "options"});
   VariantEntry entry;
   entry.name = section.text("name");
-  const auto known = std::find_if(extractors.begin(), extractors.end(),
-                                  [&](const Extractor& extractor) { return extractor.name == entry.name; });
-  if (known == extractors.end())
+  const auto known =
+      std::find_if(table.begin(), table.end(), [&](const Entry& each) { return each.name == entry.name; });
+  if (known == table.end())
     section.fail_at("name",
-                    "there is no variant \"" + entry.name + "\"; there are " + joined(names_of(extractors)));
+                    "there is no " + kind + " \"" + entry.name + "\"; there are " + joined(names_of(table)));
   entry.label = section.text_or("label", entry.name);
   const toml::table* options = section.optional_table("options");
   if (!options) return entry;
@@ -186,11 +65,13 @@ VariantEntry read_variant(const Section& file, const toml::node& node,
   return entry;
 }
 
-std::vector<VariantEntry> read_variants(const Section& file, std::span<const Extractor> extractors) {
+template <class Entry>
+std::vector<VariantEntry> read_variants(const Section& file, const std::string& kind,
+                                        std::span<const Entry> table) {
   std::vector<VariantEntry> variants;
   std::set<std::string> labels;
-  for (const toml::node& node : file.list("variants")) {
-    variants.push_back(read_variant(file, node, extractors));
+  for (const toml::node& node : file.list(kind + "s")) {
+    variants.push_back(read_variant(file, node, kind, table));
     if (!labels.insert(variants.back().label).second)
       file.fail(node.source().begin.line,
                 "the label \"" + variants.back().label + "\" is used twice; a row is known by it");
@@ -198,68 +79,201 @@ std::vector<VariantEntry> read_variants(const Section& file, std::span<const Ext
   return variants;
 }
 
-CaseEntry read_case(const Section& file, const toml::node& node, const std::vector<std::string>& cases) {
-  const Section section(file.file(), file.table(node, "a case"), "a case",
-                        {"name", "resolutions", "closeup", "view"});
-  CaseEntry entry;
-  entry.name = section.text("name");
-  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end())
-    section.fail_at("name", "there is no case \"" + entry.name + "\"; there are " + joined(cases));
-  for (const toml::node& item : section.list("resolutions"))
-    entry.resolutions.push_back(static_cast<int>(section.integer(item, "resolutions", 2, 100'000)));
+/// Either names or tables.
+std::vector<VariantEntry> read_voxelizers(const Section& file, std::span<const Voxelizer> table) {
+  if (file.list("voxelizers")[0].is_table()) return read_variants(file, "voxelizer", table);
+  std::vector<VariantEntry> voxelizers;
+  for (const std::string& name : file.names("voxelizers", "voxelizer", names_of(table)))
+    voxelizers.push_back({name, name, {}});
+  return voxelizers;
+}
+
+std::vector<double> read_numbers(const Section& section, const std::string& key, double lower, double upper) {
+  std::vector<double> numbers;
+  for (const toml::node& item : section.list(key)) numbers.push_back(section.number(item, key, lower, upper));
+  return numbers;
+}
+
+void read_view(const Section& section, CaseEntry& entry) {
   if (section.has("closeup")) {
-    const toml::array& list = section.list("closeup");
+    const std::vector<double> list = read_numbers(section, "closeup", 0.0, 2.0);
     if (list.size() != 4)
       section.fail_at("closeup", "\"closeup\" must be [x, y, z, size], fractions of the box");
-    for (std::size_t i = 0; i < 3; ++i)
-      entry.close_up.centre[i] = section.number(list[i], "closeup", 0.0, 1.0);
-    entry.close_up.size = section.number(list[3], "closeup", 1e-6, 2.0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (list[i] > 1.0) section.fail_at("closeup", "the centre of \"closeup\" must lie in the box, 0 to 1");
+      entry.close_up.centre[i] = list[i];
+    }
+    if (list[3] < 1e-6) section.fail_at("closeup", "the size of \"closeup\" must be above 0");
+    entry.close_up.size = list[3];
   }
   if (section.has("view")) {
     const toml::array& list = section.list("view");
     if (list.size() != 2) section.fail_at("view", "\"view\" must be [azimuth, elevation] in degrees");
     entry.viewpoint = {section.number(list[0], "view", -360, 360), section.number(list[1], "view", -89, 89)};
   }
+}
+
+/// "all" or a number of them.
+std::int64_t read_amount(const Section& section, const std::string& key, std::int64_t fallback) {
+  if (!section.has(key)) return fallback;
+  if (section.is_text(key)) {
+    section.choice(key, {"all"});
+    return JudgedBy::kAll;
+  }
+  return section.integer_or(key, fallback, 1, 100'000'000);
+}
+
+JudgedBy read_judged(const Section& section, const std::vector<std::string>& cases) {
+  using Signs = JudgedBy::Signs;
+  constexpr std::int64_t kSamples = 10'000;
+  JudgedBy judged;
+  if (section.has("distances")) judged.distances = read_amount(section, "distances", 0);
+  if (section.has("signs"))
+    judged.signs = Signs(section.choice("signs", {"none", "parity", "unanimous-parity", "winding-number"}));
+  const std::int64_t usual = judged.signs == Signs::kParity ? JudgedBy::kAll : kSamples;
+  judged.sign_samples = read_amount(section, "sign_samples", usual);
+  if (judged.signs != Signs::kParity && judged.sign_samples == JudgedBy::kAll)
+    section.fail_at("sign_samples", "only parity can judge the signs of all voxels");
+  judged.solid = section.text_or("solid", "");
+  if (!judged.solid.empty() && std::find(cases.begin(), cases.end(), judged.solid) == cases.end())
+    section.fail_at("solid", "there is no case \"" + judged.solid + "\"; there are " + joined(cases));
+  return judged;
+}
+
+std::optional<Sweep> read_sweep(const Section& section) {
+  const toml::table* table = section.optional_table("sweep");
+  if (!table) return std::nullopt;
+  if (table->size() != 1)
+    section.fail_at("sweep", "\"sweep\" must be { parameter = [values] } of the case's recipe");
+  const std::string parameter(table->begin()->first.str());
+  const Section values(section.file(), *table, "a sweep", {parameter});
+  return Sweep{parameter, read_numbers(values, parameter, -1e9, 1e9)};
+}
+
+void read_voxel_sizes(const Section& section, CaseEntry& entry) {
+  entry.voxel_sizes = read_numbers(section, "voxel_sizes", 1e-9, 1e9);
+  if (section.has("length")) entry.length = section.number_or("length", 1.0, 1e-9, 1e9);
+  if (!section.has("published_seconds")) return;
+  entry.published_seconds = read_numbers(section, "published_seconds", 0.0, 1e9);
+  if (entry.published_seconds.size() != entry.voxel_sizes.size())
+    section.fail_at("published_seconds", "\"published_seconds\" must have a value for every voxel size");
+}
+
+CaseEntry read_case(const Section& file, const toml::node& node, ExperimentKind kind,
+                    const std::vector<std::string>& cases) {
+  const bool extraction = kind == ExperimentKind::kExtraction;
+  const Section section(file.file(), file.table(node, "a case"), "a case",
+                        extraction ? std::vector<std::string>{"name", "resolutions", "closeup", "view"}
+                                   : std::vector<std::string>{"name", "resolutions", "voxel_sizes", "length",
+                                                              "published_seconds", "sweep", "distances",
+                                                              "signs", "sign_samples", "solid"});
+  CaseEntry entry;
+  entry.name = section.text("name");
+  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end())
+    section.fail_at("name", "there is no case \"" + entry.name + "\"; there are " + joined(cases));
+  if (section.has("voxel_sizes")) {
+    if (section.has("resolutions"))
+      section.fail_at("resolutions", "a case has either \"resolutions\" or \"voxel_sizes\"");
+    read_voxel_sizes(section, entry);
+  } else {
+    for (const toml::node& item : section.list("resolutions"))
+      entry.resolutions.push_back(static_cast<int>(section.integer(item, "resolutions", 2, 100'000)));
+  }
+  if (extraction) {
+    read_view(section, entry);
+    return entry;
+  }
+  entry.sweep = read_sweep(section);
+  entry.judged = read_judged(section, cases);
   return entry;
 }
 
-Tier read_tier(const Section& file, const std::string& name, const toml::table& table,
+Tier read_tier(const Section& file, const std::string& name, const toml::table& table, ExperimentKind kind,
                const std::vector<std::string>& cases) {
+  const bool extraction = kind == ExperimentKind::kExtraction;
   const Section section(
       file.file(), table, "[" + name + "]",
-      {"cases", "repetitions", "seconds_per_variant", "samples", "pixels", "self_intersections"});
+      extraction ? std::vector<std::string>{"cases", "repetitions", "seconds_per_variant", "samples",
+                                            "pixels", "self_intersections"}
+                 : std::vector<std::string>{"cases", "repetitions", "seconds_per_variant", "components"});
   Tier tier;
   tier.repetitions = static_cast<int>(section.integer_or("repetitions", tier.repetitions, 1, 1000));
   tier.seconds_per_variant = section.number_or("seconds_per_variant", tier.seconds_per_variant, 0.0, 1e5);
   tier.samples = section.integer_or("samples", tier.samples, 1, 1'000'000'000);
   tier.pixels = static_cast<int>(section.integer_or("pixels", tier.pixels, 0, 4000));
   tier.self_intersections = section.flag_or("self_intersections", tier.self_intersections);
-  for (const toml::node& node : section.list("cases")) tier.cases.push_back(read_case(section, node, cases));
+  tier.components = section.flag_or("components", tier.components);
+  for (const toml::node& node : section.list("cases"))
+    tier.cases.push_back(read_case(section, node, kind, cases));
   return tier;
+}
+
+Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vocabulary) {
+  const Section section(
+      file.file(), file.table(node, "a plot"), "a plot",
+      {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent"});
+  const auto known = [&](const std::string& key, const std::string& name,
+                         const std::vector<std::string>& names) {
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      section.fail_at(key,
+                      "there is no " + std::string(key == "case" ? "case" : "column") + " \"" + name + "\"");
+    return name;
+  };
+  Plot plot;
+  plot.name = section.text("name");
+  plot.title = section.text("title");
+  if (section.has("case")) plot.case_name = known("case", section.text("case"), vocabulary.cases);
+  plot.x = known("x", section.text("x"), vocabulary.columns);
+  plot.y = section.names("y", "column", vocabulary.columns);
+  plot.x_label = section.text("x_label");
+  plot.y_label = section.text("y_label");
+  plot.log_x = section.flag_or("log_x", false);
+  plot.log_y = section.flag_or("log_y", false);
+  plot.percent = section.flag_or("percent", false);
+  return plot;
+}
+
+void read_extraction(const Section& file, const Vocabulary& vocabulary, Experiment& experiment) {
+  for (const char* key : {"exterior_band", "interior_band", "plots"})
+    if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"voxelization\"");
+  experiment.variants = read_variants(file, "variant", vocabulary.extractors);
+  if (file.has("features")) experiment.features = file.number_or("features", 30.0, 0.0, 180.0);
+}
+
+void read_voxelization(const Section& file, const Vocabulary& vocabulary, Experiment& experiment) {
+  for (const char* key : {"variants", "features"})
+    if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"extraction\"");
+  experiment.exterior_band = file.number_or("exterior_band", 3.0, 1.0, 1e4);
+  experiment.interior_band = file.number_or("interior_band", 3.0, 1.0, 1e4);
+  if (file.has("plots"))
+    for (const toml::node& node : file.list("plots"))
+      experiment.plots.push_back(read_plot(file, node, vocabulary));
 }
 
 }  // namespace
 
 Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& vocabulary) {
-  const toml::table table = parse(path);
+  const toml::table table = parse_toml(path);
   const Section file(path.filename().string(), table, "an experiment",
-                     {"question", "voxelizers", "columns", "variants", "features", "quick", "full"});
+                     {"kind", "question", "voxelizers", "columns", "variants", "features", "exterior_band",
+                      "interior_band", "plots", "quick", "full"});
   Experiment experiment;
   experiment.name = path.stem().string();
+  if (file.has("kind")) experiment.kind = ExperimentKind(file.choice("kind", {"extraction", "voxelization"}));
   experiment.question = file.text("question");
-  experiment.voxelizers = file.names("voxelizers", "voxelizer", names_of(vocabulary.voxelizers));
+  experiment.voxelizers = read_voxelizers(file, vocabulary.voxelizers);
   experiment.columns = file.names("columns", "column", vocabulary.columns);
-  experiment.variants = read_variants(file, vocabulary.extractors);
-  if (file.has("features")) experiment.features = file.number_or("features", 30.0, 0.0, 180.0);
+  const bool extraction = experiment.kind == ExperimentKind::kExtraction;
+  (extraction ? read_extraction : read_voxelization)(file, vocabulary, experiment);
   for (const std::string tier : {"quick", "full"})
     if (const toml::table* found = file.optional_table(tier))
-      experiment.tiers[tier] = read_tier(file, tier, *found, vocabulary.cases);
+      experiment.tiers[tier] = read_tier(file, tier, *found, experiment.kind, vocabulary.cases);
   if (experiment.tiers.empty()) file.fail(1, "an experiment needs a table [quick] or [full] with its cases");
   return experiment;
 }
 
 std::string read_question(const std::filesystem::path& path) {
-  const toml::table table = parse(path);
+  const toml::table table = parse_toml(path);
   const auto question = table["question"].value<std::string>();
   if (!question) throw Error(path.filename().string() + ":1: an experiment needs the key \"question\"");
   return *question;

@@ -1,6 +1,6 @@
 // Experiment files: a question, and the matrix of cells that answers it. README of the format: the comment at
-// the head of headline.toml. Read strictly, because a misspelt key that is ignored turns into a wrong figure
-// in a paper.
+// the head of headline.toml, and for voxelizers that of voxelization_speed.toml. Read strictly, because a
+// misspelt key that is ignored turns into a wrong figure in a paper.
 #pragma once
 
 #include <array>
@@ -13,9 +13,30 @@
 #include <vector>
 
 #include "algorithms/core/variant.h"
+#include "experiments/plot.h"
 #include "experiments/render.h"
 
 namespace hermesh {
+
+/// Who competes: extractors on the grids of the voxelizers, or the voxelizers themselves.
+enum class ExperimentKind { kExtraction, kVoxelization };
+
+/// A parameter of a generated case that takes several values.
+struct Sweep {
+  std::string parameter;  ///< of the case's recipe
+  std::vector<double> values;
+};
+
+/// Against what the voxelizers' level sets of a case are judged.
+struct JudgedBy {
+  enum class Signs { kNone, kParity, kUnanimousParity, kWinding };
+  static constexpr std::int64_t kAll = 0;
+  std::optional<std::int64_t> distances;  ///< kAll voxels of the band or so many; absent: not judged
+  Signs signs = Signs::kNone;
+  std::int64_t sign_samples = kAll;
+  std::string
+      solid;  ///< case whose surface bounds the solid, where the input's own does not tell; empty: the input
+};
 
 /// An input at some resolutions; a resolution is the number of voxels along the longest side of the input's
 /// box.
@@ -24,10 +45,17 @@ struct CaseEntry {
   std::vector<int> resolutions;
   CloseUp close_up;
   Viewpoint viewpoint;
+
+  // Of experiments on voxelization alone.
+  std::vector<double> voxel_sizes;  ///< instead of resolutions
+  std::optional<double> length;     ///< of the longest side in the units of voxel_sizes; absent: world units
+  std::vector<double> published_seconds;  ///< somebody else's figure for each voxel size; empty: none
+  std::optional<Sweep> sweep;
+  JudgedBy judged;
 };
 
 struct VariantEntry {
-  std::string name;                            ///< of an entry in a table of extractors
+  std::string name;                            ///< of an entry in a table of extractors or voxelizers
   std::string label;                           ///< unique in the file; the name when the file gives none
   std::map<std::string, std::string> options;  ///< as given
 };
@@ -35,22 +63,32 @@ struct VariantEntry {
 /// How much work a run is.
 struct Tier {
   std::vector<CaseEntry> cases;
-  int repetitions = 5;  ///< timed extractions a variant, at most
+  int repetitions = 5;  ///< timed runs a variant, at most
   double seconds_per_variant =
       5.0;  ///< no further repetition of a variant starts once its own have used this up
   std::int64_t samples = 100'000;  ///< of the distances, on each surface
   int pixels = 400;                ///< width of one picture on the sheet; 0 draws none
   bool self_intersections = true;  ///< false leaves them uncounted, and a promise about them unchecked
+  bool components = false;         ///< count those of the surface in each voxelizer's level set
 };
 
 struct Experiment {
   std::string name;  ///< the file's name without extension
+  ExperimentKind kind = ExperimentKind::kExtraction;
   std::string question;
-  std::vector<std::string> voxelizers, columns;
-  std::vector<VariantEntry> variants;
+  std::vector<VariantEntry> voxelizers;
+  std::vector<std::string> columns;
+  std::vector<VariantEntry> variants;               ///< extractors; none in an experiment on voxelization
+  double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
   std::optional<double>
       features;  ///< dihedral angle in degrees above which an edge is a sharp feature; absent: not judged
+  std::vector<Plot> plots;
   std::map<std::string, Tier> tiers;
+
+  /// Those whose rows are compared.
+  const std::vector<VariantEntry>& contenders() const {
+    return kind == ExperimentKind::kVoxelization ? voxelizers : variants;
+  }
 };
 
 /// The names that a file may use.

@@ -19,8 +19,9 @@ class ExperimentFile : public testing::Test {
 
   Experiment read(const std::string& text) {
     std::ofstream(folder_ / "toy.toml") << text;
-    return read_experiment(folder_ / "toy.toml",
-                           {extractors_, voxelizers_, {"ball", "cube"}, {"points", "seconds", "promises"}});
+    return read_experiment(
+        folder_ / "toy.toml",
+        {extractors_, voxelizers_, {"ball", "cube"}, {"points", "seconds", "promises", "swept"}});
   }
   /// What read() complains of; empty when it does not.
   std::string complaint(const std::string& text) {
@@ -53,7 +54,7 @@ class ExperimentFile : public testing::Test {
   const std::vector<OptionSpec> options_ = {{"size", "1", "", {}, 0.0, 10.0},
                                             {"mode", "slow", "", {"slow", "fast"}}};
   const std::vector<Extractor> extractors_ = {{"toy", "a toy", {}, options_, nullptr}};
-  const std::vector<Voxelizer> voxelizers_ = {{"plain", "plain", {}, nullptr}};
+  const std::vector<Voxelizer> voxelizers_ = {{"plain", "plain", options_, nullptr}};
 };
 
 TEST_F(ExperimentFile, ReadsEveryKey) {
@@ -134,6 +135,129 @@ TEST_F(ExperimentFile, EveryMistakeNamesFileAndLine) {
         << replacement << " -> " << sentence;
     EXPECT_NE(sentence.find(expected), std::string::npos) << replacement << " -> " << sentence;
   }
+}
+
+/// A valid experiment on voxelization with one line replaced.
+std::string voxelization(int line = 0, const std::string& replacement = "") {
+  std::vector<std::string> lines = {
+      "kind = \"voxelization\"",
+      "question = \"why?\"",
+      "columns = [\"seconds\"]",
+      "exterior_band = 2",
+      "[[voxelizers]]",
+      "name = \"plain\"",
+      "[[voxelizers]]",
+      "name = \"plain\"",
+      "label = \"plain, fast\"",
+      "options = { mode = \"fast\" }",
+      "[[plots]]",
+      "name = \"p\"",
+      "title = \"t\"",
+      "case = \"ball\"",
+      "x = \"swept\"",
+      "y = [\"seconds\"]",
+      "x_label = \"x\"",
+      "y_label = \"y\"",
+      "log_x = true",
+      "[quick]",
+      "components = true",
+      "cases = [{ name = \"ball\", resolutions = [10], distances = \"all\", signs = \"parity\", solid = "
+      "\"cube\" },",
+      "  { name = \"cube\", voxel_sizes = [2, 0.5], length = 7, published_seconds = [1, 3], distances = 99, "
+      "signs = \"winding-number\" },",
+      "  { name = \"cube\", voxel_sizes = [1], sweep = { side = [1, 2.5] }, signs = \"parity\", sign_samples "
+      "= 50 }]"};
+  if (line > 0) lines[static_cast<std::size_t>(line - 1)] = replacement;
+  std::string text;
+  for (const std::string& l : lines) text += l + "\n";
+  return text;
+}
+
+TEST_F(ExperimentFile, ReadsEveryKeyOfVoxelization) {
+  const Experiment e = read(voxelization());
+  EXPECT_EQ(e.kind, ExperimentKind::kVoxelization);
+  EXPECT_EQ(e.exterior_band, 2.0);
+  EXPECT_EQ(e.interior_band, 3.0);
+  ASSERT_EQ(e.contenders().size(), 2u);
+  EXPECT_EQ(e.contenders()[1].label, "plain, fast");
+  EXPECT_EQ(e.contenders()[1].options.at("mode"), "fast");
+  EXPECT_EQ(e.plots, (std::vector<Plot>{{.name = "p",
+                                         .title = "t",
+                                         .case_name = "ball",
+                                         .x = "swept",
+                                         .y = {"seconds"},
+                                         .x_label = "x",
+                                         .y_label = "y",
+                                         .log_x = true}}));
+  const Tier& tier = e.tiers.at("quick");
+  EXPECT_TRUE(tier.components);
+  ASSERT_EQ(tier.cases.size(), 3u);
+  const JudgedBy &first = tier.cases[0].judged, &second = tier.cases[1].judged, &third = tier.cases[2].judged;
+  EXPECT_EQ(first.distances, JudgedBy::kAll);
+  EXPECT_EQ(first.signs, JudgedBy::Signs::kParity);
+  EXPECT_EQ(first.sign_samples, JudgedBy::kAll);
+  EXPECT_EQ(first.solid, "cube");
+  EXPECT_EQ(tier.cases[1].voxel_sizes, (std::vector<double>{2, 0.5}));
+  EXPECT_EQ(tier.cases[1].length, 7.0);
+  EXPECT_EQ(tier.cases[1].published_seconds, (std::vector<double>{1, 3}));
+  EXPECT_EQ(second.distances, 99);
+  EXPECT_EQ(second.signs, JudgedBy::Signs::kWinding);
+  EXPECT_EQ(second.sign_samples, 10'000);
+  ASSERT_TRUE(tier.cases[2].sweep);
+  EXPECT_EQ(tier.cases[2].sweep->parameter, "side");
+  EXPECT_EQ(tier.cases[2].sweep->values, (std::vector<double>{1, 2.5}));
+  EXPECT_FALSE(third.distances);
+  EXPECT_EQ(third.sign_samples, 50);
+}
+
+TEST_F(ExperimentFile, MistakesOfVoxelizationNameTheirLine) {
+  ASSERT_EQ(complaint(voxelization()), "");
+  const std::vector<std::tuple<int, std::string, std::string>> mistakes = {
+      {1, "kind = \"voxels\"", "one of extraction, voxelization"},
+      {2, "question = \"why?\"\nvariants = 3", ""},
+      {4, "exterior_band = 0.5", "exterior_band"},
+      {6, "name = \"plane\"", "no voxelizer \"plane\"; there are plain"},
+      {9, "", ""},  // the label is used twice
+      {10, "options = { mood = \"fast\" }", "mood"},
+      {14, "case = \"bell\"", "no case"},
+      {15, "x = \"sweep\"", "no column"},
+      {19, "logarithm = true", "unknown key"},
+      {21, "samples = 5", "unknown key \"samples\""},
+      {22, "cases = [{ name = \"ball\" },", "resolutions"},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], view = [1, 2] },", "unknown key \"view\""},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], voxel_sizes = [1] },", "either"},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], distances = \"some\" },", "one of all"},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], distances = 0 },", "distances"},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], signs = \"guess\" },", "one of none, parity"},
+      {22,
+       "cases = [{ name = \"ball\", resolutions = [10], signs = \"winding-number\", sign_samples = \"all\" "
+       "},",
+       "only parity"},
+      {22, "cases = [{ name = \"ball\", resolutions = [10], solid = \"bell\" },", "no case \"bell\""},
+      {23, "  { name = \"cube\", voxel_sizes = [2], published_seconds = [1, 3] },", "for every voxel size"},
+      {23, "  { name = \"cube\", voxel_sizes = [0] },", "voxel_sizes"},
+      {24, "  { name = \"cube\", voxel_sizes = [1], sweep = { a = [1], b = [2] } }]", "sweep"},
+      {24, "  { name = \"cube\", voxel_sizes = [1], sweep = { a = 1 } }]", "must be a list"},
+  };
+  for (const auto& [line, replacement, expected] : mistakes) {
+    const std::string sentence = complaint(voxelization(line, replacement));
+    EXPECT_TRUE(sentence.starts_with("toy.toml:")) << replacement << " -> " << sentence;
+    if (!expected.empty()) {
+      EXPECT_TRUE(sentence.starts_with("toy.toml:" + std::to_string(line) + ": "))
+          << replacement << " -> " << sentence;
+    }
+    EXPECT_NE(sentence.find(expected), std::string::npos) << replacement << " -> " << sentence;
+  }
+}
+
+TEST_F(ExperimentFile, ExtractionTakesVoxelizersWithOptionsAndNothingOfVoxelization) {
+  const std::string tables = "voxelizers = [{ name = \"plain\", label = \"p\", options = { size = 2 } }]";
+  const Experiment e = read(valid(2, tables));
+  ASSERT_EQ(e.voxelizers.size(), 1u);
+  EXPECT_EQ(e.voxelizers[0].label, "p");
+  EXPECT_EQ(e.voxelizers[0].options.at("size"), "2");
+  EXPECT_NE(complaint(valid(3, "columns = [\"points\"]\nexterior_band = 3")).find("needs kind"),
+            std::string::npos);
 }
 
 TEST_F(ExperimentFile, MissingKeysAreNamed) {

@@ -3,12 +3,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "experiments/cases.h"
+#include "experiments/cell.h"
 #include "experiments/provenance.h"
 #include "experiments/run_cells.h"
+#include "experiments/run_voxelizers.h"
 #include "experiments/table.h"
 
 namespace hermesh {
@@ -39,6 +43,11 @@ Json run_head(const Experiment& experiment, const RunSettings& settings) {
   head["run"] = origin.at("date").get<std::string>() + "-" + std::to_string(getpid());
   head.update(origin);
   head["columns"] = experiment.columns;
+  if (experiment.kind == ExperimentKind::kExtraction) return head;
+  head["kind"] = "voxelization";
+  head["band"] = {{"exterior", experiment.exterior_band}, {"interior", experiment.interior_band}};
+  if (!experiment.plots.empty()) head["plots"] = Json::array();
+  for (const Plot& plot : experiment.plots) head["plots"].push_back(to_json(plot));
   return head;
 }
 
@@ -77,13 +86,16 @@ class Run {
 
   int run() {
     table_ << "## " << experiment_.name << " (" << settings_.tier << "): " << experiment_.question << "\n\n";
-    for (const CaseEntry& entry : tier_.cases) run_case(entry);
+    const bool extraction = experiment_.kind == ExperimentKind::kExtraction;
+    for (const CaseEntry& entry : tier_.cases) extraction ? run_case(entry) : voxelize_case(entry);
     if (rows_.empty())
       throw Error("no cell of " + experiment_.name + " contains \"" + settings_.filter +
                   "\" in its case/resolution/variant");
     write_legend(rows_, table_);
     table_ << "\nRows: " << (out_ / "rows.jsonl").string() << "; pictures: " << (out_ / "*.png").string()
            << "\n";
+    // Of all rows in the folder: earlier runs with another filter belong to the same picture.
+    write_plots(read_rows(out_), out_, table_);
     return exit_code(rows_);
   }
 
@@ -95,19 +107,84 @@ class Run {
       const std::vector<VariantEntry> variants = filtered(experiment_.variants, cell, settings_.filter);
       if (variants.empty()) continue;
       if (!input) input = tables_.load(entry.name, context_);
-      for (const std::string& voxelizer : experiment_.voxelizers)
+      for (const VariantEntry& voxelizer : experiment_.voxelizers)
         finish_group(run_group({.experiment = experiment_,
                                 .tier = tier_,
                                 .entry = entry,
                                 .input = *input,
                                 .resolution = resolution,
-                                .voxelizer = find_variant(tables_.voxelizers, voxelizer),
+                                .voxelizer = voxelizer,
                                 .variants = variants,
                                 .tables = tables_,
                                 .out = out_,
                                 .head = head_},
                                context_));
     }
+  }
+
+  /// The rows of a sweep, and those of several voxel sizes, make one table.
+  void voxelize_case(const CaseEntry& entry) {
+    std::vector<Json> rows;
+    const Sweep none{"", {0.0}};
+    const Sweep& sweep = entry.sweep ? *entry.sweep : none;
+    for (const double value : sweep.values) {
+      const std::string cell = entry.name + "/" + (entry.sweep ? readable(value) + "/" : "");
+      std::optional<LoadedCase> input, solid;
+      const std::size_t sizes = entry.resolutions.size() + entry.voxel_sizes.size();
+      for (std::size_t i = 0; i < sizes; ++i) {
+        const bool by_size = !entry.voxel_sizes.empty();
+        const std::vector<VariantEntry> left = filtered(
+            experiment_.voxelizers,
+            cell + (by_size ? readable(entry.voxel_sizes[i]) : std::to_string(entry.resolutions[i])) + "/",
+            settings_.filter);
+        if (left.empty()) continue;
+        if (!input) input = load(entry.name, sweep, value);
+        if (!solid && !entry.judged.solid.empty()) solid = load(entry.judged.solid, sweep, value);
+        const double longest = bounds(input->mesh).size().maxCoeff();
+        const double voxel_size = by_size
+                                      ? entry.voxel_sizes[i] * (entry.length ? longest / *entry.length : 1.0)
+                                      : longest / entry.resolutions[i];
+        const Json head = cell_head(entry, *input, voxel_size, i, value);
+        std::vector<Json> cells = run_voxelizers({.experiment = experiment_,
+                                                  .tier = tier_,
+                                                  .entry = entry,
+                                                  .input = *input,
+                                                  .solid = solid ? *solid : *input,
+                                                  .voxel_size = voxel_size,
+                                                  .voxelizers = left,
+                                                  .tables = tables_,
+                                                  .head = head},
+                                                 context_);
+        for (const Json& row : cells) append_row(out_ / "rows.jsonl", row);
+        std::move(cells.begin(), cells.end(), std::back_inserter(rows));
+      }
+    }
+    for (const RowGroup& group : latest_groups(rows)) write_markdown(group, table_);
+    std::move(rows.begin(), rows.end(), std::back_inserter(rows_));
+  }
+
+  LoadedCase load(const std::string& name, const Sweep& sweep, double value) {
+    return sweep.parameter.empty() ? tables_.load(name, context_)
+                                   : tables_.load_changed(name, {{sweep.parameter, value}}, context_);
+  }
+
+  Json cell_head(const CaseEntry& entry, const LoadedCase& input, double voxel_size, std::size_t i,
+                 double value) const {
+    Json head = head_;
+    head["case"] = case_json(input);
+    if (entry.voxel_sizes.empty())
+      head["resolution"] = entry.resolutions[i];
+    else
+      head["nominal_voxel_size"] = entry.voxel_sizes[i];
+    head["voxel_size"] = voxel_size;
+    if (!entry.published_seconds.empty()) head["published_seconds"] = entry.published_seconds[i];
+    if (entry.sweep) head["sweep"] = {{"parameter", entry.sweep->parameter}, {"value", value}};
+    const JudgedBy& judged = entry.judged;
+    if (judged.signs != JudgedBy::Signs::kNone)
+      head["judged_by"] = {{"signs", std::array{"none", "parity", "unanimous parity",
+                                                "winding number"}[std::size_t(judged.signs)]},
+                           {"solid", judged.solid.empty() ? entry.name : judged.solid}};
+    return head;
   }
 
   void finish_group(std::vector<Json> rows) {
@@ -147,7 +224,7 @@ int run_experiment(const RunSettings& settings, const Tables& tables, RunContext
 }
 
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
-  Tables tables{all_extractors(), all_voxelizers(), {}, load_case};
+  Tables tables{all_extractors(), all_voxelizers(), {}, load_case, load_changed_case};
   for (const CaseInfo& info : list_cases()) tables.cases.push_back(info.name);
   return run_experiment(settings, tables, context, table);
 }

@@ -35,7 +35,9 @@ struct RunSettings {
 /// @throws Error for a mistake in the file, naming its line.
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table);
 
-/// Tables from the rows under `folder`, as "md", "csv" or "tex". @throws Error if there are no rows.
+/// Tables from the rows under `folder`, as "md", "csv" or "tex"; or "plots", which draws them into it and
+/// says which.
+/// @throws Error if there are no rows.
 void write_report(const std::filesystem::path& folder, const std::string& format, std::ostream& out);
 
 }  // namespace hermesh

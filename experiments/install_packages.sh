@@ -1,11 +1,12 @@
 # Sourced by ./reproduce and ./test: install_packages NAME… installs what is missing of the distribution's packages, or
 # without root names it and stops.
 
-# To build and run the program.
+# To build, run and test the program.
 hermesh_packages=(
   g++ cmake ninja-build ccache pkg-config ca-certificates git
   libopenvdb-dev libtbb-dev libeigen3-dev libimath-dev libboost-dev libcgal-dev libopenmesh-dev libembree-dev
-  libcairo2-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libbenchmark-dev libgtest-dev)
+  libcairo2-dev gnuplot-nox libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libbenchmark-dev libgtest-dev
+  libopenvdb-tools)
 
 install_packages() {
   local missing=() name

@@ -35,6 +35,9 @@ class PeakMemory {
 /// Seconds that `work` takes.
 double timed(const std::function<void()>& work);
 
+/// CPU seconds of the whole process so far, all threads, in the program and in the kernel.
+double process_cpu_seconds();
+
 /// One competitor in a race of repetitions.
 struct Contender {
   std::function<double()> run;  ///< does the work once and returns its seconds

@@ -97,9 +97,6 @@ PolygonMesh octahedral_sphere(std::uint32_t n) {
   return mesh;
 }
 
-namespace {
-
-/// Adds a sphere; one that faces inwards bounds a cavity.
 void add_sphere(PolygonMesh& mesh, const PolygonMesh& unit_sphere, double radius, const Vector3d& centre,
                 bool inwards) {
   const std::uint32_t first = next_index(mesh);
@@ -109,8 +106,6 @@ void add_sphere(PolygonMesh& mesh, const PolygonMesh& unit_sphere, double radius
     mesh.triangles.push_back(inwards ? Triangle{first + a, first + c, first + b}
                                      : Triangle{first + a, first + b, first + c});
 }
-
-}  // namespace
 
 PolygonMesh nested_spheres(const RecipeParameters& parameters, RunContext&) {
   const PolygonMesh sphere = octahedral_sphere(static_cast<std::uint32_t>(parameters.at("cuts")));
@@ -130,17 +125,21 @@ PolygonMesh overlapping_spheres(const RecipeParameters& parameters, RunContext&)
   return mesh;
 }
 
-PolygonMesh turned_cube(const RecipeParameters& parameters, RunContext&) {
+Vector3d turned(const Vector3d& point, const RecipeParameters& parameters) {
   const auto [cx, sx] = on_circle(parameters.at("about_x") / 360.0);
   const auto [cy, sy] = on_circle(parameters.at("about_y") / 360.0);
   const auto [cz, sz] = on_circle(parameters.at("about_z") / 360.0);
+  Vector3d p = point;
+  p = Vector3d(p.x(), cx * p.y() - sx * p.z(), sx * p.y() + cx * p.z());
+  p = Vector3d(cy * p.x() + sy * p.z(), p.y(), cy * p.z() - sy * p.x());
+  return {cz * p.x() - sz * p.y(), sz * p.x() + cz * p.y(), p.z()};
+}
+
+PolygonMesh turned_cube(const RecipeParameters& parameters, RunContext&) {
   PolygonMesh mesh;
   for (int corner = 0; corner < 8; ++corner) {
-    Vector3d p = Vector3d(corner & 1, corner >> 1 & 1, corner >> 2 & 1) - Vector3d::Constant(0.5);
-    p *= parameters.at("side");
-    p = Vector3d(p.x(), cx * p.y() - sx * p.z(), sx * p.y() + cx * p.z());
-    p = Vector3d(cy * p.x() + sy * p.z(), p.y(), cy * p.z() - sy * p.x());
-    add_point(mesh, Vector3d(cz * p.x() - sz * p.y(), sz * p.x() + cz * p.y(), p.z()));
+    const Vector3d p = Vector3d(corner & 1, corner >> 1 & 1, corner >> 2 & 1) - Vector3d::Constant(0.5);
+    add_point(mesh, turned(parameters.at("side") * p, parameters));
   }
   for (const Quad& q :
        {Quad{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})

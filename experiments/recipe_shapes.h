@@ -28,6 +28,13 @@ void connect_rings(PolygonMesh& mesh, std::uint32_t around);
 /// Unit sphere of 8 n² triangles of about the same area.
 PolygonMesh octahedral_sphere(std::uint32_t n);
 
+/// Adds a sphere; one that faces inwards bounds a cavity.
+void add_sphere(PolygonMesh& mesh, const PolygonMesh& unit_sphere, double radius,
+                const Eigen::Vector3d& centre, bool inwards);
+
+/// The point turned about x, then y, then z, by the parameters about_x, about_y and about_z in degrees.
+Eigen::Vector3d turned(const Eigen::Vector3d& point, const RecipeParameters& parameters);
+
 PolygonMesh noise_sphere(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh nested_spheres(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh overlapping_spheres(const RecipeParameters& parameters, RunContext& context);
@@ -36,5 +43,8 @@ PolygonMesh torus(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh uv_sphere(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh cylinder(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh cad_part(const RecipeParameters& parameters, RunContext& context);
+PolygonMesh sphere_cluster(const RecipeParameters& parameters, RunContext& context);
+PolygonMesh holed_sphere(const RecipeParameters& parameters, RunContext& context);
+PolygonMesh sheets(const RecipeParameters& parameters, RunContext& context);
 
 }  // namespace hermesh::recipes

@@ -2,6 +2,7 @@
 #include <ostream>
 
 #include "experiments/harness.h"
+#include "experiments/plot.h"
 #include "experiments/rows.h"
 #include "experiments/table.h"
 
@@ -25,9 +26,11 @@ void write_markdown_report(const std::vector<Json>& rows, std::ostream& out) {
 }  // namespace
 
 void write_report(const std::filesystem::path& folder, const std::string& format, std::ostream& out) {
-  if (format != "md" && format != "csv" && format != "tex")
-    throw Error("there is no format \"" + format + "\" of reports; there are md, csv, tex");
+  if (format != "md" && format != "csv" && format != "tex" && format != "plots")
+    throw Error("there is no format \"" + format + "\" of reports; there are md, csv, tex, plots");
   const std::vector<Json> rows = read_rows(folder);
+  if (format == "plots")
+    return write_plots(rows, std::filesystem::is_directory(folder) ? folder : folder.parent_path(), out);
   if (format == "csv") return write_csv(rows, out);
   if (format == "md") return write_markdown_report(rows, out);
   for (const RowGroup& group : latest_groups(rows)) write_latex(group, out);

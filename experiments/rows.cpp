@@ -80,6 +80,21 @@ void add_time_ratios(std::vector<Json>& rows) {
     if (const Json* own = median_of(row)) row["time_over_openvdb"] = own->get<double>() / reference;
 }
 
+void add_voxelizer_ratios(std::vector<Json>& rows) {
+  const auto base = std::find_if(rows.begin(), rows.end(), [](const Json& row) {
+    return text_at(row, "/variant/name") == "openvdb" && text_at(row, "/variant/default_options") == "true" &&
+           number_at(row, "/seconds/median") > 0.0;
+  });
+  if (base == rows.end()) return;
+  const double seconds = number_at(*base, "/seconds/median"), peak = number_at(*base, "/peak_bytes");
+  for (Json& row : rows) {
+    if (const double own = number_at(row, "/seconds/median"); own > 0.0)
+      row["openvdb_over_time"] = seconds / own;
+    if (find(row, "/peak_bytes") && peak > 0.0)
+      row["peak_over_openvdb"] = number_at(row, "/peak_bytes") / peak;
+  }
+}
+
 void append_row(const std::filesystem::path& file, const Json& row) {
   // A row may hold text from outside (a CPU's name, a library's message); what is no UTF-8 in it must not
   // lose the row.

@@ -31,6 +31,10 @@ std::string promise_letters(const Promises& promises, const PromiseCheck& check)
 /// a row, nothing.
 void add_time_ratios(std::vector<Json>& rows);
 
+/// The same for voxelizers, the other way round: sets `openvdb_over_time` (above 1 is faster) and
+/// `peak_over_openvdb` in every timed row, relative to the row of variant "openvdb" with its default options.
+void add_voxelizer_ratios(std::vector<Json>& rows);
+
 /// Appends one line in a single write, so that two runs at once do not tear each other's rows.
 /// @throws Error if the file cannot be written.
 void append_row(const std::filesystem::path& file, const Json& row);

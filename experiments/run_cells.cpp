@@ -7,22 +7,12 @@
 #include <optional>
 
 #include "algorithms/core/mesh_file.h"
-#include "experiments/columns.h"
-#include "experiments/measure.h"
+#include "experiments/cell.h"
 #include "experiments/provenance.h"
 #include "validation/report_json.h"
 
 namespace hermesh {
 namespace {
-
-/// A context for one piece of work: its own stage times, the same cancellation; progress only where wanted,
-/// since a terminal has no business inside a timed repetition.
-RunContext child_context(const RunContext& context, bool with_progress) {
-  RunContext child;
-  child.cancel = context.cancel;
-  if (with_progress) child.on_progress = context.on_progress;
-  return child;
-}
 
 /// FNV-1a over the arrays, to see whether a repetition gave the same mesh without keeping both.
 std::uint64_t fingerprint(const PolygonMesh& mesh) {
@@ -42,45 +32,6 @@ std::uint64_t fingerprint(const PolygonMesh& mesh) {
   return hash;
 }
 
-std::string file_name(std::string label) {
-  for (char& c : label)
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '-';
-  return label;
-}
-
-Json seconds_json(const std::vector<double>& seconds, bool warm) {
-  return {{"median", median(seconds)},
-          {"minimum", *std::min_element(seconds.begin(), seconds.end())},
-          {"repetitions", seconds.size()},
-          {"warm", warm},
-          {"all", seconds}};
-}
-
-Json stages_json(const std::vector<StageSeconds>& repetitions) {
-  Json json = Json::object();
-  for (const auto& [name, seconds] : median_stages(repetitions)) json[name] = seconds;
-  return json;
-}
-
-Json optional_json(const std::optional<std::int64_t>& value) { return value ? Json(*value) : Json(nullptr); }
-
-/// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
-/// up and does not count, unless it alone uses up the budget: then it is the only repetition there is.
-struct Timing {
-  Contender contender;
-  std::vector<StageSeconds> stages;
-  bool warm = true;
-
-  Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
-    contender.budget_seconds = tier.seconds_per_variant;
-    contender.repetitions = tier.repetitions;
-    warm = first_seconds < tier.seconds_per_variant;
-    if (warm) return;
-    contender.seconds = {first_seconds};
-    stages = {std::move(first_stages)};
-  }
-};
-
 struct Cell {
   const Extractor* extractor = nullptr;
   Options options;
@@ -96,8 +47,9 @@ class Group {
       : in_(group),
         context_(context),
         voxel_size_(bounds(group.input.mesh).size().maxCoeff() / group.resolution),
-        name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)) {
-    if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.name));
+        name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)),
+        voxelizer_(find_variant(in_.tables.voxelizers, in_.voxelizer.name)) {
+    if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.label));
   }
 
   std::vector<Json> run() {
@@ -123,34 +75,13 @@ class Group {
     cell.extractor = &find_variant(in_.tables.extractors, variant.name);
     cell.options = Options(variant.name, cell.extractor->options, variant.options);
     cell.row = in_.head;
-    cell.row["case"] = {{"name", in_.input.name},
-                        {"origin", in_.input.origin},
-                        {"sha256", in_.input.sha256},
-                        {"points", in_.input.mesh.points.size()},
-                        {"triangles", in_.input.mesh.triangle_count()}};
-    if (in_.input.seed) cell.row["case"]["seed"] = *in_.input.seed;
+    cell.row["case"] = case_json(in_.input);
     cell.row["resolution"] = in_.resolution;
     cell.row["voxel_size"] = voxel_size_;
     cell.row["samples"] = in_.tier.samples;
-    cell.row["variant"] = {{"name", variant.name},
-                           {"label", variant.label},
-                           {"options", cell.options.canonical()},
-                           {"promises", promise_words(cell.extractor->promises)}};
+    cell.row["variant"] = variant_json(variant, cell.options);
+    cell.row["variant"]["promises"] = promise_words(cell.extractor->promises);
     return cell;
-  }
-
-  /// The sentence of what went wrong, if anything did. Being cancelled is no failure of a variant.
-  std::optional<std::string> attempt(const std::function<void()>& work) {
-    try {
-      work();
-      return std::nullopt;
-    } catch (const Cancelled&) {
-      throw;
-    } catch (const std::bad_alloc&) {
-      return "there is not enough memory";
-    } catch (const std::exception& error) {
-      return error.what();
-    }
   }
 
   static void fail(Cell& cell, const std::string& sentence) {
@@ -161,12 +92,13 @@ class Group {
   }
 
   void voxelize() {
-    voxelization_ = {{"name", in_.voxelizer.name}};
+    const Options options(voxelizer_.name, voxelizer_.options, in_.voxelizer.options);
+    voxelization_ = variant_json(in_.voxelizer, options);
     const auto once = [&](bool with_progress, std::optional<StageSeconds>* stages) {
       RunContext child = child_context(context_, with_progress);
       const double seconds = timed([&] {
-        level_set_ =
-            in_.voxelizer.voxelize({.mesh = in_.input.mesh, .voxel_size = voxel_size_, .context = child});
+        level_set_ = voxelizer_.voxelize(
+            {.mesh = in_.input.mesh, .voxel_size = voxel_size_, .context = child, .options = options});
       });
       if (stages) *stages = child.stage_seconds;
       return seconds;
@@ -176,7 +108,7 @@ class Group {
     const double first = once(true, &stages);
     voxelization_["peak_bytes"] = optional_json(memory.bytes());
     if (!level_set_ || level_set_.active_voxels() == 0)
-      throw Error("the voxelizer " + in_.voxelizer.name + " gave a level set without active voxels");
+      throw Error("the voxelizer " + in_.voxelizer.label + " gave a level set without active voxels");
     Timing timing(in_.tier, first, *stages);
     timing.contender.run = [&] {
       const double seconds = once(false, &stages);
@@ -284,8 +216,8 @@ class Group {
   void picture(const std::vector<Json>& rows) {
     Sheet sheet;
     sheet.title = in_.input.name + " at resolution " + std::to_string(in_.resolution);
-    sheet.subtitle =
-        in_.input.origin + ", sha256 " + in_.input.sha256.substr(0, 12) + "; voxelizer " + in_.voxelizer.name;
+    sheet.subtitle = in_.input.origin + ", sha256 " + in_.input.sha256.substr(0, 12) + "; voxelizer " +
+                     in_.voxelizer.label;
     sheet.frame = bounds(in_.input.mesh);
     sheet.close_up = in_.entry.close_up;
     sheet.viewpoint = in_.entry.viewpoint;
@@ -312,6 +244,7 @@ class Group {
   RunContext& context_;
   double voxel_size_;
   std::string name_;
+  const Voxelizer& voxelizer_;
   LevelSet level_set_;
   MeshFile source_;
   Json voxelization_;

@@ -10,6 +10,7 @@
 #include "experiments/cases.h"
 #include "experiments/experiment_file.h"
 #include "experiments/harness.h"
+#include "experiments/recipes.h"
 #include "experiments/rows.h"
 
 namespace hermesh {
@@ -20,6 +21,9 @@ struct Tables {
   std::vector<Voxelizer> voxelizers;
   std::vector<std::string> cases;
   std::function<LoadedCase(const std::string& name, RunContext& context)> load;
+  /// The same with some parameters of the case's recipe changed.
+  std::function<LoadedCase(const std::string& name, const RecipeParameters& changes, RunContext& context)>
+      load_changed;
 };
 
 /// run_experiment() of harness.h with the names to choose from given.
@@ -32,7 +36,7 @@ struct GroupInput {
   const CaseEntry& entry;
   const LoadedCase& input;
   int resolution;
-  const Voxelizer& voxelizer;
+  const VariantEntry& voxelizer;
   std::vector<VariantEntry> variants;  ///< those that the filter leaves
   const Tables& tables;
   std::filesystem::path out;

@@ -73,7 +73,18 @@ std::string for_csv(const std::string& text) {
 
 /// "dragon at resolution 400" and what that was.
 std::string group_title(const Json& row) {
-  return text_at(row, "/case/name") + " at resolution " + text_at(row, "/resolution");
+  std::string title = text_at(row, "/case/name");
+  if (find(row, "/sweep")) title += " by " + text_at(row, "/sweep/parameter");
+  if (find(row, "/resolution")) return title + " at resolution " + text_at(row, "/resolution");
+  return title + (find(row, "/sweep") ? " at voxel size " + text_at(row, "/nominal_voxel_size")
+                                      : " at several voxel sizes");
+}
+
+/// Which of the table's cells a row is, where a table has several.
+std::string cell_text_of(const Json& row) {
+  if (find(row, "/sweep"))
+    return " at " + text_at(row, "/sweep/parameter") + " " + text_at(row, "/sweep/value");
+  return find(row, "/nominal_voxel_size") ? " at voxel " + text_at(row, "/nominal_voxel_size") : "";
 }
 
 std::vector<std::string> group_facts(const Json& row) {
@@ -82,9 +93,14 @@ std::vector<std::string> group_facts(const Json& row) {
                       readable(number_at(row, "/case/triangles")) + " triangles";
   if (text_at(row, "/case/origin").starts_with("stand-in"))
     input = "STAND-IN DATA, not the original; " + input;
-  std::string grid = "grid: voxelizer " + text_at(row, "/voxelization/name") + ", voxel " +
-                     readable(number_at(row, "/voxel_size"));
-  if (find(row, "/voxelization/active_voxels"))
+  std::string grid = "grid: ";
+  if (find(row, "/band"))
+    grid += "band " + readable(number_at(row, "/band/exterior")) + " voxels outside and " +
+            readable(number_at(row, "/band/interior")) + " inside";
+  else
+    grid += "voxelizer " + text_at(row, "/voxelization/label");
+  if (find(row, "/resolution")) grid += ", voxel " + readable(number_at(row, "/voxel_size"));
+  if (!find(row, "/band") && find(row, "/voxelization/active_voxels"))
     grid += ", " + readable(number_at(row, "/voxelization/active_voxels")) + " active voxels, " +
             readable(number_at(row, "/voxelization/memory_bytes") / (1 << 20)) + " MiB, made in " +
             readable(number_at(row, "/voxelization/seconds/median")) + " s";
@@ -93,7 +109,35 @@ std::vector<std::string> group_facts(const Json& row) {
   run += ", " + text_at(row, "/date") + ", " + text_at(row, "/machine/cpu") + ", " +
          text_at(row, "/threads") + " threads";
   if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
-  return {input, grid, run};
+  std::vector<std::string> facts = {input, grid, run};
+  if (find(row, "/judged_by"))
+    facts.push_back("signs: judged by the " + text_at(row, "/judged_by/signs") + " of " +
+                    text_at(row, "/judged_by/solid"));
+  return facts;
+}
+
+/// Where the time goes, a line for every row of voxelizers: "hermesh: band 0.4 s (80 %), …", and what no
+/// stage claims.
+std::vector<std::string> stage_sentences(const RowGroup& group) {
+  std::vector<std::string> sentences;
+  for (const Json& row : group.rows) {
+    const Json* stages = find(row, "/stage_seconds");
+    const double total = number_at(row, "/seconds/median");
+    if (!find(row, "/band") || find(row, "/sweep") || !stages || stages->size() < 2 || total <= 0.0) continue;
+    std::string text;
+    double claimed = 0.0;
+    const auto part = [&](const std::string& name, double seconds) {
+      text += (text.empty() ? "" : ", ") + name + " " + readable(seconds) + " s (" +
+              readable(std::round(100.0 * seconds / total)) + " %)";
+    };
+    for (const auto& [name, seconds] : stages->items()) {
+      part(name, seconds.get<double>());
+      claimed += seconds.get<double>();
+    }
+    if (total - claimed > 0.02 * total) part("rest", total - claimed);
+    sentences.push_back("time of " + text_at(row, "/variant/label") + cell_text_of(row) + ": " + text);
+  }
+  return sentences;
 }
 
 std::vector<std::string> joined_list(const Json& row, const std::string& pointer) {
@@ -107,7 +151,8 @@ std::vector<std::string> joined_list(const Json& row, const std::string& pointer
 std::vector<std::string> alarms(const RowGroup& group) {
   std::vector<std::string> sentences;
   for (const Json& row : group.rows) {
-    const std::string who = text_at(row, "/variant/label") + " on " + group_title(row) + ": ";
+    const std::string who =
+        text_at(row, "/variant/label") + " on " + group_title(row) + cell_text_of(row) + ": ";
     if (find(row, "/failed")) sentences.push_back("FAILED: " + who + text_at(row, "/failed"));
     for (const std::string& broken : joined_list(row, "/broken"))
       sentences.push_back("BROKEN: " + who + broken);
@@ -116,7 +161,9 @@ std::vector<std::string> alarms(const RowGroup& group) {
     for (const std::string& disagreement : joined_list(row, "/disagreements"))
       sentences.push_back("DISAGREEMENT of the judges: " + who + disagreement);
     if (const Json* differ = find(row, "/repetitions_differ"); differ && *differ == true)
-      sentences.push_back("NOT DETERMINISTIC: " + who + "repetitions gave different meshes");
+      sentences.push_back("NOT DETERMINISTIC: " + who + "repetitions gave different " +
+                          (find(row, "/band") ? "level sets" : "meshes"));
+    if (find(row, "/not_judged")) sentences.push_back("NOT JUDGED: " + who + text_at(row, "/not_judged"));
   }
   return sentences;
 }
@@ -128,7 +175,8 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
   std::map<std::string, std::vector<std::pair<std::string, RowGroup>>> runs;
   for (const Json& row : rows) {
     std::string key;
-    for (const char* part : {"/experiment", "/tier", "/case/name", "/resolution", "/voxelization/name"})
+    for (const char* part :
+         {"/experiment", "/tier", "/case/name", "/resolution", "/voxelization/label", "/sweep/parameter"})
       key += text_at(row, part) + "\n";
     if (!runs.contains(key)) order.push_back(key);
     auto& groups = runs[key];
@@ -164,7 +212,8 @@ void write_markdown(const RowGroup& group, std::ostream& out) {
     for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], display_width(line[c]));
 
   const auto left_aligned = [&](std::size_t c) {
-    return c == 0 || shown[c - 1]->name == "promises" || shown[c - 1]->name == "options";
+    return c == 0 || shown[c - 1]->name == "promises" || shown[c - 1]->name == "options" ||
+           shown[c - 1]->name == "fingerprint";
   };
   for (std::size_t r = 0; r < lines.size(); ++r) {
     out << (r == 0 ? "\n|" : "|");
@@ -180,8 +229,9 @@ void write_markdown(const RowGroup& group, std::ostream& out) {
           << " |";
     out << '\n';
   }
-  const std::vector<std::string> loud = alarms(group);
-  if (!loud.empty()) out << '\n';
+  const std::vector<std::string> loud = alarms(group), stages = stage_sentences(group);
+  if (!loud.empty() || !stages.empty()) out << '\n';
+  for (const std::string& sentence : stages) out << "- " << for_markdown(sentence) << "\n";
   for (const std::string& sentence : loud) out << "- **" << for_markdown(sentence) << "**\n";
   out << '\n';
 }
@@ -215,23 +265,27 @@ void write_latex(const RowGroup& group, std::ostream& out) {
 }
 
 void write_csv(const std::vector<Json>& rows, std::ostream& out) {
-  const std::vector<std::pair<std::string, std::string>> keys = {{"experiment", "/experiment"},
-                                                                 {"tier", "/tier"},
-                                                                 {"run", "/run"},
-                                                                 {"commit", "/commit"},
-                                                                 {"dirty", "/dirty"},
-                                                                 {"date", "/date"},
-                                                                 {"cpu", "/machine/cpu"},
-                                                                 {"threads", "/threads"},
-                                                                 {"case", "/case/name"},
-                                                                 {"origin", "/case/origin"},
-                                                                 {"sha256", "/case/sha256"},
-                                                                 {"resolution", "/resolution"},
-                                                                 {"voxel_size", "/voxel_size"},
-                                                                 {"voxelizer", "/voxelization/name"},
-                                                                 {"variant", "/variant/name"},
-                                                                 {"label", "/variant/label"},
-                                                                 {"failed", "/failed"}};
+  const std::vector<std::pair<std::string, std::string>> keys = {
+      {"experiment", "/experiment"},
+      {"tier", "/tier"},
+      {"run", "/run"},
+      {"commit", "/commit"},
+      {"dirty", "/dirty"},
+      {"date", "/date"},
+      {"cpu", "/machine/cpu"},
+      {"threads", "/threads"},
+      {"case", "/case/name"},
+      {"origin", "/case/origin"},
+      {"sha256", "/case/sha256"},
+      {"resolution", "/resolution"},
+      {"voxel_size", "/voxel_size"},
+      {"nominal_voxel_size", "/nominal_voxel_size"},
+      {"swept", "/sweep/parameter"},
+      {"swept_value", "/sweep/value"},
+      {"voxelizer", "/voxelization/label"},
+      {"variant", "/variant/name"},
+      {"label", "/variant/label"},
+      {"failed", "/failed"}};
   for (const auto& [name, pointer] : keys) out << name << ',';
   for (std::size_t c = 0; c < all_columns().size(); ++c) out << (c ? "," : "") << all_columns()[c].name;
   out << '\n';

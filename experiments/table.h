@@ -11,7 +11,7 @@
 namespace hermesh {
 
 /// Rows of one table: the same experiment, tier, run, case, resolution and voxelizer, in the order of the
-/// variants.
+/// variants. The values of a sweep, and voxel sizes that are given as such, share a table.
 struct RowGroup {
   std::vector<Json> rows;
   int earlier_runs = 0;  ///< how many other groups differ from this one in the run alone

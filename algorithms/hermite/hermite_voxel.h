@@ -14,6 +14,7 @@ struct HermiteVoxel {
   std::array<std::array<float, 3>, 3> normal{};  ///< by edge; unit length in index space, towards the outside
   bool inside = false;
   std::uint8_t crossing = 0;  ///< bit a is set if the edge along axis a is crossed
+  std::array<std::uint8_t, 2> padding{};  ///< named, because a file holds its bytes, too
 
   bool crosses(int axis) const { return (crossing >> axis) & 1; }
 

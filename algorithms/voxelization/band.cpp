@@ -16,7 +16,7 @@ using kernels::Kernels;
 
 /// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer, a triangle
 /// for its voxels. Where the two take equally long, measured.
-constexpr std::size_t kMany = 1500;
+constexpr std::size_t kMany = 1000;
 
 /// Up to sixteen triangles on their way to the kernels.
 struct Pending {

@@ -50,11 +50,15 @@ double meeting(const Vector3d& from, const Vector3d& to, const Piece& t) {
   const Vector3d p = way.cross(e2);
   const double det = e1.dot(p);
   if (det * det <= 1e-24 * e1.squaredNorm() * e2.squaredNorm() * way.squaredNorm()) return -1.0;
-  const Vector3d s = from - t.corner[0], q = s.cross(e1);
-  const double u = s.dot(p) / det, v = way.dot(q) / det, along = e2.dot(q) / det;
   constexpr double kOn = 1e-7;
-  const bool met = u >= -kOn && v >= -kOn && u + v <= 1.0 + kOn && along >= -kOn && along <= 1.0 + kOn;
-  return met ? std::max(along, 0.0) : -1.0;
+  const Vector3d s = from - t.corner[0];
+  const double u = s.dot(p) / det;
+  if (u < -kOn || u > 1.0 + kOn) return -1.0;
+  const Vector3d q = s.cross(e1);
+  const double v = way.dot(q) / det;
+  if (v < -kOn || u + v > 1.0 + kOn) return -1.0;
+  const double along = e2.dot(q) / det;
+  return along >= -kOn && along <= 1.0 + kOn ? std::max(along, 0.0) : -1.0;
 }
 
 VoxelBits spread(VoxelBits bits) {
@@ -71,7 +75,12 @@ using Voxel = std::array<std::int32_t, 3>;
 /// The triangles of one block of cells, by cell.
 struct Neighbourhood {
   std::vector<Piece> pieces;
-  std::vector<std::array<Vector3d, 2>> boxes;                 ///< of the pieces
+  struct Hull {
+    Vector3d low, high;  ///< box
+    Vector3d normal;     ///< not of unit length
+    double offset, slack;
+  };
+  std::vector<Hull> hulls;
   std::array<std::vector<std::uint32_t>, 512> cells;  ///< numbers of those that touch the cell up from each voxel
 
   Neighbourhood(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& block) {
@@ -88,9 +97,11 @@ struct Neighbourhood {
   bool blocked(const Vector3d& from, const Vector3d& to, unsigned cell) const {
     const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
     for (const std::uint32_t i : cells[cell]) {
-      const auto& [box_low, box_high] = boxes[i];
-      if (low[0] <= box_high[0] && low[1] <= box_high[1] && low[2] <= box_high[2] && high[0] >= box_low[0] &&
-          high[1] >= box_low[1] && high[2] >= box_low[2] && meeting(from, to, pieces[i]) >= 0)
+      const Hull& hull = hulls[i];
+      if ((low.array() > hull.high.array()).any() || (high.array() < hull.low.array()).any()) continue;
+      const double a = hull.normal.dot(from) - hull.offset, b = hull.normal.dot(to) - hull.offset;
+      if (std::min(a, b) > hull.slack || std::max(a, b) < -hull.slack) continue;
+      if (meeting(from, to, pieces[i]) >= 0)
         return true;
     }
     return false;
@@ -109,8 +120,10 @@ struct Neighbourhood {
     const std::uint32_t number = std::uint32_t(pieces.size());
     pieces.push_back(piece);
     const Vector3d margin = Vector3d::Constant(1e-6);
-    boxes.push_back({piece.corner[0].cwiseMin(piece.corner[1]).cwiseMin(piece.corner[2]) - margin,
-                     piece.corner[0].cwiseMax(piece.corner[1]).cwiseMax(piece.corner[2]) + margin});
+    const Vector3d normal = (piece.corner[1] - piece.corner[0]).cross(piece.corner[2] - piece.corner[0]);
+    hulls.push_back({piece.corner[0].cwiseMin(piece.corner[1]).cwiseMin(piece.corner[2]) - margin,
+                     piece.corner[0].cwiseMax(piece.corner[1]).cwiseMax(piece.corner[2]) + margin, normal,
+                     normal.dot(piece.corner[0]), 1e-6 * normal.norm()});
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
         for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
@@ -134,21 +147,6 @@ class Prober {
     if (above == Side::outer) return above;
     const Side below = seen_from(q - kOff * normal);
     return below == Side::inner ? above : below;
-  }
-
-  /// How many sheets cross the grid edge up from a voxel; doubled faces count once.
-  int sheets_across(const Voxel& voxel, int axis) {
-    const Vector3d from(voxel[0], voxel[1], voxel[2]);
-    hits_.clear();
-    const Neighbourhood& triangles = around(voxel);
-    for (const std::uint32_t i : triangles.cells[place_in_tile(voxel)]) {
-      const double along = meeting(from, from + Vector3d::Unit(axis), triangles.pieces[i]);
-      if (along >= 0) hits_.push_back(along);
-    }
-    std::sort(hits_.begin(), hits_.end());
-    int sheets = 0;
-    for (std::size_t i = 0; i < hits_.size(); ++i) sheets += i == 0 || hits_[i] - hits_[i - 1] > 1e-6 ? 1 : 0;
-    return sheets;
   }
 
   /// Whether a suspicious voxel is in or next to the piece's box.
@@ -214,7 +212,6 @@ class Prober {
   std::map<BlockAt, std::unique_ptr<Neighbourhood>> blocks_;
   const Neighbourhood* last_ = nullptr;
   BlockAt last_block_{};
-  std::vector<double> hits_;
 };
 
 /// What of a triangle is left.
@@ -279,26 +276,82 @@ class Finder {
   void find_suspects() {
     suspicious_.assign(band_.blocks.size(), VoxelBits{});
     std::vector<char> found(band_.blocks.size(), 0);
-    tbb::enumerable_thread_specific<Prober> probers([&] { return Prober(soup_, bins_, inside_, suspicious_); });
     parallel_blocks(found.size(), context_, [&](std::size_t i) {
+      std::vector<InnerEdge> edges = inner_edges(std::uint32_t(i));
+      if (edges.empty()) return;
+      find_hits(std::uint32_t(i), edges);
       VoxelBits voxels{};
-      BlockFinder finder(bins_.blocks());
-      for (int axis = 0; axis < 3; ++axis) {
-        VoxelBits edges = inner_edges(std::uint32_t(i), axis, finder);
-        for (std::size_t x = 0; x < 8; ++x)
-          for (std::uint64_t bits = edges[x]; bits; bits &= bits - 1) {
-            const int place = __builtin_ctzll(bits);
-            const BlockAt& at = band_.blocks[i];
-            const Voxel voxel{at[0] * 8 + std::int32_t(x), at[1] * 8 + place / 8, at[2] * 8 + place % 8};
-            if (probers.local().sheets_across(voxel, axis) % 2 == 1) voxels[x] |= bits & -bits;
-          }
+      for (InnerEdge& edge : edges) {
+        if (edge.sheets() % 2 == 0) continue;
+        const unsigned place = place_in_tile(edge.voxel);
+        voxels[place >> 6] |= std::uint64_t(1) << (place & 63);
+        found[i] = 1;
       }
-      if (std::all_of(voxels.begin(), voxels.end(), [](std::uint64_t word) { return word == 0; })) return;
-      found[i] = 1;
-      suspicious_[i] = spread(spread(voxels));
+      if (found[i]) suspicious_[i] = spread(spread(voxels));
     });
     for (std::uint32_t i = 0; i < found.size(); ++i)
       if (found[i]) suspects_.push_back(i);
+  }
+
+  /// A grid edge up from a voxel, both of its ends inside, that some triangle crosses.
+  struct InnerEdge {
+    Voxel voxel;
+    int axis;
+    std::vector<double> hits;
+
+    /// How many sheets cross it; doubled faces, and those that share the side that is hit, count once.
+    int sheets() {
+      std::sort(hits.begin(), hits.end());
+      int count = 0;
+      for (std::size_t i = 0; i < hits.size(); ++i) count += i == 0 || hits[i] - hits[i - 1] > 1e-6 ? 1 : 0;
+      return count;
+    }
+    void meet(const Piece& piece) {
+      for (int a = 0; a < 3; ++a) {
+        const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
+        const double from = voxel[std::size_t(a)];
+        if (low > from + (a == axis ? 1.0 : 0.0) + 1e-6 || high < from - 1e-6) return;
+      }
+      const Vector3d from(voxel[0], voxel[1], voxel[2]);
+      const double along = meeting(from, from + Vector3d::Unit(axis), piece);
+      if (along >= 0) hits.push_back(along);
+    }
+  };
+
+  void find_hits(std::uint32_t block, std::vector<InnerEdge>& edges) const {
+    VoxelBox box;
+    for (std::size_t a = 0; a < 3; ++a) {
+      box.low[a] = box.high[a] = edges[0].voxel[a];
+      for (const InnerEdge& edge : edges) {
+        box.low[a] = std::min(box.low[a], double(edge.voxel[a]));
+        box.high[a] = std::max(box.high[a], double(edge.voxel[a]) + (edge.axis == int(a) ? 1.0 : 0.0));
+      }
+    }
+    const auto meet = [&](std::uint32_t t) {
+      const Piece piece = piece_of(soup_.corners(t));
+      for (InnerEdge& edge : edges) edge.meet(piece);
+    };
+    bins_.for_each_cluster(band_.blocks[block], [&](const TriangleBins::Cluster& cluster) {
+      for (std::size_t a = 0; a < 3; ++a)
+        if (cluster.box.low[a] > box.high[a] + 1e-6 || cluster.box.high[a] < box.low[a] - 1e-6) return;
+      for (const std::uint32_t t : cluster.triangles) meet(t);
+    });
+    for (const std::uint32_t t : bins_.large(block)) meet(t);
+  }
+
+  std::vector<InnerEdge> inner_edges(std::uint32_t block) const {
+    std::vector<InnerEdge> edges;
+    BlockFinder finder(bins_.blocks());
+    const BlockAt& at = band_.blocks[block];
+    for (int axis = 0; axis < 3; ++axis) {
+      const VoxelBits lower = inner_edges(block, axis, finder);
+      for (std::size_t x = 0; x < 8; ++x)
+        for (std::uint64_t bits = lower[x]; bits; bits &= bits - 1) {
+          const int place = __builtin_ctzll(bits);
+          edges.push_back({{at[0] * 8 + std::int32_t(x), at[1] * 8 + place / 8, at[2] * 8 + place % 8}, axis, {}});
+        }
+    }
+    return edges;
   }
 
   /// Voxels inside whose upper neighbour on the axis is inside, too, with a triangle between.

@@ -66,8 +66,9 @@ TEST_F(CliTest, ListForPeopleNamesTheSame) {
 
 TEST_F(CliTest, CubeThroughAllStages) {
   write_cube();
+  // A resolution of 10 would put samples onto the cube's faces.
   const Outcome outcome =
-      run({"remesh", "cube.off", "out.ply", "--resolution", "10", "--extractor", "marching-cubes"});
+      run({"remesh", "cube.off", "out.ply", "--resolution", "11", "--extractor", "marching-cubes"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_NE(outcome.out.find("marching-cubes"), std::string::npos);
@@ -86,14 +87,14 @@ TEST_F(CliTest, CubeThroughAllStages) {
   EXPECT_GT(report.at("points"), 500);
   EXPECT_GT(report.at("triangles"), 1000);
   EXPECT_EQ(report.at("quads"), 0);
-  // Marching cubes cuts the corners of the cube, whose side is 2, off by less than a voxel of 0.2.
+  // Marching cubes cuts the corners of the cube, whose side is 2, off by less than a voxel of 0.18.
   EXPECT_NEAR(report.at("volume"), 8.0, 0.1);
-  EXPECT_NEAR(report.at("area"), 24.0, 1.0);
+  EXPECT_NEAR(report.at("area"), 24.0, 1.5);
   for (const char* direction : {"to_reference", "from_reference"}) {
     const Json& distances = report.at(direction);
     EXPECT_LE(distances.at("mean"), distances.at("rms"));
     EXPECT_LE(distances.at("rms"), distances.at("max"));
-    EXPECT_LT(distances.at("max"), 0.2);
+    EXPECT_LT(distances.at("max"), 0.18);
     // A sampled maximum is a lower bound of the certified interval's upper end.
     EXPECT_LE(distances.at("max"), report.at(std::string("certified_") + direction).at("upper"));
   }

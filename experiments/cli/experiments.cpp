@@ -46,8 +46,10 @@ void add_report(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "report", "Tables from the rows of earlier runs");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("DIR", arguments->folder, "Folder with rows.jsonl")->required();
-  command->add_option("--format", arguments->format, "md, csv or tex (default: md)")
-      ->check(CLI::IsMember({"md", "csv", "tex"}));
+  command
+      ->add_option("--format", arguments->format,
+                   "md, csv, tex, or plots to draw those of the rows into DIR (default: md)")
+      ->check(CLI::IsMember({"md", "csv", "tex", "plots"}));
   command->callback([arguments, &session] {
     session.command = [arguments] {
       write_report(arguments->folder, arguments->format, std::cout);

@@ -16,8 +16,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-bool is_ours(const std::string& extractor) {
-  return std::ranges::any_of(our_extractors(), [&](const Extractor& ours) { return ours.name == extractor; });
+bool is_ours(const Extractor& extractor) {
+  return std::ranges::find(our_extractors(), extractor.name, &Extractor::name) != our_extractors().end();
+}
+bool is_ours(const Voxelizer& voxelizer) {
+  return std::ranges::find(our_voxelizers(), voxelizer.name, &Voxelizer::name) != our_voxelizers().end();
 }
 
 Json to_json(const OptionSpec& option) {
@@ -31,19 +34,23 @@ Json to_json(const OptionSpec& option) {
   return json;
 }
 
+Json to_json(const std::vector<OptionSpec>& options) {
+  Json all = Json::array();
+  for (const OptionSpec& option : options) all.push_back(to_json(option));
+  return all;
+}
+
 Json to_json(const Extractor& extractor) {
-  Json options = Json::array();
-  for (const OptionSpec& option : extractor.options) options.push_back(to_json(option));
   const Promises& promises = extractor.promises;
   return {{"name", extractor.name},
           {"summary", extractor.summary},
-          {"ours", is_ours(extractor.name)},
+          {"ours", is_ours(extractor)},
           {"promises",
            {{"closed", promises.closed},
             {"manifold", promises.manifold},
             {"oriented", promises.oriented},
             {"no_self_intersection", promises.no_self_intersection}}},
-          {"options", options}};
+          {"options", to_json(extractor.options)}};
 }
 
 void print_json() {
@@ -53,7 +60,10 @@ void print_json() {
               {"cases", Json::array()}};
   for (const Extractor& extractor : all_extractors()) all["extractors"].push_back(to_json(extractor));
   for (const Voxelizer& voxelizer : all_voxelizers())
-    all["voxelizers"].push_back({{"name", voxelizer.name}, {"summary", voxelizer.summary}});
+    all["voxelizers"].push_back({{"name", voxelizer.name},
+                                 {"summary", voxelizer.summary},
+                                 {"ours", is_ours(voxelizer)},
+                                 {"options", to_json(voxelizer.options)}});
   for (const ExperimentInfo& experiment : list_experiments())
     all["experiments"].push_back(
         {{"name", experiment.name}, {"question", experiment.question}, {"file", experiment.file.string()}});
@@ -91,19 +101,33 @@ std::string allowed(const OptionSpec& option) {
   return names;
 }
 
-void print_extractor(const Extractor& extractor) {
-  print_line(extractor.name, extractor.summary + (is_ours(extractor.name) ? "" : " [reference]"));
-  print_line("", "promises: " + promised(extractor.promises));
-  for (const OptionSpec& option : extractor.options)
+void print_options(const std::string& flag, const std::vector<OptionSpec>& options) {
+  for (const OptionSpec& option : options)
     print_line("",
-               "-o " + option.name + "=" + option.fallback + " (" + allowed(option) + "): " + option.help);
+               flag + " " + option.name + "=" + option.fallback + " (" + allowed(option) + "): " + option.help);
+}
+
+template <class Variant>
+void print_name(const Variant& variant) {
+  print_line(variant.name, variant.summary + (is_ours(variant) ? "" : " [reference]"));
+}
+
+void print_extractor(const Extractor& extractor) {
+  print_name(extractor);
+  print_line("", "promises: " + promised(extractor.promises));
+  print_options("-o", extractor.options);
+}
+
+void print_voxelizer(const Voxelizer& voxelizer) {
+  print_name(voxelizer);
+  print_options("--voxelizer-option", voxelizer.options);
 }
 
 void print_text() {
   std::cout << "extractors (hermesh extract, remesh --extractor NAME)\n";
   for (const Extractor& extractor : all_extractors()) print_extractor(extractor);
   std::cout << "\nvoxelizers (hermesh voxelize, remesh --voxelizer NAME)\n";
-  for (const Voxelizer& voxelizer : all_voxelizers()) print_line(voxelizer.name, voxelizer.summary);
+  for (const Voxelizer& voxelizer : all_voxelizers()) print_voxelizer(voxelizer);
   std::cout << "\nexperiments (hermesh run FILE)\n";
   for (const ExperimentInfo& experiment : list_experiments()) {
     print_line(experiment.name, experiment.question);

@@ -63,6 +63,7 @@ int run_program(int argc, char** argv) {
   app.set_help_flag("--help,-h", "Print this help and exit");
   add_common_options(app, session);
   add_list(app, session);
+  add_voxelize(app, session);
   add_conversions(app, session);
   add_validate(app, session);
   add_info(app, session);

@@ -42,7 +42,8 @@ struct Session {
 
 // Each adds its commands, which set session.command when they are parsed.
 void add_list(CLI::App& app, Session& session);
-void add_conversions(CLI::App& app, Session& session);  ///< voxelize, extract, remesh
+void add_voxelize(CLI::App& app, Session& session);
+void add_conversions(CLI::App& app, Session& session);  ///< extract, remesh
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_experiments(CLI::App& app, Session& session);  ///< run, report

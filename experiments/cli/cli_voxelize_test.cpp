@@ -1,0 +1,170 @@
+// hermesh voxelize from the outside: its grids, signs and options, and what it refuses.
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "algorithms/core/vdb_file.h"
+#include "experiments/cli/process_for_tests.h"
+
+namespace hermesh::cli {
+namespace {
+
+using Json = nlohmann::json;
+using Arguments = std::vector<std::string>;
+
+class VoxelizeTest : public ProgramTest {
+ protected:
+  Outcome voxelize(const std::string& in, const Arguments& more) {
+    Arguments arguments = {"voxelize", in, "out.vdb", "--resolution", "20"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  void expect_refusal(int exit_code, const Arguments& more, const std::vector<std::string>& words,
+                      const std::string& in = "cube.off") {
+    const std::set<std::string> before = files();
+    const Outcome outcome = voxelize(in, more);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    for (const std::string& word : words) EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before);
+  }
+  std::vector<std::string> grids(const std::string& file) {
+    std::vector<std::string> names;
+    for (const GridSummary& grid : describe_vdb(path(file))) names.push_back(grid.name);
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  /// A tetrahedron with an attribute of each kind.
+  void write_tetrahedron() {
+    write("t.obj",
+          "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+          "vn -1 0 0\nvn 0 -1 0\nvn 0 0 -1\nvn 1 1 1\nusemtl clay\nf 1/1/3 3/2/3 2/3/3\nf 1/1/2 2/2/2 4/3/2\n"
+          "usemtl tin\nf 1/1/1 4/2/1 3/3/1\nf 2/1/4 3/2/4 4/3/4\n");
+  }
+};
+
+constexpr const char* kAllGrids = "sdf,udf,closest-point,triangle-id,fog,hermite,attributes";
+
+TEST_F(VoxelizeTest, AllGridsInOneFileAndHermiteBesideIt) {
+  write_tetrahedron();
+  const Outcome outcome = voxelize("t.obj", {"--grids", kAllGrids});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(files(), (std::set<std::string>{"t.obj", "out.vdb", "out.hermite.vdb"}));
+  EXPECT_EQ(grids("out.vdb"), (std::vector<std::string>{"closest-point", "colour", "fog", "material",
+                                                        "normal", "sdf", "triangle-id", "udf", "uv"}));
+  EXPECT_NE(outcome.out.find("out.hermite.vdb"), std::string::npos) << outcome.out;
+  EXPECT_EQ(run({"info", "out.hermite.vdb"}).exit_code, 0);
+  EXPECT_EQ(run({"extract", "out.vdb", "out.ply"}).exit_code, 0);
+}
+
+/// The tool returns 0 whatever happens, so its text is what counts.
+TEST_F(VoxelizeTest, OpenVdbsToolReadsTheFile) {
+  if (std::system("command -v vdb_print > /dev/null") != 0)
+    GTEST_SKIP() << "vdb_print is not installed (package libopenvdb-tools)";
+  write_tetrahedron();
+  ASSERT_EQ(voxelize("t.obj", {"--grids", kAllGrids}).exit_code, 0);
+  ASSERT_EQ(
+      std::system(
+          ("vdb_print -l '" + path("out.vdb").string() + "' > '" + path("text").string() + "' 2>&1").c_str()),
+      0);
+  const std::string text = read("text");
+  EXPECT_EQ(text.find("ERROR"), std::string::npos) << text;
+  for (const std::string& name : grids("out.vdb"))
+    EXPECT_NE(text.find("Name: " + name + "\n"), std::string::npos) << name << " is missing in:\n" << text;
+}
+
+TEST_F(VoxelizeTest, SameBytesForEveryNumberOfThreads) {
+  write_tetrahedron();
+  // Behind magic number, versions and a flag, a .vdb file has an identifier of its own.
+  constexpr std::size_t kIdentifier = 21, kIdentifierLength = 36;
+  std::vector<std::string> written;
+  for (const char* threads : {"1", "2"}) {
+    ASSERT_EQ(voxelize("t.obj", {"--grids", kAllGrids, "--threads", threads}).exit_code, 0);
+    written.emplace_back();
+    for (const char* file : {"out.vdb", "out.hermite.vdb"})
+      written.back() += read(file).erase(kIdentifier, kIdentifierLength);
+  }
+  EXPECT_TRUE(written[0] == written[1]);
+}
+
+TEST_F(VoxelizeTest, DefaultIsTheLevelSet) {
+  write_cube();
+  ASSERT_EQ(voxelize("cube.off", {}).exit_code, 0);
+  EXPECT_EQ(grids("out.vdb"), std::vector<std::string>{"sdf"});
+  EXPECT_NE(run({"info", "out.vdb"}).out.find("level set"), std::string::npos);
+}
+
+TEST_F(VoxelizeTest, UnsignedMakesAUdf) {
+  write_cube();
+  for (const Arguments& unsigned_ :
+       {Arguments{"--signs", "unsigned"}, {"--voxelizer-option", "signs=unsigned"}}) {
+    ASSERT_EQ(voxelize("cube.off", unsigned_).exit_code, 0);
+    EXPECT_EQ(grids("out.vdb"), std::vector<std::string>{"udf"});
+  }
+  for (const char* signs : {"auto", "flood-fill", "winding-number"}) {
+    ASSERT_EQ(voxelize("cube.off", {"--signs", signs}).exit_code, 0);
+    EXPECT_EQ(grids("out.vdb"), std::vector<std::string>{"sdf"});
+  }
+}
+
+TEST_F(VoxelizeTest, OptionsOfOtherVoxelizers) {
+  write_cube();
+  EXPECT_EQ(voxelize("cube.off", {"--voxelizer", "thesis", "--voxelizer-option", "sign_angle=80"}).exit_code,
+            0);
+  EXPECT_EQ(voxelize("cube.off", {"--voxelizer", "openvdb", "--grids", "sdf"}).exit_code, 0);
+  EXPECT_EQ(grids("out.vdb"), std::vector<std::string>{"sdf"});
+}
+
+TEST_F(VoxelizeTest, WrongUsage) {
+  write_cube();
+  expect_refusal(2, {"--grids", "sdf,smoke"}, {"smoke", "closest-point", "attribute:NAME"});
+  expect_refusal(2, {"--grids", ""}, {"missing"});
+  expect_refusal(2, {"--grids", "sdf,"}, {"missing", "fog"});
+  expect_refusal(2, {"--grids", "fog", "--voxelizer", "openvdb"}, {"hermesh", "openvdb", "--grids"});
+  expect_refusal(2, {"--fog-exterior"}, {"--fog-exterior", "fog"});
+  expect_refusal(2, {"--signs", "maybe"}, {"maybe", "winding-number"});
+  expect_refusal(2, {"--signs", "auto", "--voxelizer", "exact"}, {"exact", "signs"});
+  expect_refusal(2, {"--signs", "auto", "--voxelizer-option", "signs=auto"}, {"signs", "twice"});
+  expect_refusal(2, {"--voxelizer-option", "nonsense=1"}, {"nonsense", "hermesh", "signs"});
+  expect_refusal(2, {"--voxelizer-option", "nonsense"}, {"nonsense", "key=value"});
+  expect_refusal(2, {"--voxelizer", "thesis", "--voxelizer-option", "sign_angle=400"},
+                 {"sign_angle", "400", "180"});
+}
+
+TEST_F(VoxelizeTest, WhatTheMeshDoesNotHave) {
+  write_cube();
+  expect_refusal(1, {"--grids", "attributes"}, {"no attributes"});
+  expect_refusal(1, {"--grids", "sdf,attribute:uv"}, {"uv"});
+  for (const char* grid : {"fog", "hermite"})
+    expect_refusal(1, {"--grids", grid, "--signs", "unsigned"}, {grid, "sign"});
+}
+
+TEST_F(VoxelizeTest, BadAttributesMatterOnlyWhereTheyAreAskedFor) {
+  write("nan.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 nan\nf 1//1 3//1 2//1\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  expect_refusal(1, {"--grids", "sdf,attributes"}, {"nan.obj", "normal", "finite"}, "nan.obj");
+  EXPECT_EQ(voxelize("nan.obj", {}).exit_code, 0);
+}
+
+TEST_F(VoxelizeTest, NeitherFileIfOneCannotBeWritten) {
+  write_cube();
+  std::filesystem::create_directory(path("out.hermite.vdb"));
+  expect_refusal(1, {"--grids", "hermite"}, {"out.hermite.vdb"});
+}
+
+TEST_F(VoxelizeTest, ListShowsTheOptionsOfVoxelizers) {
+  const Json list = Json::parse(run({"list", "--json"}).out);
+  const auto hermesh =
+      std::ranges::find(list.at("voxelizers"), "hermesh", [](const Json& item) { return item.at("name"); });
+  ASSERT_NE(hermesh, list.at("voxelizers").end());
+  EXPECT_EQ(hermesh->at("ours"), true);
+  EXPECT_EQ(hermesh->at("options").at(0).at("name"), "signs");
+  EXPECT_EQ(hermesh->at("options").at(0).at("default"), "auto");
+  EXPECT_NE(run({"list"}).out.find("--voxelizer-option signs=auto (auto|flood-fill|winding-number|unsigned)"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace hermesh::cli

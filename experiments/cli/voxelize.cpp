@@ -1,0 +1,95 @@
+// hermesh voxelize: polygons to volumes.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/core/vdb_file.h"
+#include "algorithms/voxelization/hermesh_voxelizer.h"
+#include "algorithms/voxelization/volume_outputs.h"
+#include "experiments/cli/output_path.h"
+#include "experiments/cli/signals.h"
+#include "experiments/cli/voxelizing.h"
+
+namespace hermesh::cli {
+namespace {
+
+struct Arguments {
+  Paths paths;
+  VoxelizeArguments voxelizing;
+  std::string grids = "sdf";
+  bool fog_exterior = false;
+};
+
+VolumeRequest requested(const Arguments& arguments) {
+  return as_usage([&] {
+    VolumeRequest request = parse_volume_request(arguments.grids);
+    request.fog_exterior = arguments.fog_exterior;
+    if (request.fog_exterior && !request.fog)
+      throw Error("--fog-exterior is about the grid fog: name it in --grids");
+    if (arguments.voxelizing.voxelizer != "hermesh" && !request.only_sdf())
+      throw Error("only the voxelizer hermesh makes other --grids than sdf, not " +
+                  arguments.voxelizing.voxelizer);
+    return request;
+  });
+}
+
+std::string names_of(const std::vector<openvdb::GridBase::Ptr>& grids) {
+  std::string names;
+  for (const auto& grid : grids) names += (names.empty() ? "" : ", ") + grid->getName();
+  return names;
+}
+
+/// By the voxelizer that knows which triangle is nearest.
+void write_outputs(const Arguments& arguments, const VolumeRequest& request, const ChosenVoxelizer& chosen,
+                   Session& session) {
+  const Paths& paths = arguments.paths;
+  const PolygonMesh mesh = read_mesh(paths.in, session.context, {.attributes = request.any_attributes()});
+  const VoxelizationInput input = voxelization_input(mesh, paths.in, arguments.voxelizing, chosen, session);
+  const Stopwatch watch;
+  const VolumeOutputs outputs = make_volume_outputs(mesh, voxelize_options(input), request, session.context);
+  session.context.check();
+  print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
+  write_volume_outputs(paths.out, outputs, session.context);
+  print_summary(session, "wrote " + paths.out + ": " + names_of(outputs.grids));
+  if (outputs.hermite)
+    print_summary(session, "wrote " + hermite_path(paths.out).string() + ": hermite, " +
+                               std::to_string(outputs.hermite->crossing_edges()) + " crossing edges");
+}
+
+int run_voxelize(const Arguments& arguments, Session& session) {
+  const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
+  const VolumeRequest request = requested(arguments);
+  check_volume_output(arguments.paths.out);
+  if (request.hermite) check_writable(hermite_path(arguments.paths.out));
+  if (chosen.voxelizer.name == "hermesh") {
+    write_outputs(arguments, request, chosen, session);
+  } else {
+    const PolygonMesh mesh = read_mesh(arguments.paths.in, session.context);
+    const LevelSet level_set = voxelize(mesh, arguments.paths.in, arguments.voxelizing, chosen, session);
+    write_level_set(arguments.paths.out, level_set, session.context);
+  }
+  work_is_finished();
+  return kDone;
+}
+
+}  // namespace
+
+void add_voxelize(CLI::App& app, Session& session) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
+  add_paths(*command, arguments->paths, kMeshIn, "Volumes: .vdb");
+  add_voxelize_options(*command, arguments->voxelizing);
+  command->add_option(
+      "--grids", arguments->grids,
+      "Which volumes, separated by commas: sdf (the default), udf, closest-point, triangle-id, fog, "
+      "hermite (into OUT.hermite.vdb), attributes (all that PLY and OBJ hold: normals, colours, ...), "
+      "attribute:NAME");
+  command->add_flag("--fog-exterior", arguments->fog_exterior,
+                    "Spread the fog's ramp over both bands, not the interior one alone");
+  command->callback([arguments, &session] {
+    session.command = [arguments, &session] { return run_voxelize(*arguments, session); };
+  });
+}
+
+}  // namespace hermesh::cli

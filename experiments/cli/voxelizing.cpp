@@ -1,0 +1,123 @@
+#include "experiments/cli/voxelizing.h"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <map>
+
+#include "algorithms/core/memory_estimate.h"
+#include "experiments/cli/format.h"
+#include "experiments/harness.h"
+
+namespace hermesh::cli {
+namespace {
+
+CLI::Validator at_least(double minimum, const std::string& words) {
+  return CLI::Validator(
+      [minimum, words](const std::string& given) {
+        double value = 0.0;
+        const bool good = CLI::detail::lexical_cast(given, value) && std::isfinite(value) && value >= minimum;
+        return good ? std::string() : "must be " + words + ", not '" + given + "'";
+      },
+      "");
+}
+
+double voxel_size_for(const PolygonMesh& mesh, const VoxelizeArguments& arguments, const std::string& file) {
+  if (arguments.voxel_size) return *arguments.voxel_size;
+  const double longest_side = bounds(mesh).size().maxCoeff();
+  if (!(longest_side > 0.0))
+    throw Error("'" + file + "' has no extent, so that --resolution gives no voxel size: use --voxel-size");
+  return longest_side / static_cast<double>(*arguments.resolution);
+}
+
+}  // namespace
+
+void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out) {
+  command.add_option("IN", paths.in, in)->required();
+  command.add_option("OUT", paths.out, out)->required();
+}
+
+void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments) {
+  // Exactly one of the two, or the program would have to guess a size.
+  CLI::Option_group* size = command.add_option_group("Voxel size, exactly one of");
+  size->add_option("--voxel-size", arguments.voxel_size, "Edge of a voxel in world units")
+      ->check(at_least(std::numeric_limits<double>::min(), "a finite number above 0"));
+  size->add_option("--resolution", arguments.resolution, "Voxels along the longest side of the mesh")
+      ->check(at_least(1.0, "a whole number of at least 1"));
+  size->require_option(1);
+  command.add_option("--voxelizer", arguments.voxelizer,
+                     "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
+  command.add_option(
+      "--signs", arguments.signs,
+      "How the voxelizer hermesh finds the inside: auto (the default), flood-fill, winding-number, or "
+      "unsigned for none; short for --voxelizer-option signs=...");
+  command
+      .add_option("--voxelizer-option", arguments.options,
+                  "key=value, an option of the voxelizer, see hermesh list; may be repeated")
+      ->allow_extra_args(false);
+  // Both ends of an edge that the surface crosses are at most a voxel away from it.
+  const auto band = at_least(1.0, "a finite number of voxels of at least 1");
+  command
+      .add_option("--exterior-band", arguments.exterior_band,
+                  "Width of the band outside, in voxels (default: 3)")
+      ->check(band);
+  command
+      .add_option("--interior-band", arguments.interior_band,
+                  "Width of the band inside, in voxels (default: 3)")
+      ->check(band);
+}
+
+Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,
+                      const std::vector<std::string>& texts) {
+  std::map<std::string, std::string> given;
+  for (const std::string& text : texts)
+    if (const auto option = parse_option(text); !given.insert(option).second)
+      throw Error("option '" + option.first + "' of " + variant + " is given twice");
+  return Options(variant, declared, given);
+}
+
+ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
+  return as_usage([&] {
+    const Voxelizer voxelizer = find_variant(all_voxelizers(), arguments.voxelizer);
+    std::vector<std::string> options = arguments.options;
+    if (arguments.signs) options.push_back("signs=" + *arguments.signs);
+    return ChosenVoxelizer{voxelizer, parse_options(voxelizer.name, voxelizer.options, options)};
+  });
+}
+
+VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,
+                                     const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
+                                     Session& session) {
+  return {mesh,
+          voxel_size_for(mesh, arguments, file),
+          arguments.exterior_band,
+          arguments.interior_band,
+          session.context,
+          chosen.options};
+}
+
+LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                  const ChosenVoxelizer& chosen, Session& session) {
+  const VoxelizationInput input = voxelization_input(mesh, file, arguments, chosen, session);
+  check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
+  const Stopwatch watch;
+  LevelSet level_set = chosen.voxelizer.voxelize(input);
+  session.context.check();
+  print_voxelized(session, file, input, level_set.active_voxels(), chosen.voxelizer.name, watch.seconds());
+  return level_set;
+}
+
+void print_summary(const Session& session, const std::string& line) {
+  if (session.quiet) return;
+  std::cout << line << '\n';
+}
+
+void print_voxelized(const Session& session, const std::string& file, const VoxelizationInput& input,
+                     std::size_t active_voxels, const std::string& voxelizer, double seconds) {
+  print_summary(session, "voxelized " + file + ": " + std::to_string(input.mesh.triangle_count()) +
+                             " triangles, " + std::to_string(active_voxels) + " voxels of " +
+                             text(input.voxel_size) + ", " + voxelizer + ", " + seconds_text(seconds));
+}
+
+}  // namespace hermesh::cli

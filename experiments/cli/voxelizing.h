@@ -1,0 +1,68 @@
+// What the commands share that make volumes of polygons.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/variant.h"
+#include "experiments/cli/session.h"
+
+namespace hermesh::cli {
+
+struct Paths {
+  std::string in, out;
+};
+
+struct VoxelizeArguments {
+  std::optional<double> voxel_size;  ///< world units
+  std::optional<std::int64_t> resolution;
+  double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
+  std::string voxelizer = "hermesh";
+  std::optional<std::string> signs;  ///< shorthand for the option of that name
+  std::vector<std::string> options;  ///< key=value
+};
+
+/// A variant that was looked up, with its options checked.
+struct ChosenVoxelizer {
+  Voxelizer voxelizer;
+  Options options;
+};
+
+void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
+void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments);
+
+/// key=value texts, checked. @throws Error also for an option that is given twice.
+Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,
+                      const std::vector<std::string>& texts);
+/// @throws UsageError
+ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments);
+
+/// @throws Error where a resolution is asked of a mesh without extent.
+VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,
+                                     const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
+                                     Session& session);
+
+/// With a line of summary. @throws Error
+LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                  const ChosenVoxelizer& chosen, Session& session);
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+void print_summary(const Session& session, const std::string& line);
+void print_voxelized(const Session& session, const std::string& file, const VoxelizationInput& input,
+                     std::size_t active_voxels, const std::string& voxelizer, double seconds);
+
+inline constexpr const char* kMeshIn = "Mesh: .ply .obj .off .stl, also with .gz";
+inline constexpr const char* kMeshOut = "Mesh: .ply .obj .off .stl";
+
+}  // namespace hermesh::cli

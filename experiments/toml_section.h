@@ -1,0 +1,148 @@
+// A table of a TOML file that is read strictly: every key is known and asked for, and a complaint names its
+// line.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/error.h"
+
+namespace hermesh {
+
+inline std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// A table of the file that insists on every key being known and asked for. Its messages begin with
+/// "file:line: ".
+class Section {
+ public:
+  Section(std::string file, const toml::table& table, std::string what, std::vector<std::string> known)
+      : file_(std::move(file)), table_(table), what_(std::move(what)) {
+    for (const auto& [key, value] : table_)
+      if (std::find(known.begin(), known.end(), key.str()) == known.end())
+        fail(key.source().begin.line,
+             "unknown key \"" + std::string(key.str()) + "\" in " + what_ + "; it takes " + joined(known));
+  }
+
+  [[noreturn]] void fail(toml::source_index line, const std::string& sentence) const {
+    throw Error(file_ + ":" + std::to_string(std::max<toml::source_index>(line, 1)) + ": " + sentence);
+  }
+  [[noreturn]] void fail_at(const std::string& key, const std::string& sentence) const {
+    const toml::node* node = table_.get(key);
+    fail(node ? node->source().begin.line : line(), sentence);
+  }
+  toml::source_index line() const { return table_.source().begin.line; }
+  const std::string& file() const { return file_; }
+  bool has(const std::string& key) const { return table_.contains(key); }
+
+  std::string text(const std::string& key) const {
+    const toml::node& node = required(key);
+    if (const auto* value = node.as_string(); value && !value->get().empty()) return value->get();
+    fail(node.source().begin.line, "\"" + key + "\" must be a text that is not empty");
+  }
+  std::string text_or(const std::string& key, const std::string& fallback) const {
+    return has(key) ? text(key) : fallback;
+  }
+  bool is_text(const std::string& key) const { return has(key) && table_.get(key)->is_string(); }
+  /// Which of the texts it is.
+  std::size_t choice(const std::string& key, const std::vector<std::string>& choices) const {
+    const auto found = std::find(choices.begin(), choices.end(), text(key));
+    if (found != choices.end()) return static_cast<std::size_t>(found - choices.begin());
+    fail_at(key, "\"" + key + "\" must be one of " + joined(choices));
+  }
+  bool flag_or(const std::string& key, bool fallback) const {
+    if (!has(key)) return fallback;
+    if (const auto* value = table_.get(key)->as_boolean()) return value->get();
+    fail_at(key, "\"" + key + "\" must be true or false");
+  }
+  double number_or(const std::string& key, double fallback, double lower, double upper) const {
+    return has(key) ? number(*table_.get(key), key, lower, upper) : fallback;
+  }
+  std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t lower,
+                          std::int64_t upper) const {
+    return has(key) ? integer(*table_.get(key), key, lower, upper) : fallback;
+  }
+
+  double number(const toml::node& node, const std::string& key, double lower, double upper) const {
+    const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
+    if (value && *value >= lower && *value <= upper) return *value;
+    std::ostringstream range;
+    range << "\"" << key << "\" must be a number from " << lower << " to " << upper;
+    fail(node.source().begin.line, range.str());
+  }
+  std::int64_t integer(const toml::node& node, const std::string& key, std::int64_t lower,
+                       std::int64_t upper) const {
+    if (const auto* value = node.as_integer(); value && value->get() >= lower && value->get() <= upper)
+      return value->get();
+    fail(node.source().begin.line, "\"" + key + "\" must be a whole number from " + std::to_string(lower) +
+                                       " to " + std::to_string(upper));
+  }
+
+  const toml::array& list(const std::string& key) const {
+    const toml::node& node = required(key);
+    if (const auto* array = node.as_array(); array && !array->empty()) return *array;
+    fail(node.source().begin.line, "\"" + key + "\" must be a list [ … ] that is not empty");
+  }
+  /// Names out of `known`, each at most once.
+  std::vector<std::string> names(const std::string& key, const std::string& kind,
+                                 const std::vector<std::string>& known) const {
+    std::vector<std::string> result;
+    for (const toml::node& node : list(key)) {
+      const auto* value = node.as_string();
+      if (!value) fail(node.source().begin.line, "\"" + key + "\" must be a list of texts");
+      const std::string name = value->get();
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        fail(node.source().begin.line,
+             "there is no " + kind + " \"" + name + "\"; there are " + joined(known));
+      if (std::find(result.begin(), result.end(), name) != result.end())
+        fail(node.source().begin.line, "the " + kind + " \"" + name + "\" is named twice");
+      result.push_back(name);
+    }
+    return result;
+  }
+  const toml::table& table(const toml::node& node, const std::string& what) const {
+    if (const auto* value = node.as_table()) return *value;
+    fail(node.source().begin.line, what + " must be a table");
+  }
+  const toml::table* optional_table(const std::string& key) const {
+    const toml::node* node = table_.get(key);
+    return node ? &table(*node, "\"" + key + "\"") : nullptr;
+  }
+
+ private:
+  const toml::node& required(const std::string& key) const {
+    const toml::node* node = table_.get(key);
+    if (!node) fail(line(), what_ + " needs the key \"" + key + "\"");
+    return *node;
+  }
+
+  std::string file_;
+  const toml::table& table_;
+  std::string what_;
+};
+
+/// @throws Error for a file that is not there or has a syntax error.
+inline toml::table parse_toml(const std::filesystem::path& path) {
+  const std::string file = path.filename().string();
+  if (!std::filesystem::is_regular_file(path))
+    throw Error("there is no experiment file " + path.string() +
+                "; `hermesh list` names those that there are");
+  try {
+    return toml::parse_file(path.string());
+  } catch (const toml::parse_error& error) {
+    throw Error(file + ":" + std::to_string(std::max<toml::source_index>(error.source().begin.line, 1)) +
+                ": " + std::string(error.description()));
+  }
+}
+
+}  // namespace hermesh

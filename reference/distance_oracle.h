@@ -1,0 +1,86 @@
+// What is nearest to a point, and on which side of a closed surface it lies: by a CGAL tree over the
+// triangles, in double precision. Slow, certain, and it shares no code with the voxelizers that are judged by
+// it.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <bitset>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+/// The mesh's triangles in the index coordinates of a grid whose samples lie at origin + voxel_size · (i, j,
+/// k): in voxels, relative to the mesh's origin. Triangles of no area are left out (exact predicate); their
+/// edges belong to their neighbours, too.
+std::vector<Corners> triangles_in_voxels(const PolygonMesh& mesh, double voxel_size);
+
+/// All positions and distances are in voxels.
+class DistanceOracle {
+ public:
+  /// @throws Error if there are no triangles.
+  explicit DistanceOracle(std::vector<Corners> triangles);
+  ~DistanceOracle();
+  DistanceOracle(const DistanceOracle&) = delete;
+  DistanceOracle& operator=(const DistanceOracle&) = delete;
+
+  const std::vector<Corners>& triangles() const;
+
+  /// Distance to the nearest triangle, or the bound where that is smaller. A close bound makes it fast.
+  double distance(const Eigen::Vector3d& point,
+                  double upper_bound = std::numeric_limits<double>::infinity()) const;
+  bool any_within(const Eigen::Vector3d& point, double radius) const;
+  /// The point of the surface that is nearest.
+  Eigen::Vector3d nearest_point(const Eigen::Vector3d& point) const;
+  /// Numbers of all triangles within a radius.
+  std::vector<std::uint32_t> triangles_within(const Eigen::Vector3d& point, double radius) const;
+
+  /// How a set of rays from a point voted on whether it crosses the surface an odd number of times. A ray in
+  /// general position meets no edge, and its parity is right. The directions are irrational multiples of one
+  /// another; should a ray graze an edge even so, the others outvote it. Three rays that agree are enough; at
+  /// most nine are cast.
+  struct Vote {
+    int odd = 0, cast = 0;
+    bool inside() const { return 2 * odd > cast; }
+    bool unanimous() const { return odd == 0 || odd == cast; }
+  };
+  Vote parity(const Eigen::Vector3d& point) const;
+  /// Crossings of the ray from a point along direction number 0 to 8 of those that vote, each counted +1
+  /// where the ray leaves the side to which the triangle's normal does not point, −1 where it enters it.
+  int signed_crossings(const Eigen::Vector3d& point, int direction) const;
+  static Eigen::Vector3d direction(int number);
+
+  /// Origins of the 8³ blocks, at multiples of 8, whose centre is within the band (in voxels) and half a
+  /// block's diagonal of the surface: all blocks that the band meets, and a few more.
+  std::vector<std::array<int, 3>> blocks_within(double band, const RunContext& context) const;
+
+ private:
+  struct Machinery;
+  std::unique_ptr<Machinery> machinery_;
+};
+
+// ---- A block: the 512 samples of an OpenVDB leaf in the leaf's order, z fastest.
+
+inline constexpr int kBlockVoxels = 512;
+inline Eigen::Vector3d block_position(const std::array<int, 3>& origin, int i) {
+  return {double(origin[0] + (i >> 6)), double(origin[1] + (i >> 3 & 7)), double(origin[2] + (i & 7))};
+}
+
+/// Distances of all samples, each exact or no less than `reach` (voxels).
+std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
+                                                 const std::array<int, 3>& origin, double reach);
+
+/// Samples that lie inside by parity. The sign can change only across the surface, so rays are cast for one
+/// sample of every set that provably lies on one side: two neighbours whose distances add up to more than the
+/// voxel between them.
+std::bitset<kBlockVoxels> block_inside(const DistanceOracle& oracle, const std::array<int, 3>& origin,
+                                       const std::array<double, kBlockVoxels>& distances);
+
+}  // namespace hermesh
