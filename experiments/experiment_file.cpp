@@ -134,6 +134,7 @@ JudgedBy read_judged(const Section& section, const std::vector<std::string>& cas
   judged.sign_samples = read_amount(section, "sign_samples", usual);
   if (judged.signs != Signs::kParity && judged.sign_samples == JudgedBy::kAll)
     section.fail_at("sign_samples", "only parity can judge the signs of all voxels");
+  judged.to_boundary = section.flag_or("to_boundary", false);
   judged.solid = section.text_or("solid", "");
   if (!judged.solid.empty() && std::find(cases.begin(), cases.end(), judged.solid) == cases.end())
     section.fail_at("solid", "there is no case \"" + judged.solid + "\"; there are " + joined(cases));
@@ -162,11 +163,12 @@ void read_voxel_sizes(const Section& section, CaseEntry& entry) {
 CaseEntry read_case(const Section& file, const toml::node& node, ExperimentKind kind,
                     const std::vector<std::string>& cases) {
   const bool extraction = kind == ExperimentKind::kExtraction;
-  const Section section(file.file(), file.table(node, "a case"), "a case",
-                        extraction ? std::vector<std::string>{"name", "resolutions", "closeup", "view"}
-                                   : std::vector<std::string>{"name", "resolutions", "voxel_sizes", "length",
-                                                              "published_seconds", "sweep", "distances",
-                                                              "signs", "sign_samples", "solid"});
+  const Section section(
+      file.file(), file.table(node, "a case"), "a case",
+      extraction
+          ? std::vector<std::string>{"name", "resolutions", "closeup", "view"}
+          : std::vector<std::string>{"name", "resolutions", "voxel_sizes", "length", "published_seconds",
+                                     "sweep", "distances", "signs", "sign_samples", "solid", "to_boundary"});
   CaseEntry entry;
   entry.name = section.text("name");
   if (std::find(cases.begin(), cases.end(), entry.name) == cases.end())

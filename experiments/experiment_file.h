@@ -32,6 +32,7 @@ struct JudgedBy {
   enum class Signs { kNone, kParity, kUnanimousParity, kWinding };
   static constexpr std::int64_t kAll = 0;
   std::optional<std::int64_t> distances;  ///< kAll voxels of the band or so many; absent: not judged
+  bool to_boundary = false;  ///< the distances are those to the solid's boundary instead of to all polygons
   Signs signs = Signs::kNone;
   std::int64_t sign_samples = kAll;
   std::string

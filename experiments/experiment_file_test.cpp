@@ -164,6 +164,7 @@ std::string voxelization(int line = 0, const std::string& replacement = "") {
       "cases = [{ name = \"ball\", resolutions = [10], distances = \"all\", signs = \"parity\", solid = "
       "\"cube\" },",
       "  { name = \"cube\", voxel_sizes = [2, 0.5], length = 7, published_seconds = [1, 3], distances = 99, "
+      "to_boundary = true, "
       "signs = \"winding-number\" },",
       "  { name = \"cube\", voxel_sizes = [1], sweep = { side = [1, 2.5] }, signs = \"parity\", sign_samples "
       "= 50 }]"};
@@ -201,6 +202,8 @@ TEST_F(ExperimentFile, ReadsEveryKeyOfVoxelization) {
   EXPECT_EQ(tier.cases[1].length, 7.0);
   EXPECT_EQ(tier.cases[1].published_seconds, (std::vector<double>{1, 3}));
   EXPECT_EQ(second.distances, 99);
+  EXPECT_TRUE(second.to_boundary);
+  EXPECT_FALSE(first.to_boundary);
   EXPECT_EQ(second.signs, JudgedBy::Signs::kWinding);
   EXPECT_EQ(second.sign_samples, 10'000);
   ASSERT_TRUE(tier.cases[2].sweep);

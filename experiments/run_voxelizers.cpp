@@ -72,7 +72,11 @@ class Truths {
     VoxelSelection selection;
     selection.band = std::max(group.experiment.exterior_band, group.experiment.interior_band);
     if (judged.distances) {
-      surface_ = std::make_unique<DistanceOracle>(triangles_in_voxels(group.input.mesh, group.voxel_size));
+      // An input's triangles are split down to this where they dive into the solid, in voxels.
+      constexpr double kFinest = 0.05;
+      surface_ = std::make_unique<DistanceOracle>(
+          judged.to_boundary ? solid_boundary(*solid_, *winding_, kFinest, context)
+                             : triangles_in_voxels(group.input.mesh, group.voxel_size));
       selection.samples = *judged.distances;
       distances_.emplace(*surface_, *winding_, selection, context);
     }

@@ -89,6 +89,17 @@ TEST(WindingOracle, KnowsTheBoundaryFromASheetInside) {
   EXPECT_FALSE(solid.bounds_solid(surface, {10, 1, 2}));  // and the other way round
 }
 
+TEST(WindingOracle, BoundaryOfTwoBoxesIsThatOfTheirUnion) {
+  const DistanceOracle surface(triangles_in_voxels(
+      test::joined(box({-1, -1, -1}, {1, 1, 1}), box({0, -0.5, -0.5}, {2, 0.5, 0.5})), 0.5));
+  const DistanceOracle boundary(solid_boundary(surface, WindingOracle(surface), 0.05, RunContext{}));
+  // In voxels: a cube of half side 2, and a bar of half width 1 from 0 to 4 along x.
+  EXPECT_NEAR(surface.distance({1.0, 0, 0}), 1.0, 1e-12);
+  EXPECT_NEAR(boundary.distance({1.0, 0, 0}), std::sqrt(2.0), 0.05);  // the seam, at (2, 1, 0)
+  EXPECT_NEAR(boundary.distance({3.0, 0, 0}), 1.0, 1e-12);
+  EXPECT_NEAR(boundary.distance({-1.5, 0, 0}), 0.5, 1e-12);
+}
+
 /// A cube turned against the grid, its exact level set, and the truth about it.
 class Judge : public testing::Test {
  protected:

@@ -1,5 +1,7 @@
 #include "reference/winding_oracle.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -124,6 +126,50 @@ bool WindingOracle::bounds_solid(const DistanceOracle& surface, const Vector3d& 
     if (found_inside && found_outside) return true;
   }
   return false;
+}
+
+bool WindingOracle::differs_across(const Corners& triangle, const Vector3d& on_triangle) const {
+  const auto& [a, b, c] = triangle;
+  const Vector3d step = 1e-3 * (b - a).cross(c - a).stableNormalized();
+  return inside(on_triangle + step) != inside(on_triangle - step);
+}
+
+namespace {
+
+double longest_edge(const Corners& t) {
+  return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
+}
+
+void add_boundary(const Corners& t, const WindingOracle& solid, double finest,
+                  std::vector<Corners>& boundary) {
+  const Vector3d middle = (t[0] + t[1] + t[2]) / 3.0;
+  const bool bounds = solid.differs_across(t, middle);
+  const bool small = longest_edge(t) < finest;
+  const auto as_middle = [&](const Vector3d& corner) {
+    return solid.differs_across(t, 0.95 * corner + 0.05 * middle) == bounds;
+  };
+  if (small || std::all_of(t.begin(), t.end(), as_middle)) {
+    if (bounds) boundary.push_back(t);
+    return;
+  }
+  const Vector3d ab = 0.5 * (t[0] + t[1]), bc = 0.5 * (t[1] + t[2]), ca = 0.5 * (t[2] + t[0]);
+  for (const Corners& part :
+       {Corners{t[0], ab, ca}, Corners{ab, t[1], bc}, Corners{ca, bc, t[2]}, Corners{ab, bc, ca}})
+    add_boundary(part, solid, finest, boundary);
+}
+
+}  // namespace
+
+std::vector<Corners> solid_boundary(const DistanceOracle& surface, const WindingOracle& solid, double finest,
+                                    const RunContext& context) {
+  std::vector<std::vector<Corners>> parts(surface.triangles().size());
+  tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
+    context.check();
+    add_boundary(surface.triangles()[i], solid, finest, parts[i]);
+  });
+  std::vector<Corners> boundary;
+  for (const std::vector<Corners>& part : parts) boundary.insert(boundary.end(), part.begin(), part.end());
+  return boundary;
 }
 
 }  // namespace hermesh

@@ -27,6 +27,9 @@ class WindingOracle {
   double operator()(const Eigen::Vector3d& point) const;
   bool inside(const Eigen::Vector3d& point) const { return (*this)(point) > 0.5; }
 
+  /// Whether the surface's triangle bounds the solid where a point lies on it, 1e-3 voxel off on both sides.
+  bool differs_across(const Corners& triangle, const Eigen::Vector3d& on_triangle) const;
+
   /// Whether a point of the surface bounds the solid: one side of it is inside and the other outside. Looks
   /// at both sides of every triangle that has the point, a little way into the triangle and 1e-3 voxel (less
   /// where the triangle is smaller) off its plane.
@@ -43,5 +46,12 @@ class WindingOracle {
   std::vector<ConeTriangle> cone_;
   double orientation_ = 1.0;
 };
+
+/// The parts of the triangles that bound the solid: those of which the middle and points near the corners do.
+/// A triangle of which only some do is split in four, until the pieces' edges are shorter than `finest`
+/// (voxels); so the boundary ends within that of where the surface dives into the solid. What passes between
+/// all four points is overlooked: give it triangles that are small beside the features. @throws Cancelled.
+std::vector<Corners> solid_boundary(const DistanceOracle& surface, const WindingOracle& solid, double finest,
+                                    const RunContext& context);
 
 }  // namespace hermesh

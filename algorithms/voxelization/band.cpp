@@ -243,6 +243,7 @@ std::unique_ptr<LeafTriangles> nearest_triangles(const kernels::Distances& dista
 Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size, bool nearest,
                   RunContext& context) {
   Band band;
+  band.voxel_size = voxel_size;
   band.blocks = bins.blocks().blocks();
   const std::size_t n = band.blocks.size();
   band.leaves.resize(n);

@@ -18,6 +18,7 @@ using LeafTriangles = std::array<std::int32_t, 512>;
 
 /// Block i is number i of the bins' blocks().
 struct Band {
+  double voxel_size = 1.0;  ///< world units
   std::vector<BlockAt> blocks;
   /// Distance of each voxel in world units, at most the reach; the active voxels are those below it. Null where no
   /// voxel is.

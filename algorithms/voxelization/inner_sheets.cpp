@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/voxelization/segment.h"
 
 namespace hermesh {
 namespace {
@@ -22,8 +23,8 @@ constexpr double kOff = 1e-3;
 constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
 constexpr std::size_t kKept = 4;  ///< neighbourhoods that a thread keeps
 
-struct Piece {
-  Vector3d corner[3];
+struct Piece : Facet {
+  using Facet::Facet;
   Vector3d centroid() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
   double size() const {
     return std::max({(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
@@ -36,30 +37,9 @@ struct Piece {
       if (length(i) > length(longest)) longest = i;
     const Vector3d &a = corner[longest], &b = corner[(longest + 1) % 3], &c = corner[(longest + 2) % 3];
     const Vector3d middle = 0.5 * (a + b);
-    return {Piece{{a, middle, c}}, Piece{{middle, b, c}}};
+    return {Piece(a, middle, c), Piece(middle, b, c)};
   }
 };
-
-Piece piece_of(const TriangleCorners& c) {
-  return {{Vector3d(c[0], c[1], c[2]), Vector3d(c[3], c[4], c[5]), Vector3d(c[6], c[7], c[8])}};
-}
-
-/// Where the segment meets the triangle, its border included: 0 at `from` to 1 at `to`; below 0 where it does not.
-double meeting(const Vector3d& from, const Vector3d& to, const Piece& t) {
-  const Vector3d way = to - from, e1 = t.corner[1] - t.corner[0], e2 = t.corner[2] - t.corner[0];
-  const Vector3d p = way.cross(e2);
-  const double det = e1.dot(p);
-  if (det * det <= 1e-24 * e1.squaredNorm() * e2.squaredNorm() * way.squaredNorm()) return -1.0;
-  constexpr double kOn = 1e-7;
-  const Vector3d s = from - t.corner[0];
-  const double u = s.dot(p) / det;
-  if (u < -kOn || u > 1.0 + kOn) return -1.0;
-  const Vector3d q = s.cross(e1);
-  const double v = way.dot(q) / det;
-  if (v < -kOn || u + v > 1.0 + kOn) return -1.0;
-  const double along = e2.dot(q) / det;
-  return along >= -kOn && along <= 1.0 + kOn ? std::max(along, 0.0) : -1.0;
-}
 
 VoxelBits spread(VoxelBits bits) {
   VoxelBits wide;
@@ -87,10 +67,10 @@ struct Neighbourhood {
     bins.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > block[a] * 8.0 + 8.1 || cluster.box.high[a] < block[a] * 8.0 - 0.1) return;
-      for (const std::uint32_t t : cluster.triangles) add(piece_of(soup.corners(t)), block);
+      for (const std::uint32_t t : cluster.triangles) add(Piece(soup.corners(t)), block);
     });
     if (const std::uint32_t i = bins.blocks().find(block); i != BlockTable::kNone)
-      for (const std::uint32_t t : bins.large(i)) add(piece_of(soup.corners(t)), block);
+      for (const std::uint32_t t : bins.large(i)) add(Piece(soup.corners(t)), block);
   }
 
   /// Whether a triangle of the cell is in the way.
@@ -120,10 +100,8 @@ struct Neighbourhood {
     const std::uint32_t number = std::uint32_t(pieces.size());
     pieces.push_back(piece);
     const Vector3d margin = Vector3d::Constant(1e-6);
-    const Vector3d normal = (piece.corner[1] - piece.corner[0]).cross(piece.corner[2] - piece.corner[0]);
-    hulls.push_back({piece.corner[0].cwiseMin(piece.corner[1]).cwiseMin(piece.corner[2]) - margin,
-                     piece.corner[0].cwiseMax(piece.corner[1]).cwiseMax(piece.corner[2]) + margin, normal,
-                     normal.dot(piece.corner[0]), 1e-6 * normal.norm()});
+    const Vector3d normal = piece.normal();
+    hulls.push_back({piece.low() - margin, piece.high() + margin, normal, normal.dot(piece.corner[0]), 1e-6 * normal.norm()});
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
         for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
@@ -328,7 +306,7 @@ class Finder {
       }
     }
     const auto meet = [&](std::uint32_t t) {
-      const Piece piece = piece_of(soup_.corners(t));
+      const Piece piece = Piece(soup_.corners(t));
       for (InnerEdge& edge : edges) edge.meet(piece);
     };
     bins_.for_each_cluster(band_.blocks[block], [&](const TriangleBins::Cluster& cluster) {
@@ -385,7 +363,7 @@ class Finder {
     // Block by block, so that a neighbourhood is looked up once.
     std::vector<std::pair<BlockAt, std::uint32_t>> order(triangles.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) {
-      const Vector3d centre = piece_of(soup_.corners(triangles[i])).centroid();
+      const Vector3d centre = Piece(soup_.corners(triangles[i])).centroid();
       for (int a = 0; a < 3; ++a) order[i].first[std::size_t(a)] = std::int32_t(std::floor(centre[a])) >> 3;
       order[i].second = i;
     }
@@ -396,8 +374,8 @@ class Finder {
       Prober& prober = probers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         context_.check();
-        const Piece piece = piece_of(soup_.corners(triangles[order[i].second]));
-        const Vector3d normal = (piece.corner[1] - piece.corner[0]).cross(piece.corner[2] - piece.corner[0]);
+        const Piece piece = Piece(soup_.corners(triangles[order[i].second]));
+        const Vector3d normal = piece.normal();
         if (normal.norm() > 0) cut(piece, normal.normalized(), prober, remains[order[i].second]);
       }
     });
@@ -415,7 +393,7 @@ class Finder {
     std::vector<char> near(band_.blocks.size(), 0);
     BlockFinder finder(bins_.blocks());
     for (const std::uint32_t t : sheets.triangles) {
-      const Piece piece = piece_of(soup_.corners(t));
+      const Piece piece = Piece(soup_.corners(t));
       std::int32_t from[3], to[3];
       for (int a = 0; a < 3; ++a) {
         const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});

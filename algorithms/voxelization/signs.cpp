@@ -2,6 +2,7 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/voxelization/orientation.h"
+#include "algorithms/voxelization/pockets.h"
 #include "algorithms/voxelization/winding_signs.h"
 
 namespace hermesh {
@@ -20,11 +21,12 @@ std::vector<VoxelBits> enclosed_voxels(const Regions& regions, std::size_t block
 /// The winding numbers of a mesh, its faces first made to agree.
 class Winding {
  public:
-  Winding(const PolygonMesh& mesh, double voxel_size)
+  explicit Winding(const IndexSoup& soup) : Winding(soup.mesh(), soup.scale()) {}
+  Winding(const PolygonMesh& mesh, double scale)
       : triangles_(mesh.quads.empty() ? std::vector<Triangle>() : triangulated(mesh)),
         faces_(mesh.quads.empty() ? std::span<const Triangle>(mesh.triangles) : triangles_),
         orientation_(orient_faces(mesh.points, faces_)),
-        tree_(mesh.points, faces_, 1.0 / voxel_size),
+        tree_(mesh.points, faces_, scale),
         number_(tree_, orientation_.turns) {}
 
   const Orientation& orientation() const { return orientation_; }
@@ -109,19 +111,20 @@ bool leaked(const std::vector<OpenEdge>& open, const WindingNumber& winding) {
 
 }  // namespace
 
-Signs find_signs(const PolygonMesh& mesh, double voxel_size, SignRule rule, const BlockTable& table, const Band& band,
-                 double reach, RunContext& context) {
+Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band, double reach,
+                 RunContext& context) {
   Signs signs;
-  const Regions regions = find_regions(table, band.crossed, context);
+  Regions regions = find_regions(bins.blocks(), band.crossed, context);
   Flood flood;
   if (rule != SignRule::winding_number) {
+    open_pockets(soup, bins, band.blocks, regions, context);
     signs.inside = enclosed_voxels(regions, band.blocks.size());
     if (rule == SignRule::flood_fill) return signs;
     flood = look_at_flood(band, signs.inside, context);
     if (flood.leaks.empty() && flood.share > 0) return signs;
   }
   context.check();
-  const Winding winding(mesh, voxel_size);
+  const Winding winding(soup);
   context.check();
   if (winding.orientation().verdict != Orientation::Verdict::usable) {
     // Faces that cancel can still enclose something.
@@ -135,7 +138,7 @@ Signs find_signs(const PolygonMesh& mesh, double voxel_size, SignRule rule, cons
     if (!leaked(flood.leaks, winding.number())) return signs;
     context.note("Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
   }
-  return winding_signs(winding.number(), table, band, regions, reach, context);
+  return winding_signs(winding.number(), bins.blocks(), band, regions, reach, context);
 }
 
 }  // namespace hermesh

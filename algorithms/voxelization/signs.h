@@ -4,7 +4,6 @@
 #include <map>
 #include <vector>
 
-#include "algorithms/core/polygon_mesh.h"
 #include "algorithms/voxelization/band.h"
 #include "algorithms/voxelization/regions.h"
 #include "algorithms/voxelization/voxelize.h"
@@ -23,9 +22,9 @@ struct Signs {
   std::map<BlockAt, VoxelBits> beyond;
 };
 
-/// `table` numbers the blocks, and the band reaches `reach` voxels. Says in a note when `rule` is automatic and the flood leaked in, and when the polygons
+/// The band reaches `reach` voxels. Says in a note when `rule` is automatic and the flood leaked in, and when the polygons
 /// give no inside at all. @throws Cancelled.
-Signs find_signs(const PolygonMesh& mesh, double voxel_size, SignRule rule, const BlockTable& table, const Band& band,
-                 double reach, RunContext& context);
+Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band, double reach,
+                 RunContext& context);
 
 }  // namespace hermesh

@@ -146,7 +146,7 @@ openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool
 /// False when there is no inside.
 bool sign(const IndexSoup& soup, const VoxelizeOptions& options, double reach, const TriangleBins& bins,
           const Widths& widths, Band& band, RunContext& context) {
-  Signs signs = find_signs(soup.mesh(), options.voxel_size, options.signs, bins.blocks(), band, reach, context);
+  Signs signs = find_signs(soup, options.signs, bins, band, reach, context);
   if (!signs.usable) return false;
   leave_out_inner_sheets(soup, bins, signs, options.voxel_size, reach, band, context);
   if (!signs.caps.empty()) add_caps(signs, options.voxel_size, reach, bins.blocks(), band, context);

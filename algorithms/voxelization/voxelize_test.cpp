@@ -254,6 +254,28 @@ TEST(Voxelize, AutomaticSignsCloseAHole) {
     }
 }
 
+TEST(Voxelize, AVoxelAtTheBottomOfACreviceIsOutside) {
+  // Two boxes 0.4 voxels apart along the diagonal plane: no grid edge leads into the gap, which voxels lie in.
+  PolygonMesh mesh;
+  const Vector3d along = Vector3d(1, 1, 0).normalized(), across = Vector3d(1, -1, 0).normalized();
+  for (const double side : {-1.0, 1.0}) {
+    PolygonMesh half = box({-15, 0.2, -8.3}, {15, 9, 8.3});
+    for (Vector3f& p : half.points) p = (double(p.x()) * along + side * double(p.y()) * across + double(p.z()) * Vector3d::UnitZ()).cast<float>();
+    append(mesh, half, side > 0);
+  }
+  const Voxelization v = run(mesh);
+  EXPECT_GT(at(v, 9, 9, 0), 0.0) << "near the mouth";
+  EXPECT_LT(at(v, 4, -2, 0), 0.0);
+  EXPECT_LT(at(v, -2, 4, 0), 0.0);
+}
+
+TEST(Voxelize, WindingNumbersOnVoxelsOfTheSurfaceMakeNoCaps) {
+  const PolygonMesh mesh = box({-10, -10, -10}, {10, 10, 10});
+  const Voxelization v = run(mesh, {.signs = SignRule::winding_number});
+  EXPECT_LT(compare(mesh, v, 1.0, 3.0, 5).worst, 1e-5);
+  EXPECT_EQ(compare(mesh, v, 1.0, 3.0, 5).active, 0u);
+}
+
 TEST(Voxelize, FloodFillStaysAFloodFillWhenAsked) {
   RunContext context;
   const Voxelization v = voxelize(opened(20.0, 15.0), {.signs = SignRule::flood_fill}, context);

@@ -185,6 +185,14 @@ class WindingSigns {
   };
   using Cells = std::map<std::array<std::int32_t, 3>, Cell>;
 
+  /// Whether a voxel lies on a triangle, where the number is that of either side.
+  bool on_surface(const BlockAt& block, unsigned place) const {
+    constexpr double kOn = 1e-3;
+    const std::uint32_t i = table_.find(block);
+    return i != BlockTable::kNone && band_.leaves[i] &&
+           band_.leaves[i]->buffer().data()[place] < kOn * band_.voxel_size;
+  }
+
   void build_caps(std::vector<TriangleCorners>& caps) const {
     std::vector<CapEdge> edges;
     Cells cells;
@@ -205,6 +213,8 @@ class WindingSigns {
         const bool last = (place / stride) % 8 == 7;
         // Beyond what was asked nothing changes but at triangles.
         if (last && upper == asked_.end()) continue;
+        if (on_surface(block, place) || on_surface(last ? above : block, last ? place - 7 * stride : place + stride))
+          continue;
         const float from = (*asked.winding)[place];
         const float to = last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
         Eigen::Vector3d crossing = voxel_at(block, place);

@@ -1,0 +1,145 @@
+#include "algorithms/voxelization/pockets.h"
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/voxelization/segment.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Voxel = std::array<std::int32_t, 3>;
+
+/// More voxels than this are no pocket.
+constexpr std::size_t kMost = 64;
+constexpr std::int32_t kFar = 2;
+
+struct Pocket {
+  std::uint32_t region = 0;
+  std::vector<Voxel> voxels;
+};
+
+Vector3d position(const Voxel& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
+
+class PocketOpener {
+ public:
+  PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks, Regions& regions,
+               const RunContext& context)
+      : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
+
+  void run() {
+    const std::vector<Pocket> pockets = find_pockets();
+    std::vector<char> open(pockets.size(), 0);
+    tbb::parallel_for(std::size_t(0), pockets.size(), [&](std::size_t i) {
+      context_.check();
+      for (const Voxel& voxel : pockets[i].voxels)
+        if (sees_outside(voxel)) {
+          open[i] = 1;
+          break;
+        }
+    });
+    std::vector<char> opened(regions_.count, 0);
+    for (std::size_t i = 0; i < pockets.size(); ++i) opened[pockets[i].region] = open[i];
+    for (BlockComponent& component : regions_.components)
+      if (opened[component.region]) component.region = Regions::kOutside;
+  }
+
+ private:
+  std::vector<Pocket> find_pockets() const {
+    std::vector<std::size_t> size(regions_.count, 0);
+    for (const BlockComponent& component : regions_.components)
+      for (const std::uint64_t word : component.voxels) size[component.region] += std::size_t(__builtin_popcountll(word));
+    std::vector<Pocket> pockets;
+    std::vector<std::uint32_t> number(regions_.count, BlockTable::kNone);
+    for (std::size_t i = 0; i < blocks_.size(); ++i)
+      for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
+        const BlockComponent& component = regions_.components[c];
+        if (component.region == Regions::kOutside || size[component.region] > kMost) continue;
+        if (number[component.region] == BlockTable::kNone) {
+          number[component.region] = std::uint32_t(pockets.size());
+          pockets.push_back({component.region, {}});
+        }
+        add_voxels(blocks_[i], component.voxels, pockets[number[component.region]].voxels);
+      }
+    return pockets;
+  }
+
+  static void add_voxels(const BlockAt& block, const VoxelBits& bits, std::vector<Voxel>& voxels) {
+    for (std::int32_t x = 0; x < 8; ++x)
+      for (std::uint64_t word = bits[std::size_t(x)]; word; word &= word - 1) {
+        const int place = __builtin_ctzll(word);
+        voxels.push_back({block[0] * 8 + x, block[1] * 8 + place / 8, block[2] * 8 + place % 8});
+      }
+  }
+
+  bool is_outside(const Voxel& voxel) const {
+    const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
+    if (i == BlockTable::kNone) return false;
+    const unsigned place = place_in_tile(voxel);
+    for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
+      if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)
+        return regions_.components[c].region == Regions::kOutside;
+    return false;
+  }
+
+  bool sees_outside(const Voxel& voxel) const {
+    const std::vector<Facet> facets = facets_near(voxel);
+    const Vector3d from = position(voxel);
+    // Near ones first.
+    for (std::int32_t far = 1; far <= kFar; ++far)
+      for (std::int32_t x = -far; x <= far; ++x)
+        for (std::int32_t y = -far; y <= far; ++y)
+          for (std::int32_t z = -far; z <= far; ++z) {
+            if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
+            const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
+            if (is_outside(other) && free(from, position(other), facets)) return true;
+          }
+    return false;
+  }
+
+  static bool free(const Vector3d& from, const Vector3d& to, const std::vector<Facet>& facets) {
+    // A triangle in whose plane the way lies is met by no test, so the way is taken a little to one side.
+    const Vector3d aside = to + Vector3d(1.1e-5, 1.7e-5, 2.3e-5);
+    return std::none_of(facets.begin(), facets.end(), [&](const Facet& f) {
+      return meeting(from, to, f) >= 0 || meeting(from, aside, f) >= 0;
+    });
+  }
+
+  std::vector<Facet> facets_near(const Voxel& voxel) const {
+    const Vector3d at = position(voxel), reach = Vector3d::Constant(kFar + 0.01);
+    std::vector<Facet> facets;
+    const auto add = [&](std::uint32_t t) {
+      const Facet facet(soup_.corners(t));
+      if ((facet.low().array() <= (at + reach).array()).all() && (facet.high().array() >= (at - reach).array()).all())
+        facets.push_back(facet);
+    };
+    const BlockAt block = tile_of(voxel);
+    bins_.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
+      for (std::size_t a = 0; a < 3; ++a)
+        if (cluster.box.low[a] > voxel[a] + reach[0] || cluster.box.high[a] < voxel[a] - reach[0]) return;
+      for (const std::uint32_t t : cluster.triangles) add(t);
+    });
+    // A large triangle two voxels away may be filed under the blocks around only.
+    for (std::int32_t x = -1; x <= 1; ++x)
+      for (std::int32_t y = -1; y <= 1; ++y)
+        for (std::int32_t z = -1; z <= 1; ++z)
+          if (const std::uint32_t i = bins_.blocks().find({block[0] + x, block[1] + y, block[2] + z});
+              i != BlockTable::kNone)
+            for (const std::uint32_t t : bins_.large(i)) add(t);
+    return facets;
+  }
+
+  const IndexSoup& soup_;
+  const TriangleBins& bins_;
+  const std::vector<BlockAt>& blocks_;
+  Regions& regions_;
+  const RunContext& context_;
+};
+
+}  // namespace
+
+void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks, Regions& regions,
+                  const RunContext& context) {
+  PocketOpener(soup, bins, blocks, regions, context).run();
+}
+
+}  // namespace hermesh
