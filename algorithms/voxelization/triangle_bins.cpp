@@ -12,11 +12,16 @@ namespace {
 /// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for each, so
 /// small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
-constexpr std::uint32_t kLarge = BlockTable::kNone;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kMany = 1024;
 
 std::int32_t block_of(double voxel) { return std::int32_t(std::floor(voxel)) >> 3; }
+
+BlockAt block_of_centre(const VoxelBox& box) {
+  BlockAt block;
+  for (std::size_t a = 0; a < 3; ++a) block[a] = block_of(0.5 * (box.low[a] + box.high[a]));
+  return block;
+}
 
 double gap(double low, double high, double from, double to) {
   return std::max({0.0, low - to, from - high});
@@ -168,46 +173,55 @@ TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& cont
   choose_blocks(context);
 }
 
+bool TriangleBins::is_large(const VoxelBox& box) {
+  double longest = 0;
+  for (std::size_t a = 0; a < 3; ++a) longest = std::max(longest, box.high[a] - box.low[a]);
+  return longest > kLargest;
+}
+
 void TriangleBins::file_small(RunContext& context) {
   const Chunks chunks(soup_.size());
   std::vector<BlockSet> sets(chunks.count);
-  std::vector<std::uint32_t> keys(soup_.size());
+  std::vector<std::vector<std::uint32_t>> found(chunks.count);  ///< triangles by the code of their block in the set
   all_large_.resize(chunks.count);
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
       const VoxelBox box = in_voxels(box_of(t));
-      BlockAt centre;
-      double longest = 0;
-      for (int a = 0; a < 3; ++a) {
-        longest = std::max(longest, box.high[a] - box.low[a]);
-        centre[a] = block_of(0.5 * (box.low[a] + box.high[a]));
+      if (is_large(box)) {
+        all_large_[chunk].push_back(std::uint32_t(t));
+        continue;
       }
-      keys[t] = longest > kLargest ? kLarge : sets[chunk].insert(centre);
-      if (longest > kLargest) all_large_[chunk].push_back(std::uint32_t(t));
+      const std::uint32_t code = sets[chunk].insert(block_of_centre(box));
+      if (code >= found[chunk].size()) found[chunk].resize((code | 511) + 1, 0);
+      ++found[chunk][code];
     }
   });
   bins_ = BlockTable(sets);
-  // counts[chunk · bins + bin], then the place where the chunk's first triangle of the bin goes.
-  std::vector<std::uint32_t> counts(chunks.count * bins_.size(), 0);
+  // next[chunk · bins + bin]: first how many, then where the chunk's next triangle of the bin goes.
+  std::vector<std::uint32_t> next(chunks.count * bins_.size(), 0);
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     const std::vector<std::uint32_t> translation = bins_.translation(sets[chunk]);
-    std::uint32_t* count = counts.data() + chunk * bins_.size();
-    for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t)
-      if (keys[t] != kLarge) ++count[keys[t] = bins_.number(translation, keys[t])];
+    for (std::uint32_t code = 0; code < found[chunk].size(); ++code)
+      if (found[chunk][code] > 0) next[chunk * bins_.size() + bins_.number(translation, code)] = found[chunk][code];
+    found[chunk] = {};
   });
   first_.resize(bins_.size() + 1);
   std::uint32_t total = 0;
   for (std::size_t bin = 0; bin < bins_.size(); ++bin) {
     first_[bin] = total;
     for (std::size_t chunk = 0; chunk < chunks.count; ++chunk)
-      total += std::exchange(counts[chunk * bins_.size() + bin], total);
+      total += std::exchange(next[chunk * bins_.size() + bin], total);
   }
   first_.back() = total;
   order_.resize(total);
+  // The blocks are found again rather than remembered, which for ten million triangles would take more memory than the
+  // volume.
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    std::uint32_t* next = counts.data() + chunk * bins_.size();
-    for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t)
-      if (keys[t] != kLarge) order_[next[keys[t]]++] = std::uint32_t(t);
+    BlockFinder finder(bins_);
+    for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
+      const VoxelBox box = in_voxels(box_of(t));
+      if (!is_large(box)) order_[next[chunk * bins_.size() + finder.find(block_of_centre(box))]++] = std::uint32_t(t);
+    }
   });
 }
 

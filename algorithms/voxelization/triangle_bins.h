@@ -46,6 +46,7 @@ class TriangleBins {
   void file_small(RunContext& context);
   void make_clusters(RunContext& context);
   void choose_blocks(RunContext& context);
+  static bool is_large(const VoxelBox& box);
   VoxelBox in_voxels(const FloatBox& box) const;
   FloatBox box_of(std::size_t triangle) const;
 
