@@ -32,17 +32,20 @@ std::span<const Voxelizer> our_voxelizers() {
        .options = hermesh_voxelizer_options(),
        .voxelize = hermesh_voxelizer},
       {.name = "thesis",
-       .summary = "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
-       .options = {{.name = "sign_angle",
-                    .fallback = "90",
-                    .help = "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
-                            "larger makes more outside",
-                    .minimum = 1e-6,
-                    .maximum = 180.0},
-                   {.name = "shuffle_seed",
-                    .fallback = "0",
-                    .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
-                    .maximum = 1e15}},
+       .summary =
+           "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
+       .options =
+           {{.name = "sign_angle",
+             .fallback = "90",
+             .help =
+                 "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
+                 "larger makes more outside",
+             .minimum = 1e-6,
+             .maximum = 180.0},
+            {.name = "shuffle_seed",
+             .fallback = "0",
+             .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
+             .maximum = 1e15}},
        .voxelize =
            [](const VoxelizationInput& input) {
              ThesisVoxelizerOptions options;

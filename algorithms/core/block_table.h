@@ -1,4 +1,5 @@
-// A sparse set of 8³ blocks of voxels, numbered, that costs memory for what is there and not for the space around it.
+// A sparse set of 8³ blocks of voxels, numbered, that costs memory for what is there and not for the space
+// around it.
 #pragma once
 
 #include <array>
@@ -8,7 +9,8 @@
 
 namespace hermesh {
 
-/// Coordinates of a block: those of its first voxel divided by 8. Of a tile: those of its first block divided by 8.
+/// Coordinates of a block: those of its first voxel divided by 8. Of a tile: those of its first block divided
+/// by 8.
 using BlockAt = std::array<std::int32_t, 3>;
 
 inline BlockAt tile_of(const BlockAt& block) { return {block[0] >> 3, block[1] >> 3, block[2] >> 3}; }
@@ -53,8 +55,8 @@ class BlockSet {
   std::uint32_t last_ = TileNumbers::kNone;
 };
 
-/// The union of sets, its blocks numbered tile by tile, the tiles in lexicographic order: the same numbers however the
-/// blocks were spread over the sets.
+/// The union of sets, its blocks numbered tile by tile, the tiles in lexicographic order: the same numbers
+/// however the blocks were spread over the sets.
 class BlockTable {
  public:
   static constexpr std::uint32_t kNone = TileNumbers::kNone;

@@ -40,7 +40,9 @@ constexpr std::size_t kChunk = 1 << 16;
 
 Bounds joined(Bounds a, const Bounds& b) {
   // Written so that a NaN of either stays.
-  const auto pick = [](double x, double y, bool first) { return std::isnan(x) || (first && !std::isnan(y)) ? x : y; };
+  const auto pick = [](double x, double y, bool first) {
+    return std::isnan(x) || (first && !std::isnan(y)) ? x : y;
+  };
   for (int axis = 0; axis < 3; ++axis) {
     a.lower[axis] = pick(a.lower[axis], b.lower[axis], a.lower[axis] < b.lower[axis]);
     a.upper[axis] = pick(a.upper[axis], b.upper[axis], a.upper[axis] > b.upper[axis]);
@@ -84,8 +86,8 @@ Measured measure(const PolygonMesh& mesh) {
   return all;
 }
 
-/// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses count,
-/// too; there are few.
+/// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses
+/// count, too; there are few.
 std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
   std::vector<BlockSet> parts((mesh.points.size() + kChunk - 1) / kChunk);
   const double scale = 1.0 / (8.0 * voxel_size);
@@ -104,7 +106,8 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
     coarse[0].insert({block[0] >> 4, block[1] >> 4, block[2] >> 4});
     coarse[1].insert({block[0] >> 9, block[1] >> 9, block[2] >> 9});
   }
-  return {double(table.size()), double(BlockTable({coarse[0]}).size()), double(BlockTable({coarse[1]}).size())};
+  return {double(table.size()), double(BlockTable({coarse[0]}).size()),
+          double(BlockTable({coarse[1]}).size())};
 }
 
 /// What the estimates of blocks of any size share.
@@ -191,8 +194,8 @@ void check_coordinates(const PolygonMesh& mesh, const Bounds& box, double voxel_
                 "--voxel-size.");
 }
 
-BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size, double exterior_band,
-                      double interior_band) {
+BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size,
+                      double exterior_band, double interior_band) {
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
   const Extent extent{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
                       measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
@@ -206,8 +209,7 @@ BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double 
   estimate.active_voxels = std::min(
       {extent.sides.prod(), 512.0 * leaves.all, extent.thickness * extent.surface + leaves.scattered * ball});
   // Eight upper nodes meet at the grid's origin, where most meshes lie.
-  estimate.grid_bytes = kLeafBytes * leaves.all +
-                        kMiddleBytes * count_blocks(middle, extent, 128.0).all +
+  estimate.grid_bytes = kLeafBytes * leaves.all + kMiddleBytes * count_blocks(middle, extent, 128.0).all +
                         kUpperBytes * (8.0 + count_blocks(large, extent, 4096.0).all);
   estimate.peak_bytes = kPeakOverGrid * estimate.grid_bytes;
   return estimate;

@@ -14,8 +14,8 @@ using kernels::Batch;
 using kernels::kBatch;
 using kernels::Kernels;
 
-/// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer, a triangle
-/// for its voxels. Where the two take equally long, measured.
+/// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer,
+/// a triangle for its voxels. Where the two take equally long, measured.
 constexpr std::size_t kMany = 1000;
 
 /// Up to sixteen triangles on their way to the kernels.
@@ -59,7 +59,8 @@ class LeafWork {
     else
       for (const TriangleBins::Cluster& cluster : clusters_) add(cluster.triangles);
     const std::span<const std::uint32_t> large = bins_.large(number);
-    for (std::size_t i = 0; i < large.size(); i += kBatch) add(large.subspan(i, std::min<std::size_t>(kBatch, large.size() - i)));
+    for (std::size_t i = 0; i < large.size(); i += kBatch)
+      add(large.subspan(i, std::min<std::size_t>(kBatch, large.size() - i)));
     flush();
     flush_crossing();
     return kernels_.finish(distances_, float(reach_), voxel_size, values, active);
@@ -71,7 +72,8 @@ class LeafWork {
   double gap2(const VoxelBox& box) const {
     double sum = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double gap = std::max({0.0, box.low[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.high[a]});
+      const double gap =
+          std::max({0.0, box.low[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.high[a]});
       sum += gap * gap;
     }
     return sum;
@@ -165,8 +167,10 @@ class LeafWork {
     for (std::size_t a = 0; a < 3; ++a) {
       const bool there = i < clusters_.size();
       // Rounding outwards by far more than single precision's error at this range.
-      boxes.side[a][0][i % kBatch] = there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
-      boxes.side[a][1][i % kBatch] = there ? float(clusters_[i].box.high[a] - frame_.origin[a]) + 1e-5f : 1e18f;
+      boxes.side[a][0][i % kBatch] =
+          there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
+      boxes.side[a][1][i % kBatch] =
+          there ? float(clusters_[i].box.high[a] - frame_.origin[a]) + 1e-5f : 1e18f;
     }
   }
 
@@ -186,7 +190,8 @@ class LeafWork {
     return &batch;
   }
 
-  /// Whether an edge of this leaf may meet the box: at least two of its sides must reach across a whole number.
+  /// Whether an edge of this leaf may meet the box: at least two of its sides must reach across a whole
+  /// number.
   bool meets_edges(const VoxelBox& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -240,8 +245,8 @@ std::unique_ptr<LeafTriangles> nearest_triangles(const kernels::Distances& dista
 
 }  // namespace
 
-Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size, bool nearest,
-                  RunContext& context) {
+Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size,
+                  bool nearest, RunContext& context) {
   Band band;
   band.voxel_size = voxel_size;
   band.blocks = bins.blocks().blocks();
@@ -249,33 +254,33 @@ Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach,
   band.leaves.resize(n);
   band.crossed.resize(n);
   if (nearest) band.nearest.resize(n);
-  tbb::enumerable_thread_specific<LeafWork> works(
-      [&] { return LeafWork(soup, bins, reach, nearest); });
+  tbb::enumerable_thread_specific<LeafWork> works([&] { return LeafWork(soup, bins, reach, nearest); });
   // A part at a time, so that this thread can report between them.
   const std::size_t part = std::max<std::size_t>(1024, n / 64);
   for (std::size_t first = 0; first < n; first += part) {
     context.progress("distances", double(first) / double(n));
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, std::min(n, first + part), 8), [&](const auto& range) {
-      LeafWork& work = works.local();
-      alignas(64) float values[512];
-      std::uint64_t active[8];
-      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        context.check();
-        if (!work.run(band.blocks[i], std::uint32_t(i), float(voxel_size), values, active, band.crossed[i])) continue;
-        band.leaves[i] = make_leaf(band.blocks[i], values, active);
-        if (nearest) band.nearest[i] = nearest_triangles(work.distances());
-      }
-    });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, std::min(n, first + part), 8),
+                      [&](const auto& range) {
+                        LeafWork& work = works.local();
+                        alignas(64) float values[512];
+                        std::uint64_t active[8];
+                        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                          context.check();
+                          if (!work.run(band.blocks[i], std::uint32_t(i), float(voxel_size), values, active,
+                                        band.crossed[i]))
+                            continue;
+                          band.leaves[i] = make_leaf(band.blocks[i], values, active);
+                          if (nearest) band.nearest[i] = nearest_triangles(work.distances());
+                        }
+                      });
   }
   return band;
 }
 
-std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(const IndexSoup& soup, const TriangleBins& bins,
-                                                         const Band& band, const std::vector<std::uint32_t>& blocks,
-                                                         const std::vector<std::uint32_t>& without, double reach,
-                                                         double voxel_size,
-                                                         std::vector<std::unique_ptr<LeafTriangles>>* nearest,
-                                                         RunContext& context) {
+std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(
+    const IndexSoup& soup, const TriangleBins& bins, const Band& band,
+    const std::vector<std::uint32_t>& blocks, const std::vector<std::uint32_t>& without, double reach,
+    double voxel_size, std::vector<std::unique_ptr<LeafTriangles>>* nearest, RunContext& context) {
   std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
   if (nearest) nearest->resize(blocks.size());
   tbb::enumerable_thread_specific<LeafWork> works(

@@ -16,11 +16,13 @@ SignRule sign_rule(const Options& options) {
 }  // namespace
 
 std::vector<OptionSpec> hermesh_voxelizer_options() {
-  return {{.name = "signs",
-           .fallback = "auto",
-           .help = "inside is what infinity cannot reach, or what the polygons wind around; auto floods, and winds "
-                   "where the flood leaks in",
-           .choices = {"auto", "flood-fill", "winding-number", "unsigned"}}};
+  return {
+      {.name = "signs",
+       .fallback = "auto",
+       .help =
+           "inside is what infinity cannot reach, or what the polygons wind around; auto floods, and winds "
+           "where the flood leaks in",
+       .choices = {"auto", "flood-fill", "winding-number", "unsigned"}}};
 }
 
 VoxelizeOptions voxelize_options(const VoxelizationInput& input) {

@@ -1,5 +1,5 @@
-// The polygons as a soup of triangles in voxels, without a copy: a copy of ten million triangles would outweigh the
-// volume that they become.
+// The polygons as a soup of triangles in voxels, without a copy: a copy of ten million triangles would
+// outweigh the volume that they become.
 #pragma once
 
 #include "algorithms/core/polygon_mesh.h"

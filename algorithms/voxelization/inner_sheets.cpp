@@ -18,8 +18,8 @@ using Eigen::Vector3d;
 
 /// How far off a side the way to a voxel starts, in voxels: beyond rounding and beyond doubled faces.
 constexpr double kOff = 1e-3;
-/// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that four places
-/// can stand for.
+/// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that
+/// four places can stand for.
 constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
 constexpr std::size_t kKept = 4;  ///< neighbourhoods that a thread keeps
 
@@ -27,7 +27,8 @@ struct Piece : Facet {
   using Facet::Facet;
   Vector3d centroid() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
   double size() const {
-    return std::max({(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
+    return std::max(
+        {(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
   }
   /// Halves of the longest side.
   std::array<Piece, 2> halves() const {
@@ -61,7 +62,8 @@ struct Neighbourhood {
     double offset, slack;
   };
   std::vector<Hull> hulls;
-  std::array<std::vector<std::uint32_t>, 512> cells;  ///< numbers of those that touch the cell up from each voxel
+  std::array<std::vector<std::uint32_t>, 512>
+      cells;  ///< numbers of those that touch the cell up from each voxel
 
   Neighbourhood(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& block) {
     bins.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
@@ -81,8 +83,7 @@ struct Neighbourhood {
       if ((low.array() > hull.high.array()).any() || (high.array() < hull.low.array()).any()) continue;
       const double a = hull.normal.dot(from) - hull.offset, b = hull.normal.dot(to) - hull.offset;
       if (std::min(a, b) > hull.slack || std::max(a, b) < -hull.slack) continue;
-      if (meeting(from, to, pieces[i]) >= 0)
-        return true;
+      if (meeting(from, to, pieces[i]) >= 0) return true;
     }
     return false;
   }
@@ -101,15 +102,16 @@ struct Neighbourhood {
     pieces.push_back(piece);
     const Vector3d margin = Vector3d::Constant(1e-6);
     const Vector3d normal = piece.normal();
-    hulls.push_back({piece.low() - margin, piece.high() + margin, normal, normal.dot(piece.corner[0]), 1e-6 * normal.norm()});
+    hulls.push_back({piece.low() - margin, piece.high() + margin, normal, normal.dot(piece.corner[0]),
+                     1e-6 * normal.norm()});
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
         for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
   }
 };
 
-/// What is certain about a place of the surface, or just off it: the outside is next to it, only the inside is, or
-/// neither can be told, as in a crevice narrower than a voxel.
+/// What is certain about a place of the surface, or just off it: the outside is next to it, only the inside
+/// is, or neither can be told, as in a crevice narrower than a voxel.
 enum class Side { outer, inner, unknown };
 
 /// Asks what is where; each thread has its own.
@@ -227,8 +229,8 @@ void cut(const Piece& piece, const Vector3d& normal, Prober& prober, Remains& re
 
 class Finder {
  public:
-  Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band, const std::vector<VoxelBits>& inside,
-         const RunContext& context)
+  Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
+         const std::vector<VoxelBits>& inside, const RunContext& context)
       : soup_(soup), bins_(bins), band_(band), inside_(inside), context_(context) {}
 
   InnerSheets run(double reach, double voxel_size) {
@@ -249,8 +251,8 @@ class Finder {
   }
 
  private:
-  /// Blocks with an edge between two voxels inside that an odd number of sheets cross, and the voxels around such
-  /// edges. An even number is most often a gap narrower than a voxel, whose walls do bound the solid.
+  /// Blocks with an edge between two voxels inside that an odd number of sheets cross, and the voxels around
+  /// such edges. An even number is most often a gap narrower than a voxel, whose walls do bound the solid.
   void find_suspects() {
     suspicious_.assign(band_.blocks.size(), VoxelBits{});
     std::vector<char> found(band_.blocks.size(), 0);
@@ -326,7 +328,8 @@ class Finder {
       for (std::size_t x = 0; x < 8; ++x)
         for (std::uint64_t bits = lower[x]; bits; bits &= bits - 1) {
           const int place = __builtin_ctzll(bits);
-          edges.push_back({{at[0] * 8 + std::int32_t(x), at[1] * 8 + place / 8, at[2] * 8 + place % 8}, axis, {}});
+          edges.push_back(
+              {{at[0] * 8 + std::int32_t(x), at[1] * 8 + place / 8, at[2] * 8 + place % 8}, axis, {}});
         }
     }
     return edges;
@@ -336,7 +339,8 @@ class Finder {
   VoxelBits inner_edges(std::uint32_t block, int axis, BlockFinder& finder) const {
     VoxelBits edges{};
     std::uint64_t any = 0;
-    for (std::size_t x = 0; x < 8; ++x) any |= edges[x] = band_.crossed[block].word[axis][x] & inside_[block][x];
+    for (std::size_t x = 0; x < 8; ++x)
+      any |= edges[x] = band_.crossed[block].word[axis][x] & inside_[block][x];
     if (!any) return edges;
     BlockAt above = band_.blocks[block];
     ++above[std::size_t(axis)];
@@ -369,7 +373,8 @@ class Finder {
     }
     std::sort(order.begin(), order.end());
     std::vector<Remains> remains(triangles.size());
-    tbb::enumerable_thread_specific<Prober> probers([&] { return Prober(soup_, bins_, inside_, suspicious_); });
+    tbb::enumerable_thread_specific<Prober> probers(
+        [&] { return Prober(soup_, bins_, inside_, suspicious_); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 64), [&](const auto& range) {
       Prober& prober = probers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -384,7 +389,8 @@ class Finder {
 
   static void add_piece(const Piece& piece, double voxel_size, std::uint32_t parent, InnerSheets& sheets) {
     const std::uint32_t n = std::uint32_t(sheets.pieces.points.size());
-    for (const Vector3d& corner : piece.corner) sheets.pieces.points.push_back((corner * voxel_size).cast<float>());
+    for (const Vector3d& corner : piece.corner)
+      sheets.pieces.points.push_back((corner * voxel_size).cast<float>());
     sheets.pieces.triangles.push_back({n, n + 1, n + 2});
     sheets.parents.push_back(parent);
   }

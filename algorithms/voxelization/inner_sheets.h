@@ -1,6 +1,6 @@
-// Parts of the mesh that do not bound the solid because the solid is on both of their sides: where parts of a model
-// intersect, and walls of a cavity that was filled. Distances to them would be wrong, and voxels near them stray.
-// (Aldén 2011, §5.4, deletes the voxels instead.)
+// Parts of the mesh that do not bound the solid because the solid is on both of their sides: where parts of a
+// model intersect, and walls of a cavity that was filled. Distances to them would be wrong, and voxels near
+// them stray. (Aldén 2011, §5.4, deletes the voxels instead.)
 #pragma once
 
 #include <vector>
@@ -20,10 +20,10 @@ struct InnerSheets {
   std::vector<std::uint32_t> blocks;
 };
 
-/// A piece of a triangle counts as inner only where that is certain: from just off either of its sides a straight way
-/// leads to a voxel inside without meeting a triangle. Everything else stays. Triangles that are inner in part are cut
-/// into pieces of at most a tenth of a voxel along the seam. `inside` are the voxels inside each block, and `reach` is
-/// how far distances matter, in voxels. @throws Cancelled.
+/// A piece of a triangle counts as inner only where that is certain: from just off either of its sides a
+/// straight way leads to a voxel inside without meeting a triangle. Everything else stays. Triangles that are
+/// inner in part are cut into pieces of at most a tenth of a voxel along the seam. `inside` are the voxels
+/// inside each block, and `reach` is how far distances matter, in voxels. @throws Cancelled.
 InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
                               const std::vector<VoxelBits>& inside, double reach, double voxel_size,
                               RunContext& context);

@@ -22,8 +22,8 @@ Vector3d position(const Voxel& v) { return {double(v[0]), double(v[1]), double(v
 
 class PocketOpener {
  public:
-  PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks, Regions& regions,
-               const RunContext& context)
+  PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
+               Regions& regions, const RunContext& context)
       : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
 
   void run() {
@@ -47,7 +47,8 @@ class PocketOpener {
   std::vector<Pocket> find_pockets() const {
     std::vector<std::size_t> size(regions_.count, 0);
     for (const BlockComponent& component : regions_.components)
-      for (const std::uint64_t word : component.voxels) size[component.region] += std::size_t(__builtin_popcountll(word));
+      for (const std::uint64_t word : component.voxels)
+        size[component.region] += std::size_t(__builtin_popcountll(word));
     std::vector<Pocket> pockets;
     std::vector<std::uint32_t> number(regions_.count, BlockTable::kNone);
     for (std::size_t i = 0; i < blocks_.size(); ++i)
@@ -109,7 +110,8 @@ class PocketOpener {
     std::vector<Facet> facets;
     const auto add = [&](std::uint32_t t) {
       const Facet facet(soup_.corners(t));
-      if ((facet.low().array() <= (at + reach).array()).all() && (facet.high().array() >= (at - reach).array()).all())
+      if ((facet.low().array() <= (at + reach).array()).all() &&
+          (facet.high().array() >= (at - reach).array()).all())
         facets.push_back(facet);
     };
     const BlockAt block = tile_of(voxel);
@@ -137,8 +139,8 @@ class PocketOpener {
 
 }  // namespace
 
-void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks, Regions& regions,
-                  const RunContext& context) {
+void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
+                  Regions& regions, const RunContext& context) {
   PocketOpener(soup, bins, blocks, regions, context).run();
 }
 

@@ -101,8 +101,8 @@ class UnionFind {
   std::vector<std::uint32_t> parent_;
 };
 
-/// Blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level below, and
-/// the components are those of the cells without a block.
+/// Blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level
+/// below, and the components are those of the cells without a block.
 struct Level {
   std::vector<BlockAt> blocks;
   std::vector<std::uint32_t> first;  ///< component of each block, as a node
@@ -160,7 +160,8 @@ class Hierarchy {
   std::uint32_t root(std::uint32_t component) { return sets_.find(levels_[0].node + component); }
 
  private:
-  /// True when the level just made has only the eight blocks around zero, so that there is nothing beyond but infinity.
+  /// True when the level just made has only the eight blocks around zero, so that there is nothing beyond but
+  /// infinity.
   bool add_level() {
     const BlockTable& below = *tables_.back();
     std::vector<BlockSet> set(1);

@@ -1,6 +1,7 @@
-// Connected regions of voxels that no triangle separates: two neighbours are connected when no triangle crosses the
-// grid edge between them, and all space without blocks is connected through. Needs no normals and no closed mesh; the
-// result does not depend on an order. (Aldén 2011, §5.3, floods the same way, along the surface's shell.)
+// Connected regions of voxels that no triangle separates: two neighbours are connected when no triangle
+// crosses the grid edge between them, and all space without blocks is connected through. Needs no normals and
+// no closed mesh; the result does not depend on an order. (Aldén 2011, §5.3, floods the same way, along the
+// surface's shell.)
 #pragma once
 
 #include <cstdint>

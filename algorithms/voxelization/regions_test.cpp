@@ -64,7 +64,8 @@ TEST(Regions, ARoomWithoutBlocksIsOneRegion) {
     for (std::int32_t x = -1; x <= size; ++x)
       for (std::int32_t y = -1; y <= size; ++y)
         for (std::int32_t z = -1; z <= size; ++z)
-          if (x == -1 || y == -1 || z == -1 || x == size || y == size || z == size) blocks.push_back({x, y, z});
+          if (x == -1 || y == -1 || z == -1 || x == size || y == size || z == size)
+            blocks.push_back({x, y, z});
     Scene scene(blocks);
     // The wall stands between voxels −5 and −4 and at the other end likewise.
     const std::int32_t low = -5, high = 8 * size + 3;

@@ -45,7 +45,8 @@ struct OpenEdge {
   Eigen::Vector3d end[2];
 };
 
-/// Edges of the block that are crossed, and those of them with both ends outside; edges inside the block only.
+/// Edges of the block that are crossed, and those of them with both ends outside; edges inside the block
+/// only.
 struct CrossedEdges {
   int all = 0, open = 0;
   OpenEdge example;
@@ -78,16 +79,17 @@ CrossedEdges crossed_edges(const Band& band, std::size_t block, const VoxelBits&
 
 /// What the flood did.
 struct Flood {
-  double share = 0;              ///< of the crossed edges that have an end inside
+  double share = 0;             ///< of the crossed edges that have an end inside
   std::vector<OpenEdge> leaks;  ///< one open edge of every block in which nearly all are open
 };
 
-/// Nearly all edges of a block are open where the flood leaked in, and at a plate thinner than a voxel. Single open
-/// edges are at thin features and mean nothing.
+/// Nearly all edges of a block are open where the flood leaked in, and at a plate thinner than a voxel.
+/// Single open edges are at thin features and mean nothing.
 Flood look_at_flood(const Band& band, const std::vector<VoxelBits>& inside, const RunContext& context) {
   constexpr int kEnough = 12;
   std::vector<CrossedEdges> edges(band.blocks.size());
-  parallel_blocks(edges.size(), context, [&](std::size_t i) { edges[i] = crossed_edges(band, i, inside[i]); });
+  parallel_blocks(edges.size(), context,
+                  [&](std::size_t i) { edges[i] = crossed_edges(band, i, inside[i]); });
   Flood flood;
   double all = 0, closed = 0;
   for (const CrossedEdges& e : edges) {
@@ -111,8 +113,8 @@ bool leaked(const std::vector<OpenEdge>& open, const WindingNumber& winding) {
 
 }  // namespace
 
-Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band, double reach,
-                 RunContext& context) {
+Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band,
+                 double reach, RunContext& context) {
   Signs signs;
   Regions regions = find_regions(bins.blocks(), band.crossed, context);
   Flood flood;
@@ -129,14 +131,16 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   if (winding.orientation().verdict != Orientation::Verdict::usable) {
     // Faces that cancel can still enclose something.
     if (rule == SignRule::automatic && flood.share > 0.5) return signs;
-    context.note(std::string("The distances have no sign: ") + explanation(winding.orientation().verdict) + ".");
+    context.note(std::string("The distances have no sign: ") + explanation(winding.orientation().verdict) +
+                 ".");
     signs.inside.clear();
     signs.usable = false;
     return signs;
   }
   if (rule == SignRule::automatic) {
     if (!leaked(flood.leaks, winding.number())) return signs;
-    context.note("Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
+    context.note(
+        "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
   }
   return winding_signs(winding.number(), bins.blocks(), band, regions, reach, context);
 }

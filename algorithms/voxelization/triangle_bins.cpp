@@ -9,8 +9,8 @@
 namespace hermesh {
 namespace {
 
-/// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for each, so
-/// small ones are filed once; but then a block must look at all that are filed around it.
+/// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
+/// each, so small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kMany = 1024;
@@ -23,9 +23,7 @@ BlockAt block_of_centre(const VoxelBox& box) {
   return block;
 }
 
-double gap(double low, double high, double from, double to) {
-  return std::max({0.0, low - to, from - high});
-}
+double gap(double low, double high, double from, double to) { return std::max({0.0, low - to, from - high}); }
 
 /// Calls f(block) for the blocks with a voxel nearer than `reach` to the box.
 template <class F>
@@ -48,8 +46,8 @@ void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
     }
 }
 
-/// Whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes through its
-/// edges.
+/// Whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes
+/// through its edges.
 class TriangleSlab {
  public:
   explicit TriangleSlab(const TriangleCorners& c) {
@@ -84,7 +82,8 @@ class TriangleSlab {
   int count_ = 0;
 };
 
-/// Pieces of the work whose number depends on its size alone, so that every thread count gives the same result.
+/// Pieces of the work whose number depends on its size alone, so that every thread count gives the same
+/// result.
 struct Chunks {
   std::size_t items, size, count;
   explicit Chunks(std::size_t n, std::size_t smallest = 8192)
@@ -106,7 +105,8 @@ struct Centre {
   std::uint32_t triangle;
 };
 
-/// Orders triangles so that each sixteen in a row are close together: halves the longest side, again and again.
+/// Orders triangles so that each sixteen in a row are close together: halves the longest side, again and
+/// again.
 void make_compact(std::span<Centre> centres) {
   while (centres.size() > kClusterSize) {
     Eigen::Vector3f low = centres[0].at, high = low;
@@ -127,9 +127,10 @@ void make_compact(std::span<Centre> centres) {
   }
 }
 
-/// Orders many triangles along the Morton curve through cells of half a voxel, in linear time. Fills `sorted`.
-void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, double scale, std::vector<std::uint32_t>& cell,
-                  std::vector<Centre>& sorted) {
+/// Orders many triangles along the Morton curve through cells of half a voxel, in linear time. Fills
+/// `sorted`.
+void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, double scale,
+                  std::vector<std::uint32_t>& cell, std::vector<Centre>& sorted) {
   constexpr int kBits = 4;
   std::vector<std::uint32_t> next((1 << 3 * kBits) + 1, 0);
   cell.resize(centres.size());
@@ -182,7 +183,8 @@ bool TriangleBins::is_large(const VoxelBox& box) {
 void TriangleBins::file_small(RunContext& context) {
   const Chunks chunks(soup_.size());
   std::vector<BlockSet> sets(chunks.count);
-  std::vector<std::vector<std::uint32_t>> found(chunks.count);  ///< triangles by the code of their block in the set
+  std::vector<std::vector<std::uint32_t>> found(
+      chunks.count);  ///< triangles by the code of their block in the set
   all_large_.resize(chunks.count);
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
@@ -202,7 +204,8 @@ void TriangleBins::file_small(RunContext& context) {
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     const std::vector<std::uint32_t> translation = bins_.translation(sets[chunk]);
     for (std::uint32_t code = 0; code < found[chunk].size(); ++code)
-      if (found[chunk][code] > 0) next[chunk * bins_.size() + bins_.number(translation, code)] = found[chunk][code];
+      if (found[chunk][code] > 0)
+        next[chunk * bins_.size() + bins_.number(translation, code)] = found[chunk][code];
     found[chunk] = {};
   });
   first_.resize(bins_.size() + 1);
@@ -214,13 +217,14 @@ void TriangleBins::file_small(RunContext& context) {
   }
   first_.back() = total;
   order_.resize(total);
-  // The blocks are found again rather than remembered, which for ten million triangles would take more memory than the
-  // volume.
+  // The blocks are found again rather than remembered, which for ten million triangles would take more memory
+  // than the volume.
   parallel_chunks(chunks, context, [&](std::size_t chunk) {
     BlockFinder finder(bins_);
     for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
       const VoxelBox box = in_voxels(box_of(t));
-      if (!is_large(box)) order_[next[chunk * bins_.size() + finder.find(block_of_centre(box))]++] = std::uint32_t(t);
+      if (!is_large(box))
+        order_[next[chunk * bins_.size() + finder.find(block_of_centre(box))]++] = std::uint32_t(t);
     }
   });
 }
@@ -254,7 +258,8 @@ void TriangleBins::make_clusters(RunContext& context) {
         } else {
           make_compact(centres);
         }
-        std::transform(centres.begin(), centres.end(), triangles.begin(), [](const Centre& c) { return c.triangle; });
+        std::transform(centres.begin(), centres.end(), triangles.begin(),
+                       [](const Centre& c) { return c.triangle; });
       }
       FloatBox* cluster = clusters_.data() + first_cluster_[bin];
       for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++cluster) {
@@ -296,8 +301,7 @@ void TriangleBins::choose_blocks(RunContext& context) {
   first_large_.assign(blocks_.size() + 1, 0);
   for (std::size_t chunk = 0; chunk < pairs.size(); ++chunk) {
     const std::vector<std::uint32_t> translation = blocks_.translation(sets[bins.count + chunk]);
-    for (Pair& pair : pairs[chunk])
-      ++first_large_[pair.first = blocks_.number(translation, pair.first)];
+    for (Pair& pair : pairs[chunk]) ++first_large_[pair.first = blocks_.number(translation, pair.first)];
   }
   std::uint64_t total = 0;
   for (std::uint64_t& count : first_large_) total += std::exchange(count, total);

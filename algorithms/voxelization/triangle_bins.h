@@ -1,13 +1,14 @@
-// Which triangles can be near which block of voxels. Small triangles are filed once each, under the block of their
-// box's centre, in clusters of sixteen with a box of their own; large ones under every block that they come near.
+// Which triangles can be near which block of voxels. Small triangles are filed once each, under the block of
+// their box's centre, in clusters of sixteen with a box of their own; large ones under every block that they
+// come near.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "algorithms/core/run_context.h"
 #include "algorithms/core/block_table.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/voxelization/index_soup.h"
 
 namespace hermesh {
@@ -31,7 +32,8 @@ class TriangleBins {
     std::span<const std::uint32_t> triangles;  ///< numbers, at most kClusterSize
     VoxelBox box;
   };
-  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are within reach.
+  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are
+  /// within reach.
   template <class F>
   void for_each_cluster(const BlockAt& block, F&& f) const;
   /// Large triangles within reach of block number `i`, in ascending order.

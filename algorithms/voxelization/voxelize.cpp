@@ -17,7 +17,8 @@ struct Widths {
   float exterior, interior;
 };
 
-void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths, const kernels::Kernels& kernels) {
+void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths,
+               const kernels::Kernels& kernels) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   kernels.apply_signs(inside.data(), widths.exterior, widths.interior, leaf.buffer().data(),
                       &mask.getWord<openvdb::Index64>(0));
@@ -29,7 +30,8 @@ PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_
   for (const TriangleCorners& t : triangles) {
     const std::uint32_t n = std::uint32_t(mesh.points.size());
     for (std::size_t i = 0; i < 3; ++i)
-      mesh.points.push_back(Eigen::Map<const Eigen::Vector3d>(t.data() + 3 * i).cast<float>() * float(voxel_size));
+      mesh.points.push_back(Eigen::Map<const Eigen::Vector3d>(t.data() + 3 * i).cast<float>() *
+                            float(voxel_size));
     mesh.triangles.push_back({n, n + 1, n + 2});
   }
   return mesh;
@@ -45,7 +47,8 @@ void lower(FloatLeaf& leaf, const FloatLeaf& other) {
 }
 
 /// Adds the distances to the caps of the holes, and the blocks that only a cap is near.
-void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band, RunContext& context) {
+void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band,
+              RunContext& context) {
   const PolygonMesh caps = to_mesh(signs.caps, voxel_size);
   const IndexSoup soup(caps, voxel_size);
   const TriangleBins bins(soup, reach, context);
@@ -80,8 +83,8 @@ void replace_inside(FloatLeaf& leaf, const FloatLeaf* other, const VoxelBits& in
 }
 
 /// Distances of the voxels inside, once more without what does not bound the solid.
-void leave_out_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Signs& signs, double voxel_size,
-                            double reach, Band& band, RunContext& context) {
+void leave_out_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Signs& signs,
+                            double voxel_size, double reach, Band& band, RunContext& context) {
   const InnerSheets sheets = find_inner_sheets(soup, bins, band, signs.inside, reach, voxel_size, context);
   if (sheets.triangles.empty()) return;
   std::vector<std::unique_ptr<LeafTriangles>> nearest;
@@ -162,7 +165,8 @@ bool sign(const IndexSoup& soup, const VoxelizeOptions& options, double reach, c
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
   initialize_openvdb();
-  const Widths widths{float(options.exterior_band * options.voxel_size), float(options.interior_band * options.voxel_size)};
+  const Widths widths{float(options.exterior_band * options.voxel_size),
+                      float(options.interior_band * options.voxel_size)};
   const double reach = std::max(options.exterior_band, options.interior_band);
   const IndexSoup soup(mesh, options.voxel_size);
   bool is_signed = false;

@@ -35,7 +35,8 @@ PolygonMesh sphere(const Vector3d& centre, double radius, int n = 24) {
     const double theta = std::numbers::pi * i / n, phi = std::numbers::pi * (j % (2 * n)) / n;
     // Both poles exactly on the axis, so that the mesh is closed.
     const double r = i == 0 || i == n ? 0.0 : std::sin(theta);
-    return Vector3d(centre + radius * Vector3d(r * std::cos(phi), r * std::sin(phi), i == n ? -1.0 : std::cos(theta)));
+    return Vector3d(centre +
+                    radius * Vector3d(r * std::cos(phi), r * std::sin(phi), i == n ? -1.0 : std::cos(theta)));
   };
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < 2 * n; ++j) {
@@ -49,7 +50,8 @@ PolygonMesh box(const Vector3d& low, const Vector3d& high) {
   PolygonMesh mesh;
   for (int i = 0; i < 8; ++i)
     mesh.points.push_back(
-        Vector3d(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()).cast<float>());
+        Vector3d(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z())
+            .cast<float>());
   mesh.quads = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   return mesh;
 }
@@ -58,7 +60,8 @@ void append(PolygonMesh& mesh, const PolygonMesh& other, bool turned = false) {
   const std::uint32_t n = std::uint32_t(mesh.points.size());
   mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());
   for (const Triangle& t : triangulated(other))
-    mesh.triangles.push_back(turned ? Triangle{t[0] + n, t[2] + n, t[1] + n} : Triangle{t[0] + n, t[1] + n, t[2] + n});
+    mesh.triangles.push_back(turned ? Triangle{t[0] + n, t[2] + n, t[1] + n}
+                                    : Triangle{t[0] + n, t[1] + n, t[2] + n});
 }
 
 Voxelization run(const PolygonMesh& mesh, VoxelizeOptions options = {}) {
@@ -66,7 +69,9 @@ Voxelization run(const PolygonMesh& mesh, VoxelizeOptions options = {}) {
   return voxelize(mesh, options, context);
 }
 
-double at(const Voxelization& v, int x, int y, int z) { return v.distance->tree().getValue(openvdb::Coord(x, y, z)); }
+double at(const Voxelization& v, int x, int y, int z) {
+  return v.distance->tree().getValue(openvdb::Coord(x, y, z));
+}
 
 struct Errors {
   double worst = 0;        ///< of a magnitude, voxels
@@ -74,7 +79,8 @@ struct Errors {
   std::size_t checked = 0;
 };
 
-/// Every voxel of the box against the tree: exact in double precision, and independent of blocks and vector code.
+/// Every voxel of the box against the tree: exact in double precision, and independent of blocks and vector
+/// code.
 Errors compare(const PolygonMesh& mesh, const Voxelization& v, double voxel_size, double band, int margin) {
   const std::vector<Triangle> triangles = triangulated(mesh);
   const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
@@ -136,9 +142,9 @@ TEST(Voxelize, ManySmallTrianglesAreExact) {
   for (auto voxel = v.nearest->cbeginValueOn(); voxel; ++voxel) {
     const Triangle t = mesh.triangles.at(std::size_t(*voxel));
     const openvdb::Coord c = voxel.getCoord();
-    const double d = std::sqrt(squared_distance({double(c.x()), double(c.y()), double(c.z())},
-                                                mesh.points[t[0]].cast<double>(), mesh.points[t[1]].cast<double>(),
-                                                mesh.points[t[2]].cast<double>()));
+    const double d = std::sqrt(
+        squared_distance({double(c.x()), double(c.y()), double(c.z())}, mesh.points[t[0]].cast<double>(),
+                         mesh.points[t[1]].cast<double>(), mesh.points[t[2]].cast<double>()));
     ASSERT_NEAR(d, std::abs(v.distance->tree().getValue(c)), 1e-5);
   }
 }
@@ -201,7 +207,8 @@ TEST(Voxelize, UnionOfOverlappingSpheres) {
     const double outside = std::hypot(x - apart, rho) - radius;
     // Inside, the nearest place is on the sphere of this half space, or on the circle where the spheres meet.
     const double seam = std::hypot(x, rho - std::sqrt(radius * radius - apart * apart));
-    const bool sphere_is_nearest = std::hypot(x - apart, rho) > 0 && x * radius >= apart * (radius - std::hypot(x - apart, rho));
+    const bool sphere_is_nearest =
+        std::hypot(x - apart, rho) > 0 && x * radius >= apart * (radius - std::hypot(x - apart, rho));
     const double truth = outside > 0 ? outside : -(sphere_is_nearest ? -outside : seam);
     wrong_signs += std::abs(truth) > 0.05 && (truth < 0) != (*voxel < 0) ? 1 : 0;
     stray += truth < -3.2 ? 1 : 0;
@@ -255,12 +262,15 @@ TEST(Voxelize, AutomaticSignsCloseAHole) {
 }
 
 TEST(Voxelize, AVoxelAtTheBottomOfACreviceIsOutside) {
-  // Two boxes 0.4 voxels apart along the diagonal plane: no grid edge leads into the gap, which voxels lie in.
+  // Two boxes 0.4 voxels apart along the diagonal plane: no grid edge leads into the gap, which voxels lie
+  // in.
   PolygonMesh mesh;
   const Vector3d along = Vector3d(1, 1, 0).normalized(), across = Vector3d(1, -1, 0).normalized();
   for (const double side : {-1.0, 1.0}) {
     PolygonMesh half = box({-15, 0.2, -8.3}, {15, 9, 8.3});
-    for (Vector3f& p : half.points) p = (double(p.x()) * along + side * double(p.y()) * across + double(p.z()) * Vector3d::UnitZ()).cast<float>();
+    for (Vector3f& p : half.points)
+      p = (double(p.x()) * along + side * double(p.y()) * across + double(p.z()) * Vector3d::UnitZ())
+              .cast<float>();
     append(mesh, half, side > 0);
   }
   const Voxelization v = run(mesh);
@@ -326,19 +336,20 @@ class Soups {
     for (int i = 0; i < n; ++i) {
       const Vector3d a = point(12), b = kind == 3 ? a : Vector3d(a + point(kind == 5 ? 60 : 6));
       Vector3d c = a + point(6);
-      if (kind == 1) c = 0.5 * (a + b) + 1e-4 * point(1);           // slivers
-      if (kind == 2) c = a + 0.3 * (b - a);                         // segments
-      if (kind == 3) c = a;                                         // points
-      if (kind == 4) c = a + 1e-6 * point(1);                       // needles
+      if (kind == 1) c = 0.5 * (a + b) + 1e-4 * point(1);  // slivers
+      if (kind == 2) c = a + 0.3 * (b - a);                // segments
+      if (kind == 3) c = a;                                // points
+      if (kind == 4) c = a + 1e-6 * point(1);              // needles
       if (kind == 6) {
         for (const Vector3d& v : {a, b, c}) add_whole(mesh, v);  // corners on voxels
       }
       if (kind != 6) add_triangle(mesh, a, b, c);
-      if (kind == 7) add_triangle(mesh, a, c, b);                   // coincident
+      if (kind == 7) add_triangle(mesh, a, c, b);  // coincident
     }
     if (kind == 6) {
       mesh.triangles.clear();
-      for (std::uint32_t i = 0; i + 2 < mesh.points.size(); i += 3) mesh.triangles.push_back({i, i + 1, i + 2});
+      for (std::uint32_t i = 0; i + 2 < mesh.points.size(); i += 3)
+        mesh.triangles.push_back({i, i + 1, i + 2});
     }
     if (random_() % 4 == 0) mesh.origin = Vector3d(1e7, -3e8, 12345.678);
     return mesh;
@@ -352,7 +363,9 @@ class Soups {
     const double x = uniform(random_), y = uniform(random_);
     return {x, y, uniform(random_)};
   }
-  static void add_whole(PolygonMesh& mesh, const Vector3d& v) { mesh.points.push_back(v.array().round().matrix().cast<float>()); }
+  static void add_whole(PolygonMesh& mesh, const Vector3d& v) {
+    mesh.points.push_back(v.array().round().matrix().cast<float>());
+  }
   std::mt19937_64 random_;
 };
 
@@ -362,8 +375,9 @@ TEST(Voxelize, TwoThousandSoupsAreExact) {
   for (int i = 0; i < 2000; ++i) {
     const PolygonMesh mesh = soups.next();
     const double band = soups.band(), voxel_size = soups.voxel_size();
-    const Voxelization v =
-        run(mesh, {.voxel_size = voxel_size, .exterior_band = band, .interior_band = band, .signs = SignRule::none});
+    const Voxelization v = run(
+        mesh,
+        {.voxel_size = voxel_size, .exterior_band = band, .interior_band = band, .signs = SignRule::none});
     // A random sample of the box, or the whole of it where it is small, keeps this to seconds.
     const std::vector<Triangle> triangles = triangulated(mesh);
     const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);

@@ -23,7 +23,8 @@ unsigned first_voxel(const VoxelBits& bits) {
 }
 
 Eigen::Vector3d voxel_at(const BlockAt& block, unsigned place) {
-  return {block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7), block[2] * 8.0 + double(place & 7)};
+  return {block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7),
+          block[2] * 8.0 + double(place & 7)};
 }
 
 /// A block that is asked voxel by voxel.
@@ -34,8 +35,8 @@ struct Asked {
 
 class WindingSigns {
  public:
-  WindingSigns(const WindingNumber& winding, const BlockTable& table, const Band& band, const Regions& regions,
-               const RunContext& context)
+  WindingSigns(const WindingNumber& winding, const BlockTable& table, const Band& band,
+               const Regions& regions, const RunContext& context)
       : winding_(winding), table_(table), band_(band), regions_(regions), context_(context) {}
 
   /// `rings`: how many blocks away from a cap its distance matters.
@@ -104,8 +105,8 @@ class WindingSigns {
     const std::uint64_t open = ~face(crossed, axis, 1);
     for (std::uint32_t a = regions_.first[lower]; a < regions_.first[lower + 1]; ++a)
       for (std::uint32_t b = regions_.first[upper]; b < regions_.first[upper + 1]; ++b)
-        if (side(a) != side(b) &&
-            (open & face(regions_.components[a].voxels, axis, 1) & face(regions_.components[b].voxels, axis, 0)))
+        if (side(a) != side(b) && (open & face(regions_.components[a].voxels, axis, 1) &
+                                   face(regions_.components[b].voxels, axis, 0)))
           return true;
     return false;
   }
@@ -124,8 +125,9 @@ class WindingSigns {
     for (std::size_t i = 0; i < blocks.size(); ++i) asked_.emplace(blocks[i], std::move(found[i]));
   }
 
-  /// Neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: a side of the block on which
-  /// the sign changes without a triangle, or where the neighbour is believed to be on the other side.
+  /// Neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: a side of the
+  /// block on which the sign changes without a triangle, or where the neighbour is believed to be on the
+  /// other side.
   std::vector<BlockAt> next_blocks(const std::vector<BlockAt>& from) const {
     std::map<BlockAt, int> next;
     for (const BlockAt& block : from) {
@@ -137,7 +139,8 @@ class WindingSigns {
           at[std::size_t(axis)] += side ? 1 : -1;
           if (asked_.count(at)) continue;
           const std::uint64_t ours = face(inside, axis, side);
-          if (table_.find(at) == BlockTable::kNone ? ours != 0 && ours != ~0ull : leads_to(block, at, axis, side))
+          if (table_.find(at) == BlockTable::kNone ? ours != 0 && ours != ~0ull
+                                                   : leads_to(block, at, axis, side))
             next.emplace(at, 0);
         }
     }
@@ -172,8 +175,8 @@ class WindingSigns {
     return bits;
   }
 
-  // ---- Caps: the dual of the grid edges on which the number passes ½ and no triangle is, a quad an edge, its corners
-  // the means of what crosses the cells around it (surface nets, Gibson 1998).
+  // ---- Caps: the dual of the grid edges on which the number passes ½ and no triangle is, a quad an edge,
+  // its corners the means of what crosses the cells around it (surface nets, Gibson 1998).
 
   struct Cell {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -200,12 +203,14 @@ class WindingSigns {
     for (const CapEdge& edge : edges) add_quad(edge, cells, caps);
   }
 
-  void collect_edges(const BlockAt& block, const Asked& asked, std::vector<CapEdge>& edges, Cells& cells) const {
+  void collect_edges(const BlockAt& block, const Asked& asked, std::vector<CapEdge>& edges,
+                     Cells& cells) const {
     for (int axis = 0; axis < 3; ++axis) {
       BlockAt above = block;
       ++above[std::size_t(axis)];
       const auto upper = asked_.find(above);
-      VoxelBits changes = differs_from_upper(asked.inside, upper == asked_.end() ? VoxelBits{} : upper->second.inside, axis);
+      VoxelBits changes =
+          differs_from_upper(asked.inside, upper == asked_.end() ? VoxelBits{} : upper->second.inside, axis);
       const VoxelBits crossed = crossed_along(block, axis);
       for (unsigned place = 0; place < 512; ++place) {
         if (!holds(changes, place) || holds(crossed, place)) continue;
@@ -213,10 +218,12 @@ class WindingSigns {
         const bool last = (place / stride) % 8 == 7;
         // Beyond what was asked nothing changes but at triangles.
         if (last && upper == asked_.end()) continue;
-        if (on_surface(block, place) || on_surface(last ? above : block, last ? place - 7 * stride : place + stride))
+        if (on_surface(block, place) ||
+            on_surface(last ? above : block, last ? place - 7 * stride : place + stride))
           continue;
         const float from = (*asked.winding)[place];
-        const float to = last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
+        const float to =
+            last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
         Eigen::Vector3d crossing = voxel_at(block, place);
         CapEdge edge{{}, axis};
         for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(crossing[a]);
@@ -258,7 +265,8 @@ class WindingSigns {
     }
   }
 
-  /// Blocks around those that were asked, on one side of the surface as a whole unless they were asked themselves.
+  /// Blocks around those that were asked, on one side of the surface as a whole unless they were asked
+  /// themselves.
   void sign_beyond(int rings, std::map<BlockAt, VoxelBits>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();
@@ -289,8 +297,8 @@ class WindingSigns {
 
 }  // namespace
 
-Signs winding_signs(const WindingNumber& winding, const BlockTable& table, const Band& band, const Regions& regions,
-                    double reach, const RunContext& context) {
+Signs winding_signs(const WindingNumber& winding, const BlockTable& table, const Band& band,
+                    const Regions& regions, double reach, const RunContext& context) {
   return WindingSigns(winding, table, band, regions, context).run(int(std::ceil(reach / 8.0)));
 }
 

@@ -82,12 +82,12 @@ const Kernels& at_level(std::string_view name) {
   for (const Level& level : all_levels()) {
     if (name != level.name) continue;
     if (!level.available)
-      throw Error("HERMESH_SIMD=" + std::string(name) + " asks for vector code that this machine cannot run; it has " +
-                  joined(levels()) + ".");
+      throw Error("HERMESH_SIMD=" + std::string(name) +
+                  " asks for vector code that this machine cannot run; it has " + joined(levels()) + ".");
     return *level.kernels;
   }
-  throw Error("HERMESH_SIMD is '" + std::string(name) + "', which is no level of vector code; this machine has " +
-              joined(levels()) + ".");
+  throw Error("HERMESH_SIMD is '" + std::string(name) +
+              "', which is no level of vector code; this machine has " + joined(levels()) + ".");
 }
 
 const Kernels& chosen() {

@@ -1,6 +1,7 @@
-// The arithmetic of one 8³ leaf: squared distances of its 512 voxels to triangles, and which of its grid edges the
-// triangles cross. Compiled for several levels of vector code, of which one is chosen at run time; all levels give the
-// same bytes, for there is no fused multiply-add, no approximate instruction and no sum across lanes.
+// The arithmetic of one 8³ leaf: squared distances of its 512 voxels to triangles, and which of its grid
+// edges the triangles cross. Compiled for several levels of vector code, of which one is chosen at run time;
+// all levels give the same bytes, for there is no fused multiply-add, no approximate instruction and no sum
+// across lanes.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,8 @@ namespace hermesh::kernels {
 /// Lanes of a batch.
 inline constexpr int kBatch = 16;
 
-/// Corners of up to 16 triangles, in voxels, relative to a leaf's first voxel: corner[3 · corner + axis][triangle].
+/// Corners of up to 16 triangles, in voxels, relative to a leaf's first voxel: corner[3 · corner +
+/// axis][triangle].
 struct Corners {
   alignas(64) double corner[9][kBatch];
 };
@@ -35,22 +37,23 @@ struct Near {
   unsigned at_edges;      ///< the box touches a grid edge that the leaf owns, by the same margin
 };
 
-/// A triangle as linear functions of position x (voxels, relative to a leaf's first voxel), so that a distance is a few
-/// additions a voxel. With n the unit normal, and for edge i with unit direction e and in-plane outward normal m:
+/// A triangle as linear functions of position x (voxels, relative to a leaf's first voxel), so that a
+/// distance is a few additions a voxel. With n the unit normal, and for edge i with unit direction e and
+/// in-plane outward normal m:
 ///   height  n·x + c                  signed distance to the plane
 ///   across  m·x + c                  signed distance to the edge's line, positive outside
 ///   along   e·x, from `low` to `high` on the edge
-/// so that d² = height² + (all across < 0 ? 0 : min over edges of across² + (along − clamp(along, low, high))²).
-/// A triangle thinner than a millionth of a voxel is its longest side, a segment, whose three edges are the same one
-/// seen from both sides, so that nothing is inside.
+/// so that d² = height² + (all across < 0 ? 0 : min over edges of across² + (along − clamp(along, low,
+/// high))²). A triangle thinner than a millionth of a voxel is its longest side, a segment, whose three edges
+/// are the same one seen from both sides, so that nothing is inside.
 struct Batch {
   enum { kHeight = 0, kEdge = 4, kPerEdge = 9, kAlong = 4, kLow = 7, kHigh = 8, kFloats = 31 };
   alignas(64) float f[kFloats][kBatch];
   alignas(64) std::int32_t id[kBatch];
 };
 
-/// Squared distances, voxels², of a leaf's voxels: 32 blocks of 2×2×4 voxels, 16 lanes each, so that a small triangle
-/// touches few of them. position() tells where a voxel is.
+/// Squared distances, voxels², of a leaf's voxels: 32 blocks of 2×2×4 voxels, 16 lanes each, so that a small
+/// triangle touches few of them. position() tells where a voxel is.
 struct Distances {
   alignas(64) float squared[512];
   alignas(64) std::int32_t id[512];  ///< of the nearest triangle; only kept where asked for
@@ -61,7 +64,8 @@ constexpr int position(int x, int y, int z) {
   return ((x >> 1) << 7 | (y >> 1) << 5 | (z >> 2) << 4) | ((x & 1) << 3 | (y & 1) << 2 | (z & 3));
 }
 
-/// Boxes of batches in voxels relative to the leaf's first voxel, sixteen at a time: [axis][low, high][batch].
+/// Boxes of batches in voxels relative to the leaf's first voxel, sixteen at a time: [axis][low,
+/// high][batch].
 struct Boxes {
   alignas(64) float side[3][2][kBatch];
 };
@@ -75,8 +79,8 @@ struct LazyBatches {
   void* context;
 };
 
-/// Grid edges that triangles cross: bit (x·8 + y)·8 + z of word x, axis of the edge first. An edge belongs to its lower
-/// end.
+/// Grid edges that triangles cross: bit (x·8 + y)·8 + z of word x, axis of the edge first. An edge belongs to
+/// its lower end.
 struct EdgeBits {
   std::uint64_t word[3][8];
 };
@@ -86,23 +90,23 @@ struct Kernels {
   Near (*near)(const MeshCorners&, const LeafFrame&, float reach);
   /// All 16 to voxels.
   void (*to_leaf)(const MeshCorners&, const LeafFrame&, Corners&);
-  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel, call
-  /// set_up_segment().
+  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel,
+  /// call set_up_segment().
   unsigned (*set_up)(const Corners&, Batch&);
-  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch; beyond it
-  /// they may stay as they are.
+  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch;
+  /// beyond it they may stay as they are.
   void (*update)(const Batch&, int count, float reach, bool ids, Distances&);
-  /// The same for thousands of triangles far smaller than a voxel: a voxel at a time, 16 triangles at once, batches
-  /// whose box is farther than the nearest triangle so far left out.
+  /// The same for thousands of triangles far smaller than a voxel: a voxel at a time, 16 triangles at once,
+  /// batches whose box is farther than the nearest triangle so far left out.
   void (*update_from_many)(const LazyBatches&, float reach, bool ids, Distances&);
-  /// Adds the edges that the first `count` triangles cross, ends and borders included with a tolerance of 1e-9 voxel,
-  /// so that no path along grid edges slips through between two triangles that share an edge.
+  /// Adds the edges that the first `count` triangles cross, ends and borders included with a tolerance of
+  /// 1e-9 voxel, so that no path along grid edges slips through between two triangles that share an edge.
   void (*cross)(const Corners&, int count, EdgeBits&);
-  /// Distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels below it as bits.
-  /// False when there is none.
+  /// Distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels below
+  /// it as bits. False when there is none.
   bool (*finish)(const Distances&, float reach, float scale, float* values, std::uint64_t* active);
-  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit and limits them on either side;
-  /// leaves in `active` the bits of those below their limit.
+  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit and limits them on either
+  /// side; leaves in `active` the bits of those below their limit.
   void (*apply_signs)(const std::uint64_t* inside, float exterior, float interior, float* values,
                       std::uint64_t* active);
 };
@@ -116,7 +120,8 @@ std::vector<std::string> levels();
 /// The kernels of a level. @throws Error for a name that is none, or that this machine cannot run.
 const Kernels& at_level(std::string_view name);
 
-/// Those of the environment variable HERMESH_SIMD, or else of the machine's fastest level. @throws Error as at_level().
+/// Those of the environment variable HERMESH_SIMD, or else of the machine's fastest level. @throws Error as
+/// at_level().
 const Kernels& chosen();
 
 }  // namespace hermesh::kernels

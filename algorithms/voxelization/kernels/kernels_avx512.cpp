@@ -5,7 +5,6 @@
 
 namespace hermesh::kernels::avx512 {
 
-#include "algorithms/voxelization/kernels/simd.h"
 #include "algorithms/voxelization/kernels/kernels.inc"
 
 }  // namespace hermesh::kernels::avx512

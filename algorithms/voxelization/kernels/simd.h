@@ -1,6 +1,7 @@
-// Sixteen floats or eight doubles, whatever the width of the machine's registers. This header and kernels.inc are
-// compiled once for each level of vector code, each time inside a namespace of its own, so nothing here may be shared
-// between levels: no standard library, or the linker could pick a copy that the machine cannot execute.
+// Sixteen floats or eight doubles, whatever the width of the machine's registers. This header and kernels.inc
+// are compiled once for each level of vector code, each time inside a namespace of its own, so nothing here
+// may be shared between levels: no standard library, or the linker could pick a copy that the machine cannot
+// execute.
 //
 // Every operation is elementwise and rounded once, as IEEE 754 says, so all levels give the same bytes.
 
@@ -96,7 +97,9 @@ inline __m256 choose_register(unsigned bits, int i, __m256 set, __m256 clear) {
 }
 constexpr int kFloatLanes = 8, kDoubleLanes = 4;
 using Integers = __m256i;
-inline Integers load_integers(const int* at) { return _mm256_load_si256(reinterpret_cast<const __m256i*>(at)); }
+inline Integers load_integers(const int* at) {
+  return _mm256_load_si256(reinterpret_cast<const __m256i*>(at));
+}
 inline void store_integers(int* at, Integers x) { _mm256_store_si256(reinterpret_cast<__m256i*>(at), x); }
 inline Integers integers_of(int x) { return _mm256_set1_epi32(x); }
 #else
