@@ -294,7 +294,8 @@ class Finder {
       }
       const Vector3d from(voxel[0], voxel[1], voxel[2]);
       const double along = meeting(from, from + Vector3d::Unit(axis), piece);
-      if (along >= 0) hits.push_back(along);
+      // At an end the surface goes through the voxel, as faces along the grid do, and is beside the edge, not across.
+      if (along > 1e-6 && along < 1.0 - 1e-6) hits.push_back(along);
     }
   };
 
