@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 #include <sstream>
+#include <thread>
 
 #include "algorithms/core/error.h"
 
@@ -65,6 +66,46 @@ TEST_F(CommitTogetherTest, TheOlderFirstComesBack) {
   write(folder / "first", "older");
   fail_to_commit();
   EXPECT_EQ(files(), (std::map<std::string, std::string>{{"first", "older"}}));
+}
+
+class AtomicFileTest : public CommitTogetherTest {};
+
+TEST_F(AtomicFileTest, TheTargetAppearsOnCommitOnly) {
+  {
+    AtomicFile file(folder / "a.txt");
+    std::ofstream(file.path()) << "new";
+    EXPECT_FALSE(fs::exists(folder / "a.txt"));
+    EXPECT_EQ(file.path().parent_path(), folder);
+    EXPECT_EQ(file.path().extension(), ".txt");
+    file.commit();
+  }
+  EXPECT_EQ(files().at("a.txt"), "new");
+  { AtomicFile file(folder / "a.txt"); }
+  EXPECT_EQ(files().at("a.txt"), "new");
+  EXPECT_EQ(files().size(), 1u);
+}
+
+TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
+  AtomicFile one(folder / "a.txt"), two(folder / "b.txt");
+  AtomicFile done(folder / "c.txt");
+  done.commit();
+  EXPECT_EQ(files().size(), 3u);
+  std::thread(remove_unfinished_files).join();
+  EXPECT_EQ(files().size(), 1u);
+  EXPECT_EQ(files().count("c.txt"), 1u);
+  EXPECT_THROW(one.commit(), Error);
+}
+
+TEST_F(AtomicFileTest, WritesThroughLinksAndNotOverDevices) {
+  write(folder / "real.txt", "old");
+  fs::create_symlink("real.txt", folder / "link.txt");
+  AtomicFile file(folder / "link.txt");
+  std::ofstream(file.path()) << "new";
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(folder / "link.txt"));
+  EXPECT_EQ(files().at("real.txt"), "new");
+  EXPECT_THROW(AtomicFile("/dev/null"), Error);
+  EXPECT_THROW(AtomicFile(folder / ""), Error);
 }
 
 }  // namespace

@@ -564,44 +564,5 @@ TEST_F(MeshFileTest, CoordinatesBeyondSinglePrecisionAreRefused) {
   EXPECT_THROW(read_mesh(path, context), Error);
 }
 
-class AtomicFileTest : public MeshFileTest {};
-
-TEST_F(AtomicFileTest, TheTargetAppearsOnCommitOnly) {
-  {
-    AtomicFile file(folder / "a.txt");
-    std::ofstream(file.path()) << "new";
-    EXPECT_FALSE(fs::exists(folder / "a.txt"));
-    EXPECT_EQ(file.path().parent_path(), folder);
-    EXPECT_EQ(file.path().extension(), ".txt");
-    file.commit();
-  }
-  EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
-  { AtomicFile file(folder / "a.txt"); }
-  EXPECT_EQ(bytes_of(folder / "a.txt"), "new");
-  EXPECT_EQ(files().size(), 1u);
-}
-
-TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
-  AtomicFile one(folder / "a.txt"), two(folder / "b.txt");
-  AtomicFile done(folder / "c.txt");
-  done.commit();
-  EXPECT_EQ(files().size(), 3u);
-  std::thread(remove_unfinished_files).join();
-  EXPECT_EQ(files(), std::vector<std::string>{"c.txt"});
-  EXPECT_THROW(one.commit(), Error);
-}
-
-TEST_F(AtomicFileTest, WritesThroughLinksAndNotOverDevices) {
-  write("real.txt", "old");
-  fs::create_symlink("real.txt", folder / "link.txt");
-  AtomicFile file(folder / "link.txt");
-  std::ofstream(file.path()) << "new";
-  file.commit();
-  EXPECT_TRUE(fs::is_symlink(folder / "link.txt"));
-  EXPECT_EQ(bytes_of(folder / "real.txt"), "new");
-  EXPECT_THROW(AtomicFile("/dev/null"), Error);
-  EXPECT_THROW(AtomicFile(folder / ""), Error);
-}
-
 }  // namespace
 }  // namespace hermesh
