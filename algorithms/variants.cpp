@@ -13,7 +13,7 @@ std::span<const Extractor> our_extractors() {
        .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, "
                   "ambiguities resolved)",
        .promises = {.closed = true, .manifold = true, .oriented = true},
-       .options = {},
+       .options = marching_cubes_options(),
        .extract = marching_cubes},
       {.name = "dual-contouring",
        .summary = "uniform dual contouring of Hermite data, keeps sharp features (Ju et al. 2002; Aldén "

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/voxelization/quad_diagonals.h"
 #include "experiments/case_file.h"
 #include "experiments/sha256.h"
 
@@ -64,13 +65,20 @@ std::string fetch(const CaseFile& file, RunContext& context) {
   return failures[file.name] = reason.empty() ? "it could not be fetched" : reason;
 }
 
+/// As a program that voxelizes it would take it.
+PolygonMesh read_polygons(const fs::path& path, RunContext& context) {
+  PolygonMesh mesh = read_mesh(path, context);
+  choose_diagonals(mesh);
+  return mesh;
+}
+
 LoadedCase read_file(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path,
                      const std::string& origin, RunContext& context) {
   const std::string sha256 = sha256_of_file(path);
   if (sha256 != file.sha256)
     throw Error(path.string() + " is not the file of case " + recipe.name + ": its SHA-256 is " + sha256 +
                 " instead of " + file.sha256 + "; remove it or put the right one there");
-  return {recipe.name, read_mesh(path, context), origin, sha256};
+  return {recipe.name, read_polygons(path, context), origin, sha256};
 }
 
 /// The first of the case's files that is in the folder.
@@ -153,7 +161,7 @@ LoadedCase load_case(const std::string& name, RunContext& context) {
   const std::vector<CaseRecipe> all = recipes_of_project();
   const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
   if (recipe != all.end()) return load_recipe(all, *recipe, context);
-  if (is_mesh_path(name)) return {name, read_mesh(name, context), "file", sha256_of_file(name), {}};
+  if (is_mesh_path(name)) return {name, read_polygons(name, context), "file", sha256_of_file(name), {}};
   throw Error("there is no case '" + name +
               "' and no mesh file of that name; the cases are: " + names_of(all));
 }

@@ -46,6 +46,17 @@ std::span<const Column> all_columns() {
        "/report/from_reference/mean", Unit::kVoxel},
       {"from_rms", "from rms [vx]", "root mean square distance from the input to the mesh, in voxels",
        "/report/from_reference/rms", Unit::kVoxel},
+      {"normal_mean", "normal mean [°]", "mean angle between the mesh's normals and those of the input nearest to them",
+       "/report/normals_to_reference/mean"},
+      {"normal_rms", "normal rms [°]", "root mean square of that angle", "/report/normals_to_reference/rms"},
+      {"hermite_mib", "Hermite [MiB]", "memory of the Hermite data that the mesh was made from", "/figures/hermite_bytes",
+       Unit::kMebibyte},
+      {"hermite_bytes_per_crossing", "B/crossing", "that in bytes per edge crossing",
+       "/figures/hermite_bytes_per_crossing"},
+      {"hermite_bytes_per_voxel", "B/band voxel", "that in bytes per active voxel of the level set",
+       "/figures/hermite_bytes_per_voxel"},
+      {"lost_crossings", "lost", "edge crossings that the representation of the Hermite data lost",
+       "/figures/lost_crossings"},
       {"edge_mean", "edge mean [vx]", "mean distance from the input's sharp edges to the mesh, in voxels",
        "/report/features/edge_to_mesh/mean", Unit::kVoxel},
       {"edge_max", "edge max [vx]", "largest distance from the input's sharp edges to the mesh, in voxels",
@@ -127,6 +138,16 @@ std::vector<std::string> column_names() {
   std::vector<std::string> names;
   for (const Column& column : all_columns()) names.push_back(column.name);
   return names;
+}
+
+std::vector<Column> own_columns(const Json& row) {
+  std::vector<Column> columns;
+  const Json* own = find(row, "/table/columns");
+  if (!own) return columns;
+  for (const Json& column : *own)
+    columns.push_back({column.at("name"), column.at("header"), column.at("meaning"),
+                       "/values/" + column.at("name").get<std::string>()});
+  return columns;
 }
 
 const Json* find(const Json& row, const std::string& pointer) {

@@ -29,6 +29,9 @@ struct Column {
 std::span<const Column> all_columns();
 std::vector<std::string> column_names();
 
+/// Those that a row of a measurement brings along (measurements.h), none for other rows.
+std::vector<Column> own_columns(const Json& row);
+
 /// What a JSON pointer leads to; null where that is nothing, or JSON's null.
 const Json* find(const Json& row, const std::string& pointer);
 /// 0 where there is no number.

@@ -235,6 +235,48 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
   return plot;
 }
 
+/// A plot's case is one of the measurement's tables.
+Vocabulary words_of(const Measurement& measurement) {
+  Vocabulary words;
+  for (const MeasuredTable& table : measurement.tables) {
+    words.cases.push_back(table.name);
+    for (const MeasuredColumn& column : table.columns) words.columns.push_back(column.name);
+  }
+  return words;
+}
+
+Tier read_parameters(const Section& file, const std::string& name, const toml::table& table,
+                     const Measurement& measurement) {
+  const Section section(file.file(), table, "[" + name + "]", names_of(std::span(measurement.parameters)));
+  Tier tier;
+  for (const auto& [key, value] : table)
+    tier.parameters[std::string(key.str())] = option_text(section, std::string(key.str()), value);
+  try {
+    Options(measurement.name, measurement.parameters, tier.parameters);
+  } catch (const Error& error) {
+    section.fail(section.line(), error.what());
+  }
+  return tier;
+}
+
+Experiment read_measurement(const Section& file, const Vocabulary& vocabulary, Experiment experiment) {
+  for (const char* key : {"voxelizers", "columns", "variants", "features", "exterior_band", "interior_band"})
+    if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" has no place in a measurement");
+  const Measurement& measurement =
+      vocabulary.measurements[file.choice("measurement", names_of(vocabulary.measurements))];
+  experiment.measurement = measurement.name;
+  experiment.seed = std::uint64_t(file.integer_or("seed", 1, 0, 1'000'000'000));
+  if (file.has("plots"))
+    for (const toml::node& node : file.list("plots"))
+      experiment.plots.push_back(read_plot(file, node, words_of(measurement)));
+  for (const std::string tier : {"quick", "full"})
+    if (const toml::table* found = file.optional_table(tier))
+      experiment.tiers[tier] = read_parameters(file, tier, *found, measurement);
+  if (experiment.tiers.empty())
+    file.fail(1, "a measurement needs a table [quick] or [full], which may be empty");
+  return experiment;
+}
+
 void read_extraction(const Section& file, const Vocabulary& vocabulary, Experiment& experiment) {
   for (const char* key : {"exterior_band", "interior_band", "plots"})
     if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"voxelization\"");
@@ -258,11 +300,15 @@ Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& 
   const toml::table table = parse_toml(path);
   const Section file(path.filename().string(), table, "an experiment",
                      {"kind", "question", "voxelizers", "columns", "variants", "features", "exterior_band",
-                      "interior_band", "plots", "quick", "full"});
+                      "interior_band", "plots", "measurement", "seed", "quick", "full"});
   Experiment experiment;
   experiment.name = path.stem().string();
-  if (file.has("kind")) experiment.kind = ExperimentKind(file.choice("kind", {"extraction", "voxelization"}));
+  if (file.has("kind"))
+    experiment.kind = ExperimentKind(file.choice("kind", {"extraction", "voxelization", "measurement"}));
   experiment.question = file.text("question");
+  if (experiment.kind == ExperimentKind::kMeasurement) return read_measurement(file, vocabulary, experiment);
+  for (const char* key : {"measurement", "seed"})
+    if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"measurement\"");
   experiment.voxelizers = read_voxelizers(file, vocabulary.voxelizers);
   experiment.columns = file.names("columns", "column", vocabulary.columns);
   const bool extraction = experiment.kind == ExperimentKind::kExtraction;

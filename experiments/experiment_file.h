@@ -13,13 +13,15 @@
 #include <vector>
 
 #include "algorithms/core/variant.h"
+#include "experiments/measurements.h"
 #include "experiments/plot.h"
 #include "experiments/render.h"
 
 namespace hermesh {
 
-/// Who competes: extractors on the grids of the voxelizers, or the voxelizers themselves.
-enum class ExperimentKind { kExtraction, kVoxelization };
+/// Who competes: extractors on the grids of the voxelizers, or the voxelizers themselves; or nobody, where a
+/// function measures something else.
+enum class ExperimentKind { kExtraction, kVoxelization, kMeasurement };
 
 /// A parameter of a generated case that takes several values.
 struct Sweep {
@@ -71,6 +73,7 @@ struct Tier {
   int pixels = 400;                ///< width of one picture on the sheet; 0 draws none
   bool self_intersections = true;  ///< false leaves them uncounted, and a promise about them unchecked
   bool components = false;         ///< count those of the surface in each voxelizer's level set
+  std::map<std::string, std::string> parameters;  ///< of a measurement, as given
 };
 
 struct Experiment {
@@ -84,6 +87,8 @@ struct Experiment {
   std::optional<double>
       features;  ///< dihedral angle in degrees above which an edge is a sharp feature; absent: not judged
   std::vector<Plot> plots;
+  std::string measurement;  ///< name of an entry in the table of measurements
+  std::uint64_t seed = 1;   ///< of a measurement's random numbers
   std::map<std::string, Tier> tiers;
 
   /// Those whose rows are compared.
@@ -97,6 +102,7 @@ struct Vocabulary {
   std::span<const Extractor> extractors;
   std::span<const Voxelizer> voxelizers;
   std::vector<std::string> cases, columns;
+  std::span<const Measurement> measurements = {};
 };
 
 /// @throws Error "headline.toml:12: …" for a syntax error, an unknown or missing key, a wrong type, a value

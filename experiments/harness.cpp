@@ -42,10 +42,12 @@ Json run_head(const Experiment& experiment, const RunSettings& settings) {
   const Json origin = provenance(experiments_folder());
   head["run"] = origin.at("date").get<std::string>() + "-" + std::to_string(getpid());
   head.update(origin);
-  head["columns"] = experiment.columns;
+  if (!experiment.columns.empty()) head["columns"] = experiment.columns;
   if (experiment.kind == ExperimentKind::kExtraction) return head;
-  head["kind"] = "voxelization";
-  head["band"] = {{"exterior", experiment.exterior_band}, {"interior", experiment.interior_band}};
+  const bool voxelization = experiment.kind == ExperimentKind::kVoxelization;
+  head["kind"] = voxelization ? "voxelization" : "measurement";
+  if (voxelization)
+    head["band"] = {{"exterior", experiment.exterior_band}, {"interior", experiment.interior_band}};
   if (!experiment.plots.empty()) head["plots"] = Json::array();
   for (const Plot& plot : experiment.plots) head["plots"].push_back(to_json(plot));
   return head;
@@ -78,8 +80,8 @@ class Run {
         tables_(tables),
         context_(context),
         table_(table),
-        experiment_(read_experiment(settings.experiment,
-                                    {tables.extractors, tables.voxelizers, tables.cases, column_names()})),
+        experiment_(read_experiment(settings.experiment, {tables.extractors, tables.voxelizers, tables.cases,
+                                                          column_names(), tables.measurements})),
         tier_(find_tier(experiment_, settings.tier)),
         out_(make_folder(settings.out)),
         head_(run_head(experiment_, settings)) {}
@@ -88,10 +90,11 @@ class Run {
     table_ << "## " << experiment_.name << " (" << settings_.tier << "): " << experiment_.question << "\n\n";
     const bool extraction = experiment_.kind == ExperimentKind::kExtraction;
     for (const CaseEntry& entry : tier_.cases) extraction ? run_case(entry) : voxelize_case(entry);
+    if (experiment_.kind == ExperimentKind::kMeasurement) measure();
     if (rows_.empty())
       throw Error("no cell of " + experiment_.name + " contains \"" + settings_.filter +
                   "\" in its case/resolution/variant");
-    write_legend(rows_, table_);
+    if (experiment_.kind != ExperimentKind::kMeasurement) write_legend(rows_, table_);
     table_ << "\nRows: " << (out_ / "rows.jsonl").string() << "; pictures: " << (out_ / "*.png").string()
            << "\n";
     // Of all rows in the folder: earlier runs with another filter belong to the same picture.
@@ -100,6 +103,17 @@ class Run {
   }
 
  private:
+  /// Every table of a measurement has columns of its own.
+  void measure() {
+    rows_ = run_measurement(experiment_, tier_, tables_, out_, settings_.filter, head_, context_);
+    for (const Json& row : rows_) append_row(out_ / "rows.jsonl", row);
+    for (const RowGroup& group : latest_groups(rows_)) {
+      write_markdown(group, table_);
+      write_legend(group.rows, table_);
+      table_ << '\n';
+    }
+  }
+
   void run_case(const CaseEntry& entry) {
     std::optional<LoadedCase> input;
     for (const int resolution : entry.resolutions) {
@@ -226,6 +240,7 @@ int run_experiment(const RunSettings& settings, const Tables& tables, RunContext
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
   Tables tables{all_extractors(), all_voxelizers(), {}, load_case, load_changed_case};
   for (const CaseInfo& info : list_cases()) tables.cases.push_back(info.name);
+  tables.measurements = {all_measurements().begin(), all_measurements().end()};
   return run_experiment(settings, tables, context, table);
 }
 

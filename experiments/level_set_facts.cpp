@@ -67,8 +67,7 @@ std::uint64_t fingerprint(const LevelSet& level_set) {
 }
 
 std::int64_t count_surface_components(const LevelSet& level_set, RunContext& context) {
-  const Options none;
-  const PolygonMesh mesh = marching_cubes({.level_set = level_set, .options = none, .context = context});
+  const PolygonMesh mesh = marching_cubes(level_set, 0.0, nullptr, context);
   if (mesh.empty()) return 0;
   validation::MeshReport report;
   validation::count_topology(to_mesh_file(mesh), report, context);

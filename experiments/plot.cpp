@@ -22,14 +22,16 @@ struct Curve {
   std::vector<std::pair<double, double>> points;
 };
 
-const Column& column_named(const std::string& name) {
+Column column_of(const Json& row, const std::string& name) {
+  for (const Column& column : own_columns(row))
+    if (column.name == name) return column;
   for (const Column& column : all_columns())
     if (column.name == name) return column;
   throw Error("there is no column \"" + name + "\"");
 }
 
 std::optional<double> number_in(const std::string& column, const Json& row) {
-  const Json value = value_of(column_named(column), row);
+  const Json value = value_of(column_of(row, column), row);
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
@@ -52,7 +54,7 @@ std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
       if (!y || (plot.log_y && *y <= 0.0)) continue;
       const std::string label = text_at(row, "/variant/label");
       if (i > 0 && label != first_label) continue;
-      auto& points = curve(i == 0 ? label : column_named(plot.y[i]).header).points;
+      auto& points = curve(i == 0 ? label : column_of(row, plot.y[i]).header).points;
       points.emplace_back(*x, plot.percent ? 100.0 * *y : *y);
     }
   }

@@ -148,6 +148,7 @@ class Group {
         folder / (std::to_string(number + 1) + "-" + file_name(cell.row["variant"]["label"]) + ".ply");
     write_mesh(cell.mesh_file, mesh, child);
     cell.row["notes"] = child.notes;
+    for (const auto& [name, value] : child.figures) cell.row["figures"][name] = value;
     mesh = {};
     judge_file(cell);
   }

@@ -10,6 +10,7 @@
 #include "experiments/cases.h"
 #include "experiments/experiment_file.h"
 #include "experiments/harness.h"
+#include "experiments/measurements.h"
 #include "experiments/recipes.h"
 #include "experiments/rows.h"
 
@@ -24,6 +25,7 @@ struct Tables {
   /// The same with some parameters of the case's recipe changed.
   std::function<LoadedCase(const std::string& name, const RecipeParameters& changes, RunContext& context)>
       load_changed;
+  std::vector<Measurement> measurements = {};
 };
 
 /// run_experiment() of harness.h with the names to choose from given.

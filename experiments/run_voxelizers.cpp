@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "algorithms/core/level_set_grid.h"
 #include "experiments/cell.h"
 #include "experiments/level_set_facts.h"
 #include "experiments/provenance.h"
@@ -176,6 +177,8 @@ class Group {
   }
 
   void first_run(Cell& cell, const Truths* truths) {
+    // OpenVDB's registers are the process's, not those of whoever happens to be measured first.
+    initialize_openvdb();
     const PeakMemory memory;
     const Once first = once(cell, true);
     cell.row["peak_bytes"] = optional_json(memory.bytes());

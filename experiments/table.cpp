@@ -11,17 +11,34 @@
 namespace hermesh {
 namespace {
 
-std::vector<const Column*> shown_columns(const std::vector<Json>& rows) {
-  std::vector<const Column*> shown;
-  const Json* names = rows.empty() ? nullptr : find(rows.front(), "/columns");
-  for (const Column& column : all_columns()) {
-    if (!names) shown.push_back(&column);
-  }
-  if (!names) return shown;
+std::vector<Column> shown_columns(const std::vector<Json>& rows) {
+  if (rows.empty()) return {};
+  if (find(rows.front(), "/measurement")) return own_columns(rows.front());
+  const Json* names = find(rows.front(), "/columns");
+  if (!names) return {all_columns().begin(), all_columns().end()};
+  std::vector<Column> shown;
   for (const Json& name : *names)
     for (const Column& column : all_columns())
-      if (name == column.name) shown.push_back(&column);
+      if (name == column.name) shown.push_back(column);
   return shown;
+}
+
+/// Those of the CSV: the columns that the rows bring along, and the common ones unless no row has them.
+std::vector<Column> csv_columns(const std::vector<Json>& rows) {
+  std::vector<Column> columns;
+  bool common = rows.empty();
+  for (const Json& row : rows) {
+    common = common || !find(row, "/measurement");
+    for (const Column& own : own_columns(row))
+      if (std::ranges::find(columns, own.name, &Column::name) == columns.end()) columns.push_back(own);
+  }
+  if (common) columns.insert(columns.begin(), all_columns().begin(), all_columns().end());
+  return columns;
+}
+
+/// Rows of some tables are only there to be plotted.
+bool is_printed(const std::vector<Json>& rows) {
+  return !rows.empty() && text_at(rows.front(), "/table/printed") != "false";
 }
 
 /// Columns on a terminal: one for each code point, since no wide or combining letters occur in tables.
@@ -74,6 +91,8 @@ std::string for_csv(const std::string& text) {
 /// "dragon at resolution 400" and what that was.
 std::string group_title(const Json& row) {
   std::string title = text_at(row, "/case/name");
+  if (find(row, "/measurement"))
+    return find(row, "/table/title") ? title + ": " + text_at(row, "/table/title") : title;
   if (find(row, "/sweep")) title += " by " + text_at(row, "/sweep/parameter");
   if (find(row, "/resolution")) return title + " at resolution " + text_at(row, "/resolution");
   return title + (find(row, "/sweep") ? " at voxel size " + text_at(row, "/nominal_voxel_size")
@@ -87,7 +106,20 @@ std::string cell_text_of(const Json& row) {
   return find(row, "/nominal_voxel_size") ? " at voxel " + text_at(row, "/nominal_voxel_size") : "";
 }
 
+std::string run_fact(const Json& row) {
+  std::string run = "run: commit " + text_at(row, "/commit").substr(0, 12);
+  if (const Json* dirty = find(row, "/dirty"); dirty && *dirty == true) run += " with changes";
+  run += ", " + text_at(row, "/date") + ", " + text_at(row, "/machine/cpu") + ", " +
+         text_at(row, "/threads") + " threads";
+  if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
+  return run;
+}
+
 std::vector<std::string> group_facts(const Json& row) {
+  if (find(row, "/measurement"))
+    return {
+        "measured: " + text_at(row, "/measurement/parameters") + " seed=" + text_at(row, "/measurement/seed"),
+        run_fact(row)};
   std::string input = "input: " + text_at(row, "/case/origin") + ", sha256 " +
                       text_at(row, "/case/sha256").substr(0, 12) + ", " +
                       readable(number_at(row, "/case/triangles")) + " triangles";
@@ -104,12 +136,7 @@ std::vector<std::string> group_facts(const Json& row) {
     grid += ", " + readable(number_at(row, "/voxelization/active_voxels")) + " active voxels, " +
             readable(number_at(row, "/voxelization/memory_bytes") / (1 << 20)) + " MiB, made in " +
             readable(number_at(row, "/voxelization/seconds/median")) + " s";
-  std::string run = "run: commit " + text_at(row, "/commit").substr(0, 12);
-  if (const Json* dirty = find(row, "/dirty"); dirty && *dirty == true) run += " with changes";
-  run += ", " + text_at(row, "/date") + ", " + text_at(row, "/machine/cpu") + ", " +
-         text_at(row, "/threads") + " threads";
-  if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
-  std::vector<std::string> facts = {input, grid, run};
+  std::vector<std::string> facts = {input, grid, run_fact(row)};
   if (find(row, "/judged_by"))
     facts.push_back("signs: judged by the " + text_at(row, "/judged_by/signs") + " of " +
                     text_at(row, "/judged_by/solid"));
@@ -138,6 +165,11 @@ std::vector<std::string> stage_sentences(const RowGroup& group) {
     sentences.push_back("time of " + text_at(row, "/variant/label") + cell_text_of(row) + ": " + text);
   }
   return sentences;
+}
+
+/// The header above the labels.
+std::string first_column(const Json& row) {
+  return find(row, "/table/first_column") ? text_at(row, "/table/first_column") : "variant";
 }
 
 std::vector<std::string> joined_list(const Json& row, const std::string& pointer) {
@@ -194,26 +226,26 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
 }
 
 void write_markdown(const RowGroup& group, std::ostream& out) {
-  if (group.rows.empty()) return;
+  if (!is_printed(group.rows)) return;
   out << "### " << for_markdown(group_title(group.rows.front())) << "\n\n";
   for (const std::string& fact : group_facts(group.rows.front())) out << "- " << fact << "\n";
   if (group.earlier_runs > 0)
     out << "- earlier runs of these cells in the same folder, not shown: " << group.earlier_runs << "\n";
 
-  const std::vector<const Column*> shown = shown_columns(group.rows);
-  std::vector<std::vector<std::string>> lines{{"variant"}};
-  for (const Column* column : shown) lines[0].push_back(column->header);
+  const std::vector<Column> shown = shown_columns(group.rows);
+  std::vector<std::vector<std::string>> lines{{first_column(group.rows.front())}};
+  for (const Column& column : shown) lines[0].push_back(column.header);
   for (const Json& row : group.rows) {
     lines.push_back({for_markdown(text_at(row, "/variant/label"))});
-    for (const Column* column : shown) lines.back().push_back(for_markdown(cell_text(*column, row)));
+    for (const Column& column : shown) lines.back().push_back(for_markdown(cell_text(column, row)));
   }
   std::vector<std::size_t> widths(lines[0].size(), 3);
   for (const auto& line : lines)
     for (std::size_t c = 0; c < line.size(); ++c) widths[c] = std::max(widths[c], display_width(line[c]));
 
   const auto left_aligned = [&](std::size_t c) {
-    return c == 0 || shown[c - 1]->name == "promises" || shown[c - 1]->name == "options" ||
-           shown[c - 1]->name == "fingerprint";
+    return c == 0 || shown[c - 1].name == "promises" || shown[c - 1].name == "options" ||
+           shown[c - 1].name == "fingerprint";
   };
   for (std::size_t r = 0; r < lines.size(); ++r) {
     out << (r == 0 ? "\n|" : "|");
@@ -237,25 +269,27 @@ void write_markdown(const RowGroup& group, std::ostream& out) {
 }
 
 void write_legend(const std::vector<Json>& rows, std::ostream& out) {
+  if (!is_printed(rows)) return;
   out << "Columns:";
   const char* separator = " ";
-  for (const Column* column : shown_columns(rows)) {
-    out << separator << "*" << column->header << "* " << column->meaning;
+  for (const Column& column : shown_columns(rows)) {
+    out << separator << "*" << column.header << "* " << column.meaning;
     separator = "; ";
   }
   out << ".\n";
 }
 
 void write_latex(const RowGroup& group, std::ostream& out) {
-  if (group.rows.empty()) return;
-  const std::vector<const Column*> shown = shown_columns(group.rows);
+  if (!is_printed(group.rows)) return;
+  const std::vector<Column> shown = shown_columns(group.rows);
   out << "\\begin{table}\n\\centering\n\\begin{tabular}{l" << std::string(shown.size(), 'r')
-      << "}\n\\toprule\nvariant";
-  for (const Column* column : shown) out << " & " << for_latex(column->header);
+      << "}\n\\toprule\n"
+      << for_latex(first_column(group.rows.front()));
+  for (const Column& column : shown) out << " & " << for_latex(column.header);
   out << " \\\\\n\\midrule\n";
   for (const Json& row : group.rows) {
     out << for_latex(text_at(row, "/variant/label"));
-    for (const Column* column : shown) out << " & " << for_latex(cell_text(*column, row));
+    for (const Column& column : shown) out << " & " << for_latex(cell_text(column, row));
     out << " \\\\\n";
   }
   out << "\\bottomrule\n\\end{tabular}\n\\caption{" << for_latex(group_title(group.rows.front())) << ".";
@@ -287,12 +321,13 @@ void write_csv(const std::vector<Json>& rows, std::ostream& out) {
       {"label", "/variant/label"},
       {"failed", "/failed"}};
   for (const auto& [name, pointer] : keys) out << name << ',';
-  for (std::size_t c = 0; c < all_columns().size(); ++c) out << (c ? "," : "") << all_columns()[c].name;
+  const std::vector<Column> columns = csv_columns(rows);
+  for (std::size_t c = 0; c < columns.size(); ++c) out << (c ? "," : "") << columns[c].name;
   out << '\n';
   for (const Json& row : rows) {
     for (const auto& [name, pointer] : keys) out << for_csv(text_at(row, pointer)) << ',';
-    for (std::size_t c = 0; c < all_columns().size(); ++c) {
-      const Json value = value_of(all_columns()[c], row);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const Json value = value_of(columns[c], row);
       out << (c ? "," : "")
           << for_csv(value.is_null()     ? ""
                      : value.is_string() ? value.get<std::string>()

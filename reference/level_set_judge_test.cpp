@@ -78,6 +78,31 @@ TEST(WindingOracle, InsideOutIsTurnedRound) {
   EXPECT_NEAR(WindingOracle(surface)(Vector3d::Zero()), 1.0, 1e-12);
 }
 
+TEST(WindingOracle, InsideOutIsTurnedRoundDespiteAHole) {
+  // Five faces of a cube of edge 2, wound inwards. The cone from a point has a volume of −8 and a third of
+  // the missing face times the point's height above it: at most −8 + 4 · 2 / 3.
+  PolygonMesh open = box({-1, -1, -1}, {1, 1, 1});
+  open.quads.pop_back();
+  open = test::reversed(open);
+  const DistanceOracle surface(triangles_in_voxels(open, 1.0));
+  EXPECT_NEAR(winding_number(surface.triangles(), Vector3d::Zero()), -5.0 / 6.0, 1e-12);
+  EXPECT_NEAR(WindingOracle(surface)(Vector3d::Zero()), 5.0 / 6.0, 1e-12);
+}
+
+TEST(WindingOracle, ASheetKeepsItsWinding) {
+  // A square in the plane y = z: the cone to it from a point of its box has the volume (y − z) / 3, which is
+  // ⅓ in one corner and −⅓ in the opposite one.
+  PolygonMesh sheet;
+  sheet.points = {{0, 0, 0}, {1, 0, 0}, {1, 1, 1}, {0, 1, 1}};
+  sheet.quads = {{0, 1, 2, 3}};
+  for (const PolygonMesh& mesh : {sheet, test::reversed(sheet)}) {
+    const DistanceOracle surface(triangles_in_voxels(mesh, 0.1));
+    const Vector3d below(5, 6, 4), above(5, 4, 6);
+    for (const Vector3d& p : {below, above})
+      EXPECT_NEAR(WindingOracle(surface)(p), winding_number(surface.triangles(), p), 1e-12);
+  }
+}
+
 TEST(WindingOracle, KnowsTheBoundaryFromASheetInside) {
   const DistanceOracle surface(triangles_in_voxels(
       test::joined(box({-1, -1, -1}, {1, 1, 1}), box({0, -0.5, -0.5}, {2, 0.5, 0.5})), 0.1));

@@ -107,9 +107,7 @@ PolygonMesh decimate(const PolygonMesh& mesh, std::size_t budget, double normal_
 }
 
 PolygonMesh marching_cubes_decimated(const ExtractionInput& input) {
-  const Options no_options;
-  const PolygonMesh fine =
-      marching_cubes({input.level_set, input.isovalue, input.source, no_options, input.context});
+  const PolygonMesh fine = marching_cubes(input.level_set, input.isovalue, nullptr, input.context);
   const double absolute = input.options.number("triangles");
   const double budget =
       absolute > 0.0 ? absolute : input.options.number("fraction") * double(fine.triangle_count());

@@ -66,6 +66,20 @@ std::vector<DirectedEdge> boundary_of(const std::vector<Corners>& triangles) {
   return boundary;
 }
 
+/// Whether the volume of the cone from a point to the triangles is negative from every point of the box: it
+/// is linear in the point, so that the corners tell.
+bool is_inside_out(const std::vector<Corners>& triangles, const Vector3d& lower, const Vector3d& upper) {
+  bool negative = true;
+  for (int i = 0; i < 8; ++i) {
+    const Vector3d apex(i & 1 ? upper.x() : lower.x(), i & 2 ? upper.y() : lower.y(),
+                        i & 4 ? upper.z() : lower.z());
+    double volume = 0.0;
+    for (const auto& [a, b, c] : triangles) volume += (a - apex).dot((b - apex).cross(c - apex));
+    negative = negative && volume < 0.0;
+  }
+  return negative;
+}
+
 }  // namespace
 
 double winding_number(const std::vector<Corners>& triangles, const Vector3d& point) {
@@ -85,9 +99,7 @@ WindingOracle::WindingOracle(const DistanceOracle& surface) : surface_(surface) 
   const Vector3d apex = 0.5 * (lower + upper) + 0.1 * (upper - lower).norm() * DistanceOracle::direction(4);
   for (const DirectedEdge& edge : boundary_of(surface.triangles()))
     cone_.push_back({{apex, edge.low, edge.high}, edge.direction});
-  double volume = 0.0;  // of the closed surface: relative to the apex the cone has none
-  for (const auto& [a, b, c] : surface.triangles()) volume += (a - apex).dot((b - apex).cross(c - apex));
-  orientation_ = volume < 0.0 ? -1.0 : 1.0;
+  orientation_ = is_inside_out(surface.triangles(), lower, upper) ? -1.0 : 1.0;
 }
 
 /// Two rays that agree are enough; else the most frequent answer of nine.

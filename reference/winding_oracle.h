@@ -22,8 +22,9 @@ class WindingOracle {
   /// Keeps a reference to the surface.
   explicit WindingOracle(const DistanceOracle& surface);
 
-  /// The soup's winding number, its sign turned where the soup as a whole is inside out (has a negative
-  /// volume).
+  /// The soup's winding number, its sign turned where the soup as a whole is inside out: has a negative
+  /// volume, and that about every point of its box. The volume of an open soup depends on the point, and
+  /// where even its sign does, as it does for a sheet, the winding that was given stands.
   double operator()(const Eigen::Vector3d& point) const;
   bool inside(const Eigen::Vector3d& point) const { return (*this)(point) > 0.5; }
 

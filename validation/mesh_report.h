@@ -46,6 +46,12 @@ struct Distances {
   std::int64_t samples = 0;
 };
 
+/// Between the normals of two surfaces, in degrees, over samples of the first.
+struct NormalAngles {
+  double mean = 0.0, rms = 0.0, max = 0.0;
+  std::int64_t samples = 0;
+};
+
 /// Certified: lower ≤ true one-sided Hausdorff distance ≤ upper, world units.
 struct HausdorffBound {
   double lower = 0.0, upper = 0.0;
@@ -74,6 +80,7 @@ struct MeshReport {
   std::vector<LibraryCounts> libraries;
   std::optional<SelfIntersections> self_intersections;  ///< absent when not asked for
   std::optional<Distances> to_reference, from_reference;
+  std::optional<NormalAngles> normals_to_reference;
   std::optional<HausdorffBound> certified_to_reference, certified_from_reference;
   std::optional<FeatureDistances> features;
 

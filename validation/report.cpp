@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include "validation/normal_error.h"
 #include "validation/distance.h"
 #include "validation/features.h"
 #include "validation/hausdorff.h"
@@ -50,6 +51,7 @@ void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const
     const Stage stage(context, "distances");
     report.to_reference = sampled_distances(soup, reference_tree, options.samples, context);
     report.from_reference = sampled_distances(reference, tree, options.samples, context);
+    report.normals_to_reference = sampled_normal_angles(soup, reference_tree, options.samples, context);
   }
   if (!options.certify) return;
   const Stage stage(context, "certified distances");

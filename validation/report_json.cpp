@@ -105,6 +105,11 @@ nlohmann::json to_json(const MeshReport& r) {
   json["watertight"] = r.self_intersections ? Json(r.watertight()) : Json(nullptr);
   if (r.to_reference) json["to_reference"] = distances(*r.to_reference);
   if (r.from_reference) json["from_reference"] = distances(*r.from_reference);
+  if (r.normals_to_reference)
+    json["normals_to_reference"] = {{"mean", number(r.normals_to_reference->mean)},
+                                    {"rms", number(r.normals_to_reference->rms)},
+                                    {"max", number(r.normals_to_reference->max)},
+                                    {"samples", r.normals_to_reference->samples}};
   if (r.certified_to_reference) json["certified_to_reference"] = bound(*r.certified_to_reference);
   if (r.certified_from_reference) json["certified_from_reference"] = bound(*r.certified_from_reference);
   if (r.features) json["features"] = features(*r.features);

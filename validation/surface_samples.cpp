@@ -26,10 +26,14 @@ SurfaceSamples::SurfaceSamples(const TriangleSoup& soup, std::int64_t count) : s
   if (!(total > 0.0)) count_ = 0;
 }
 
-Eigen::Vector3d SurfaceSamples::operator[](std::int64_t i) const {
+std::size_t SurfaceSamples::triangle(std::int64_t i) const {
   const double area = area_up_to_.back() * ((double(i) + 0.5) / double(count_));
   const auto found = std::upper_bound(area_up_to_.begin(), area_up_to_.end() - 1, area);
-  const Corners c = soup_.corners(std::size_t(found - area_up_to_.begin()));
+  return std::size_t(found - area_up_to_.begin());
+}
+
+Eigen::Vector3d SurfaceSamples::operator[](std::int64_t i) const {
+  const Corners c = soup_.corners(triangle(i));
   double u = fraction(double(i) * kFirstStep), v = fraction(double(i) * kSecondStep);
   // The half of the square that is not the triangle folds onto it.
   if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;

@@ -20,6 +20,7 @@ class SurfaceSamples {
   /// 0 if the surface has no area.
   std::int64_t size() const { return count_; }
   Eigen::Vector3d operator[](std::int64_t i) const;
+  std::size_t triangle(std::int64_t i) const;  ///< that sample i lies on
 
  private:
   const TriangleSoup& soup_;

@@ -46,6 +46,13 @@ class BlockSet {
     return last_ << 9 | place;
   }
 
+  /// The block that insert() gave `code` for.
+  BlockAt block(std::uint32_t code) const {
+    const BlockAt& tile = numbers_.tiles()[code >> 9];
+    return {tile[0] * 8 + std::int32_t(code >> 6 & 7), tile[1] * 8 + std::int32_t(code >> 3 & 7),
+            tile[2] * 8 + std::int32_t(code & 7)};
+  }
+
  private:
   friend class BlockTable;
   void select(const BlockAt& tile);

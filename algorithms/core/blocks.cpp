@@ -11,6 +11,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "algorithms/core/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/polygon_mesh.h"
 
@@ -30,8 +31,54 @@ Coord neighbour_of(const Coord& lower, int dx, int dy, int dz) {
   return lower.offsetBy(8 * dx, 8 * dy, 8 * dz);
 }
 
-/// The placement of a grid: its affine map, with the origin of single precision chosen near its active
-/// voxels.
+/// Finds the blocks that must be there although the tree has no leaf for them.
+class MissingBlocks {
+ public:
+  MissingBlocks(const Tree& tree, const std::function<bool(double)>& is_inside)
+      : tree_(tree), is_inside_(is_inside) {}
+
+  /// A leaf's six neighbours: one that is a tile of another sign than the samples next to it must become a
+  /// block.
+  void beside_leaf(Accessor& access, const Block& block, std::vector<Coord>& found) const {
+    constexpr std::uint64_t kRow = 0xff, kFirstZ = 0x0101010101010101u;
+    const Coord lower(block.lower[0], block.lower[1], block.lower[2]);
+    std::uint64_t any_inside = 0, all_inside = ~0ull;
+    for (const std::uint64_t word : block.inside) any_inside |= word, all_inside &= word;
+    const auto check = [&](int dx, int dy, int dz, std::uint64_t some, std::uint64_t every,
+                           std::uint64_t face) {
+      const Coord there = neighbour_of(lower, dx, dy, dz);
+      if (access.probeConstLeaf(there)) return;
+      const bool inside = is_inside_(access.getValue(there));
+      if (inside ? (every & face) != face : (some & face) != 0) found.push_back(there);
+    };
+    check(-1, 0, 0, block.inside[0], block.inside[0], ~0ull);
+    check(+1, 0, 0, block.inside[7], block.inside[7], ~0ull);
+    check(0, -1, 0, any_inside, all_inside, kRow);
+    check(0, +1, 0, any_inside, all_inside, kRow << 56);
+    check(0, 0, -1, any_inside, all_inside, kFirstZ);
+    check(0, 0, +1, any_inside, all_inside, kFirstZ << 7);
+  }
+
+ private:
+  const Tree& tree_;
+  const std::function<bool(double)>& is_inside_;
+};
+
+/// Runs f(item, found) over 0…n−1 in parallel and joins the lists in order.
+template <class F>
+std::vector<Coord> collect(std::size_t n, F&& f) {
+  std::vector<std::vector<Coord>> lists(n);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i, lists[i]);
+                    });
+  std::vector<Coord> all;
+  for (const auto& list : lists) all.insert(all.end(), list.begin(), list.end());
+  return all;
+}
+
+}  // namespace
+
 IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   if (!grid.transform().isLinear())
     throw Error(
@@ -66,94 +113,10 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   return result;
 }
 
-/// Finds the blocks that must be there although the tree has no leaf for them.
-class MissingBlocks {
- public:
-  MissingBlocks(const Tree& tree, const std::function<bool(double)>& is_inside)
-      : tree_(tree), is_inside_(is_inside) {}
-
-  /// A leaf's six neighbours: one that is a tile of another sign than the samples next to it must become a
-  /// block.
-  void beside_leaf(Accessor& access, const Block& block, std::vector<Coord>& found) const {
-    constexpr std::uint64_t kRow = 0xff, kFirstZ = 0x0101010101010101u;
-    const Coord lower(block.lower[0], block.lower[1], block.lower[2]);
-    std::uint64_t any_inside = 0, all_inside = ~0ull;
-    for (const std::uint64_t word : block.inside) any_inside |= word, all_inside &= word;
-    const auto check = [&](int dx, int dy, int dz, std::uint64_t some, std::uint64_t every,
-                           std::uint64_t face) {
-      const Coord there = neighbour_of(lower, dx, dy, dz);
-      if (access.probeConstLeaf(there)) return;
-      const bool inside = is_inside_(access.getValue(there));
-      if (inside ? (every & face) != face : (some & face) != 0) found.push_back(there);
-    };
-    check(-1, 0, 0, block.inside[0], block.inside[0], ~0ull);
-    check(+1, 0, 0, block.inside[7], block.inside[7], ~0ull);
-    check(0, -1, 0, any_inside, all_inside, kRow);
-    check(0, +1, 0, any_inside, all_inside, kRow << 56);
-    check(0, 0, -1, any_inside, all_inside, kFirstZ);
-    check(0, 0, +1, any_inside, all_inside, kFirstZ << 7);
-  }
-
-  /// A tile of the sign that the background has not: wherever one of the other sign touches it, both must become blocks.
-  void beside_tile(Accessor& access, const openvdb::CoordBBox& tile, std::vector<Coord>& found) const {
-    const Coord size = tile.dim();
-    const bool inside = !is_inside_(tree_.background());
-    for (int axis = 0; axis < 3; ++axis) {
-      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-      for (const int side : {-1, 1})
-        for (int a = 0; a < size[u]; a += 8)
-          for (int b = 0; b < size[v]; b += 8) {
-            Coord own = tile.min();
-            own[u] += a, own[v] += b;
-            if (side > 0) own[axis] += size[axis] - 8;
-            Coord there = own;
-            there[axis] += 8 * side;
-            if (access.probeConstLeaf(there) || is_inside_(access.getValue(there)) == inside) continue;
-            found.push_back(own);
-            found.push_back(there);
-          }
-    }
-  }
-
- private:
-  const Tree& tree_;
-  const std::function<bool(double)>& is_inside_;
-};
-
-/// Runs f(item, found) over 0…n−1 in parallel and joins the lists in order.
-template <class F>
-std::vector<Coord> collect(std::size_t n, F&& f) {
-  std::vector<std::vector<Coord>> lists(n);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i, lists[i]);
-                    });
-  std::vector<Coord> all;
-  for (const auto& list : lists) all.insert(all.end(), list.begin(), list.end());
-  return all;
-}
-
-/// Tiles of the tree whose sign is not the background's, whatever their level. Where two tiles differ in sign, one of
-/// them is such; the others may fill space without end.
-std::vector<openvdb::CoordBBox> tiles_unlike_background(const Tree& tree, const std::function<bool(double)>& is_inside) {
-  const bool background = is_inside(tree.background());
-  std::vector<openvdb::CoordBBox> tiles;
-  Tree::ValueAllCIter it = tree.cbeginValueAll();
-  it.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; it; ++it)
-    if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
-  return tiles;
-}
-
-}  // namespace
-
 BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& context)
     : level_set_(level_set), isovalue_(isovalue) {
-  if (!std::isfinite(isovalue)) throw Error("the isovalue must be a finite number");
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
-  const bool background_is_below =
-      grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
-  scale_ = background_is_below ? -1.0 : 1.0;
+  scale_ = double(inside_rule(grid, isovalue).scale);
   placement_ = placement_of(grid);
   read_leaves(level_set, context);
 
@@ -161,20 +124,13 @@ BlockGrid::BlockGrid(const LevelSet& level_set, double isovalue, RunContext& con
   const std::function<bool(double)> is_inside = [this](double value) {
     return scale_ * (value - isovalue_) < 0;
   };
-  if (!std::isfinite(grid.background())) throw Error("the volume's background value is not finite");
   const MissingBlocks missing(tree, is_inside);
   const std::size_t leaves = blocks_.size();
   std::vector<Coord> added = collect(leaves, [&](std::size_t i, std::vector<Coord>& found) {
     Accessor access(tree);
     missing.beside_leaf(access, blocks_[i], found);
   });
-  const std::vector<openvdb::CoordBBox> tiles = tiles_unlike_background(tree, is_inside);
-  const std::vector<Coord> beside_tiles =
-      collect(tiles.size(), [&](std::size_t i, std::vector<Coord>& found) {
-        if (i % 64 == 0) context.check();
-        Accessor access(tree);
-        missing.beside_tile(access, tiles[i], found);
-      });
+  const std::vector<Coord> beside_tiles = tiles_between_signs(tree, inside_rule(grid, isovalue), context);
   added.insert(added.end(), beside_tiles.begin(), beside_tiles.end());
 
   BlockIndex index;

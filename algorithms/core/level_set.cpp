@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/hermite_grid.h"
+#include "algorithms/hermite/dense_hermite.h"
 
 namespace hermesh {
 
@@ -25,7 +25,7 @@ void initialize_openvdb() {
   static std::once_flag once;
   std::call_once(once, [] {
     openvdb::initialize();
-    register_hermite_grid();
+    register_hermite_grids();
   });
 }
 

@@ -29,12 +29,15 @@ class RunContext {
   void progress(std::string_view stage, double fraction) const {
     if (on_progress) on_progress(stage, fraction);
   }
+  /// A figure of the work that tables show, such as the bytes of what lies between two stages.
+  void figure(std::string name, double value) { figures.emplace_back(std::move(name), value); }
   /// A sentence that the user should read although the work goes on, such as points that a file format
   /// rounds.
   void note(std::string sentence) { notes.push_back(std::move(sentence)); }
 
   std::vector<std::pair<std::string, double>> stage_seconds;  ///< in order of completion
   std::vector<std::string> notes;
+  std::vector<std::pair<std::string, double>> figures;
 };
 
 /// Times a stage from construction to destruction, and announces it.

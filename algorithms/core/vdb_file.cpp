@@ -1,83 +1,19 @@
 #include "algorithms/core/vdb_file.h"
 
-#include <openvdb/io/Archive.h>
-#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <sstream>
 
-#include "algorithms/core/atomic_file.h"
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/vdb_archive.h"
 
 namespace hermesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Runs f and turns what OpenVDB throws into one sentence about the file.
-template <class F>
-auto about_file(const fs::path& path, F&& f) {
-  try {
-    return f();
-  } catch (const openvdb::LookupError& e) {
-    throw Error(path.string() + " holds a grid of a type that this program does not know (" + e.what() + ")");
-  } catch (const openvdb::Exception& e) {
-    throw Error(path.string() + " cannot be read as a .vdb file (" + e.what() + "); is it complete?");
-  } catch (const std::bad_alloc&) {
-    throw Error(path.string() + " asks for more memory than there is; is it complete?");
-  } catch (const std::length_error&) {
-    throw Error(path.string() + " asks for more memory than there is; is it complete?");
-  }
-}
-
-/// OpenVDB reports a missing file and one of another kind in the same words; these are ours.
-void check_is_vdb(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) throw Error(path.string() + " does not exist");
-  if (fs::is_directory(path, ignored)) throw Error(path.string() + " is a folder, not a .vdb file");
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error(path.string() + " cannot be opened for reading");
-  constexpr std::int64_t kMagic = 0x56444220;
-  std::int64_t magic = 0;
-  if (!in.read(reinterpret_cast<char*>(&magic), sizeof magic))
-    throw Error(path.string() + (fs::file_size(path, ignored) == 0
-                                     ? " is empty"
-                                     : " is truncated: it is too short for a .vdb file"));
-  if (magic != kMagic) throw Error(path.string() + " is not a .vdb file");
-}
-
-/// Reads what stands before the grids, which names where each of them ends. OpenVDB itself takes the bytes that are
-/// missing at the end of a truncated file for zeros.
-class GridEnds : public openvdb::io::Archive {
- public:
-  void check(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    readHeader(in);
-    openvdb::io::setVersion(in, libraryVersion(), fileVersion());  // the descriptors are read by it
-    openvdb::MetaMap metadata;
-    metadata.readMeta(in);
-    if (!inputHasGridOffsets()) return;
-    std::int64_t end = 0;
-    for (std::int32_t left = readGridCount(in); left > 0 && in; --left) {
-      openvdb::io::GridDescriptor descriptor;
-      descriptor.read(in);
-      end = std::max(end, descriptor.getEndPos());
-      descriptor.seekToEnd(in);
-    }
-    if (!in || end > static_cast<std::int64_t>(fs::file_size(path)))
-      throw Error(path.string() + " is truncated: its last grid ends beyond the end of the file");
-  }
-};
-
-std::string names_of(const openvdb::io::File& file) {
-  std::string names;
-  for (auto it = file.beginName(); it != file.endName(); ++it) names += (names.empty() ? "" : ", ") + *it;
-  return names;
-}
 
 openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const std::string& what) {
   if (auto same = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return same;
@@ -103,13 +39,10 @@ void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {
 
 LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunContext& context) {
   Stage stage(context, "read volume");
-  initialize_openvdb();
-  check_is_vdb(path);
-  return about_file(path, [&] {
-    GridEnds().check(path);
+  return about_vdb_file(path, [&] {
     openvdb::io::File file(path.string());
-    file.open(/*delayLoad=*/false);
-    const std::string names = names_of(file);
+    open_vdb(file, path);
+    const std::string names = grid_names(file);
     std::string name = grid_name;
     if (name.empty() && file.hasGrid("sdf")) name = "sdf";
     if (name.empty()) {
@@ -131,27 +64,16 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
 void write_level_set(const fs::path& path, const LevelSet& level_set, RunContext& context) {
   Stage stage(context, "write volume");
   initialize_openvdb();
-  AtomicFile file(path);
   // A shallow copy, so that naming it does not change the grid that others hold.
   openvdb::FloatGrid::Ptr grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(level_set.grid().grid)->copy();
   grid->setName("sdf");
-  try {
-    openvdb::io::File out(file.path().string());
-    out.write(openvdb::GridCPtrVec{grid});
-    out.close();
-  } catch (const openvdb::Exception& e) {
-    throw Error(path.string() + " cannot be written (" + e.what() + ")");
-  }
-  file.commit();
+  write_grids(path, {grid});
 }
 
 std::vector<GridSummary> describe_vdb(const fs::path& path) {
-  initialize_openvdb();
-  check_is_vdb(path);
-  return about_file(path, [&] {
-    GridEnds().check(path);
+  return about_vdb_file(path, [&] {
     openvdb::io::File file(path.string());
-    file.open(/*delayLoad=*/false);
+    open_vdb(file, path);
     std::vector<GridSummary> summaries;
     for (auto it = file.beginName(); it != file.endName(); ++it) {
       GridSummary& summary = summaries.emplace_back();

@@ -112,16 +112,5 @@ TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
   EXPECT_NE(error_of(folder_ / "nan.vdb").find("not finite at index [4, 5, 6]"), std::string::npos);
 }
 
-TEST_F(VdbFile, HermiteGridsAreDescribed) {
-  const LevelSet volume = ramp();
-  const HermiteGrid hermite = sample_level_set(BlockGrid(volume, 0.0, context_), context_);
-  hermite.write(folder_ / "h.vdb", context_);
-  const std::vector<GridSummary> grids = describe_vdb(folder_ / "h.vdb");
-  ASSERT_EQ(grids.size(), 1u);
-  EXPECT_EQ(grids[0].name, "hermite");
-  EXPECT_NE(grids[0].value_type.find("hermite_float"), std::string::npos);
-  EXPECT_GT(grids[0].active_voxels, 0u);
-}
-
 }  // namespace
 }  // namespace hermesh

@@ -1,82 +1,344 @@
-#include <algorithm>
-#include <cmath>
-#include <limits>
+#include <tbb/parallel_sort.h>
 
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <tuple>
+
+#include "algorithms/core/leaf_table.h"
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/hermite/edge_kernels/edge_kernels.h"
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
 namespace {
 
-/// The block's samples with one layer of its neighbours' around it; NaN where there is no active sample.
-class Apron {
- public:
-  Apron(const BlockGrid& grid, std::int32_t block) {
-    for (int x = -1; x < 10; ++x)
-      for (int y = -1; y < 10; ++y)
-        for (int z = -1; z < 10; ++z) {
-          const auto at = grid.locate(block, x, y, z);
-          const bool there = at.block >= 0 && test(grid.blocks()[at.block].active, at.sample);
-          values_[index(x, y, z)] = there ? grid.signed_value(grid.blocks()[at.block], at.sample)
-                                          : std::numeric_limits<double>::quiet_NaN();
-        }
+constexpr float kNoData = std::numeric_limits<float>::infinity();
+
+/// Rows along z of a leaf and its surroundings that a stencil reads: bit y+1 of word x+1.
+struct RowMask {
+  std::array<std::uint16_t, 11> y{};
+
+  void add(int x, std::uint32_t rows) { y[x + 1] = static_cast<std::uint16_t>(y[x + 1] | rows); }
+  bool has(int x, int row) const { return (y[x + 1] >> (row + 1)) & 1; }
+};
+
+/// Which rows the stencils of a leaf's crossing edges read, and in which of them the samples before the leaf's first and
+/// behind its last.
+struct RowsNeeded {
+  RowMask any, below, above;
+
+  explicit RowsNeeded(const std::array<BlockMask, 3>& edges) {
+    constexpr std::uint64_t kFirstZ = 0x0101010101010101u;
+    for (int x = 0; x < 8; ++x) {
+      for (int axis = 0; axis < 3; ++axis)
+        if (edges[axis][x] != 0) add_edges(any, x, rows_with(edges[axis][x], ~std::uint64_t{0}), axis);
+      const std::uint64_t across = edges[0][x] | edges[1][x] | edges[2][x];
+      // A difference along z is taken at both ends of an edge.
+      const std::uint32_t first = rows_with(across, kFirstZ), last = rows_with(across, kFirstZ << 7);
+      for (RowMask* side : {&below, &above}) {
+        const std::uint64_t bits = side == &below ? kFirstZ : kFirstZ << 7;
+        side->add(x, (side == &below ? first : last) << 1);
+        side->add(x + 1, rows_with(edges[0][x], bits) << 1);
+        side->add(x, rows_with(edges[1][x], bits) << 2);
+      }
+      // The upper end of an edge along z lies above; the differences across it are taken there, too.
+      add_edges(above, x, rows_with(edges[2][x], kFirstZ << 7), 2);
+      above.add(x, rows_with(edges[2][x], kFirstZ << 6) << 1);
+    }
   }
 
-  /// Derivative along each axis at a sample of the block or one step beyond it; 0 along an axis without data.
-  Eigen::Vector3d gradient(int x, int y, int z) const {
-    constexpr int kStride[3] = {121, 11, 1};
-    const int here = index(x, y, z);
-    Eigen::Vector3d result;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double below = values_[here - kStride[axis]], at = values_[here],
-                   above = values_[here + kStride[axis]];
-      const double central = 0.5 * (above - below), forward = above - at, backward = at - below;
-      result[axis] = !std::isnan(central)    ? central
-                     : !std::isnan(forward)  ? forward
-                     : !std::isnan(backward) ? backward
-                                             : 0.0;
+ private:
+  /// Bit y is set if the row has one of `bits`.
+  static std::uint32_t rows_with(std::uint64_t word, std::uint64_t bits) {
+    word &= bits;
+    word |= word >> 4;
+    word |= word >> 2;
+    word |= word >> 1;
+    return static_cast<std::uint32_t>(((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56);
+  }
+
+  /// Rows of the stencils of edges along `axis` that start in `rows` (bit y) of layer x.
+  static void add_edges(RowMask& mask, int x, std::uint32_t rows, int axis) {
+    const std::uint32_t own = rows << 1, around = rows | (rows << 1) | (rows << 2);
+    if (axis == 0) {
+      mask.add(x - 1, own);
+      mask.add(x, around);
+      mask.add(x + 1, around);
+      mask.add(x + 2, own);
+    } else if (axis == 1) {
+      mask.add(x - 1, own | (own << 1));
+      mask.add(x, around | (rows << 3));
+      mask.add(x + 1, own | (own << 1));
+    } else {
+      mask.add(x - 1, own);
+      mask.add(x, around);
+      mask.add(x + 1, own);
+    }
+  }
+};
+
+/// A leaf's samples and its neighbours' from one step below it to two beyond, at strides of kX, kY and 1, as far as its
+/// stencils read them. Samples that are no data are infinite or not less than the background in magnitude.
+class Apron {
+ public:
+  static constexpr int kX = 11 * 16, kY = 16;
+  static constexpr int kStride[3] = {kX, kY, 1};
+  static constexpr int index(int x, int y, int z) { return kX * (x + 1) + kY * (y + 1) + (z + 4); }
+
+  /// `masked`: samples that are not active are no data. It is not asked of level sets, where all but the band has the
+  /// background's magnitude.
+  Apron(const LeafTable& table, std::size_t leaf, const std::array<BlockMask, 3>& edges, bool masked)
+      : table_(table), leaf_(leaf), masked_(masked) {
+    const RowsNeeded needed(edges);
+    for (int x = -1; x < 10; ++x)
+      for (std::uint32_t rows = needed.any.y[x + 1]; rows != 0; rows &= rows - 1) {
+        const int y = std::countr_zero(rows) - 1;
+        gather_row(x, y, needed.below.has(x, y), needed.above.has(x, y));
+      }
+  }
+
+  const float* values() const { return values_; }
+
+ private:
+  struct Source {
+    const float* values = nullptr;  ///< of the leaf there; null for none
+    bool known = false;
+    BlockMask active;
+  };
+
+  const Source& source(int slot) {
+    Source& result = sources_[slot];
+    if (result.known) return result;
+    result.known = true;
+    const std::int32_t there = table_.neighbour(leaf_, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1);
+    if (there >= 0) {
+      result.values = table_.values(static_cast<std::size_t>(there));
+      if (masked_) result.active = table_.active(static_cast<std::size_t>(there));
     }
     return result;
   }
 
- private:
-  static int index(int x, int y, int z) { return 121 * (x + 1) + 11 * (y + 1) + (z + 1); }
-  std::array<double, 11 * 11 * 11> values_;
+  void gather_row(int x, int y, bool below, bool above) {
+    const int column = 9 * ((x >> 3) + 1) + 3 * ((y >> 3) + 1), row = 64 * (x & 7) + 8 * (y & 7);
+    float* at = values_ + index(x, y, 0);
+    const Source& own = source(column + 1);
+    if (own.values)
+      std::memcpy(at, own.values + row, 8 * sizeof(float));
+    else
+      std::fill(at, at + 8, kNoData);
+    if (below) {
+      const Source& before = source(column);
+      at[-1] = before.values ? before.values[row + 7] : kNoData;
+    }
+    if (above) {
+      const Source& after = source(column + 2);
+      at[8] = after.values ? after.values[row] : kNoData;
+      at[9] = after.values ? after.values[row + 1] : kNoData;
+    }
+    if (masked_) drop_inactive(column, row, at);
+  }
+
+  void drop_inactive(int column, int row, float* at) {
+    const auto inactive = [&](int slot, int z) {
+      return sources_[slot].values && !test(sources_[slot].active, row + z);
+    };
+    if (inactive(column, 7)) at[-1] = kNoData;
+    for (int z = 0; z < 8; ++z)
+      if (inactive(column + 1, z)) at[z] = kNoData;
+    for (int z = 0; z < 2; ++z)
+      if (inactive(column + 2, z)) at[8 + z] = kNoData;
+  }
+
+  const LeafTable& table_;
+  const std::size_t leaf_;
+  const bool masked_;
+  Source sources_[27];
+  alignas(64) float values_[11 * kX];
 };
 
-void sample_block(const BlockGrid& grid, std::int32_t source, const HermiteBlock& block) {
-  if (!any(block.crossing[0]) && !any(block.crossing[1]) && !any(block.crossing[2])) return;
-  const Apron apron(grid, source);
-  for (int axis = 0; axis < 3; ++axis)
-    for_each_bit(block.crossing[axis], [&](int sample) {
-      const int x = sample >> 6, y = (sample >> 3) & 7, z = sample & 7;
-      const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
-      const auto end = grid.locate(source, x + dx, y + dy, z + dz);
-      const double from = grid.signed_value(grid.blocks()[source], sample);
-      const double to = grid.signed_value(grid.blocks()[end.block], end.sample);
-      const double offset = from / (from - to);
+SignLeaf sign_leaf(const LeafTable& table, std::size_t leaf) {
+  SignLeaf result{};
+  result.inside = table.inside(leaf);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t there = table.neighbour(leaf, axis == 0, axis == 1, axis == 2);
+    result.beyond[axis] = there >= 0                ? first_layer(table.inside(static_cast<std::size_t>(there)), axis)
+                          : there == kUniformInside ? ~std::uint64_t{0}
+                                                    : 0;
+  }
+  return result;
+}
 
-      Eigen::Vector3d normal =
-          (1.0 - offset) * apron.gradient(x, y, z) + offset * apron.gradient(x + dx, y + dy, z + dz);
-      // Where two sheets are close the gradient may vanish or point back inside; the edge itself is then the
-      // best guess.
-      const double rise = to > from ? 1.0 : -1.0;
-      if (!(normal[axis] * rise > 0)) normal[axis] = std::abs(to - from) * rise;
-      normal.normalize();
-      HermiteVoxel& voxel = block.voxels[sample];
-      voxel.offset[axis] = static_cast<float>(offset);
-      for (int a = 0; a < 3; ++a) voxel.normal[axis][a] = static_cast<float>(normal[a]);
+/// What sampling needs to know of the whole volume.
+struct Volume {
+  const LeafTable& table;
+  bool masked;         ///< samples that are not active are no data
+  float data_below;    ///< samples of at least this magnitude are no data
+  edge_kernels::Sample* sample;
+};
+
+/// One edge whose stencil has samples that are no data: differences to one side, or none.
+class IncompleteStencil {
+ public:
+  IncompleteStencil(const Volume& volume, std::size_t leaf)
+      : volume_(volume), table_(volume.table), leaf_(leaf) {}
+
+  EdgeCrossing sample(int x, int y, int z, int axis) const {
+    const std::array<int, 3> from{x, y, z};
+    std::array<int, 3> to = from;
+    ++to[axis];
+    const InsideRule& rule = table_.rule();
+    const double a = rule.signed_value(at(from).value), b = rule.signed_value(at(to).value);
+    const double offset = a / (a - b);
+    Eigen::Vector3d normal = (1.0 - offset) * gradient(from) + offset * gradient(to);
+    const double rise = b - a;
+    if (!(normal[axis] * rise > 0)) normal[axis] = rise;
+    normal.normalize();
+    return {static_cast<float>(offset),
+            {static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])}};
+  }
+
+ private:
+  struct Sample {
+    float value;
+    bool is_data;
+  };
+  Sample at(const std::array<int, 3>& p) const {
+    const std::int32_t there = table_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
+    const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
+    if (there < 0) {
+      const openvdb::Coord place = table_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
+      return {table_.tree().getValue(place), table_.tree().isValueOn(place)};
+    }
+    const float value = table_.values(static_cast<std::size_t>(there))[sample];
+    const bool active = !volume_.masked || test(table_.active(static_cast<std::size_t>(there)), sample);
+    return {value, active && std::fabs(value) < volume_.data_below};
+  }
+
+  /// Derivative along each axis; 0 along an axis without data.
+  Eigen::Vector3d gradient(const std::array<int, 3>& p) const {
+    Eigen::Vector3d result = Eigen::Vector3d::Zero();
+    const Sample here = at(p);
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<int, 3> low = p, high = p;
+      --low[axis], ++high[axis];
+      const Sample below = at(low), above = at(high);
+      double difference = 0.0;
+      if (below.is_data && above.is_data)
+        difference = 0.5 * (double(above.value) - below.value);
+      else if (above.is_data && here.is_data)
+        difference = double(above.value) - here.value;
+      else if (below.is_data && here.is_data)
+        difference = double(here.value) - below.value;
+      result[axis] = table_.rule().scale * difference;
+    }
+    return result;
+  }
+
+  const Volume& volume_;
+  const LeafTable& table_;
+  const std::size_t leaf_;
+};
+
+/// Writes the crossings of one leaf, each as `make` turns it from an EdgeCrossing.
+template <class Crossing, class Make>
+void sample_leaf(const Volume& volume, std::size_t leaf, const std::array<BlockMask, 3>& edges, Crossing* out,
+                 Make&& make) {
+  const Apron apron(volume.table, leaf, edges, volume.masked);
+  const InsideRule& rule = volume.table.rule();
+  edge_kernels::Edges batch;
+  for (int axis = 0; axis < 3; ++axis) {
+    batch.count = 0;
+    for_each_bit(edges[axis], [&](int sample) {
+      batch.at[batch.count++] = Apron::index(sample >> 6, (sample >> 3) & 7, sample & 7);
     });
+    volume.sample(apron.values(), Apron::kStride[axis], Apron::kStride[(axis + 1) % 3],
+                  Apron::kStride[(axis + 2) % 3], rule.isovalue, rule.scale, batch);
+    for (int i = 0; i < batch.count; ++i) {
+      EdgeCrossing crossing{batch.offset[i], {}};
+      for (int a = 0; a < 3; ++a) crossing.normal[(axis + a) % 3] = batch.normal[a][i];
+      if (!(batch.largest[i] < volume.data_below)) {
+        const int place = batch.at[i];
+        crossing = IncompleteStencil(volume, leaf).sample(place / Apron::kX - 1, place / Apron::kY % 11 - 1,
+                                                          place % Apron::kY - 4, axis);
+      }
+      *out++ = make(crossing);
+    }
+  }
+}
+
+/// A leaf that owns crossings: its place in the result's order.
+struct LiveLeaf {
+  std::array<std::int32_t, 3> lower;
+  std::uint32_t leaf;
+  bool operator<(const LiveLeaf& other) const { return lower < other.lower; }
+};
+
+/// The next leaf's samples: they lie where no machine can guess, and waiting for them costs more than the arithmetic.
+void prefetch(const float* values) {
+  for (int i = 0; i < 512; i += 16) __builtin_prefetch(values + i);
+}
+
+template <class Crossing, class Make>
+SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue, RunContext& context, Make&& make) {
+  SparseHermite<Crossing> result;
+  result.placement = placement_of(*level_set.grid().grid);
+  const LeafTable table = [&] {
+    Stage stage(context, "read signs");
+    return LeafTable(level_set, isovalue, context);
+  }();
+  const openvdb::FloatGrid& grid = *level_set.grid().grid;
+  const bool is_level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+  const Volume volume{table, !is_level_set,
+                      is_level_set ? std::fabs(grid.background()) : std::numeric_limits<float>::max(),
+                      edge_kernels::chosen()};
+  Stage stage(context, "Hermite data from the level set");
+  result.outermost_inside = table.rule()(table.tree().background());
+
+  std::vector<std::uint16_t> counts(table.size());
+  parallel_blocks(table.size(), context, [&](std::size_t i) {
+    int crossings = 0;
+    for (const BlockMask& axis : crossing_edges(sign_leaf(table, i))) crossings += count(axis);
+    counts[i] = static_cast<std::uint16_t>(crossings);
+  });
+  std::vector<LiveLeaf> live;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (counts[i] == 0) continue;
+    const openvdb::Coord lower = table.lower(i);
+    live.push_back({{lower.x(), lower.y(), lower.z()}, static_cast<std::uint32_t>(i)});
+  }
+  tbb::parallel_sort(live.begin(), live.end());
+  std::vector<std::uint64_t> first(live.size());
+  for (std::size_t i = 0; i < live.size(); ++i) first[i] = counts[live[i].leaf];
+  result.crossings.resize(exclusive_scan(first, "edge crossings"));
+  result.leaves.resize(live.size());
+  parallel_blocks(live.size(), context, [&](std::size_t i) {
+    if (i + 1 < live.size()) prefetch(table.values(live[i + 1].leaf));
+    SignLeaf leaf = sign_leaf(table, live[i].leaf);
+    leaf.lower = live[i].lower;
+    leaf.first = static_cast<std::uint32_t>(first[i]);
+    sample_leaf(volume, live[i].leaf, crossing_edges(leaf), result.crossings.data() + first[i], make);
+    result.leaves[i] = leaf;
+  });
+  return result;
 }
 
 }  // namespace
 
-HermiteGrid sample_level_set(const BlockGrid& grid, RunContext& context) {
-  Stage stage(context, "Hermite data from the level set");
-  std::vector<std::int32_t> source;
-  HermiteGrid result(grid, source, context);
-  const std::vector<HermiteBlock>& blocks = result.blocks();
-  parallel_blocks(blocks.size(), context, [&](std::size_t i) { sample_block(grid, source[i], blocks[i]); });
+FloatHermite sample_level_set(const LevelSet& level_set, double isovalue, RunContext& context) {
+  return sample<EdgeCrossing>(level_set, isovalue, context, [](const EdgeCrossing& crossing) { return crossing; });
+}
+
+PackedHermite sample_level_set_packed(const LevelSet& level_set, double isovalue, NormalCodeId code,
+                                      RunContext& context) {
+  PackedHermite result = with_normal_code(code, [&](auto chosen) {
+    return sample<PackedCrossing>(level_set, isovalue, context,
+                                  [](const EdgeCrossing& crossing) { return pack<decltype(chosen)>(crossing); });
+  });
+  result.normal_code = code;
   return result;
 }
 

@@ -76,10 +76,10 @@ struct TriangleBins {
   std::vector<std::uint32_t> list;
 };
 
-TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const HermiteGrid& grid,
+TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const FloatHermite& hermite,
                            RunContext& context) {
-  const std::vector<HermiteBlock>& blocks = grid.blocks();
-  const auto& base = grid.placement().base;
+  const auto& blocks = hermite.leaves;
+  const auto& base = hermite.placement.base;
   std::unordered_map<Key, std::uint32_t, KeyHash> index;
   index.reserve(blocks.size());
   Key lowest{}, highest{};
@@ -132,11 +132,16 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const He
   return bins;
 }
 
-/// Chooses among the hits of one block's crossing edges.
-class BlockHits {
+/// Chooses among the hits of one leaf's crossing edges.
+class LeafHits {
  public:
-  BlockHits(const HermiteBlock& block, const std::array<std::int32_t, 3>& base) : block_(block) {
-    for (int a = 0; a < 3; ++a) lower_[a] = block.lower[a] - base[a];
+  /// `crossings` are the leaf's, by rank, as the level set has them.
+  LeafHits(const SignLeaf& leaf, std::span<EdgeCrossing> crossings, const std::array<std::int32_t, 3>& base)
+      : leaf_(leaf), edges_(crossing_edges(leaf)) {
+    for (int a = 0; a < 3; ++a) lower_[a] = leaf.lower[a] - base[a];
+    EdgeCrossing* next = crossings.data();
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(edges_[axis], [&](int sample) { crossing_[axis][sample] = next++; });
   }
 
   /// Intersects one triangle with the block's edges along one axis.
@@ -170,7 +175,7 @@ class BlockHits {
   void write(const std::vector<IndexTriangle>& triangles, std::span<const std::uint32_t> nearby,
              PolygonSampling& sampling) const {
     for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(block_.crossing[axis], [&](int sample) {
+      for_each_bit(edges_[axis], [&](int sample) {
         const Best& best = best_[axis][sample];
         if (best.hits == 0) {
           take_nearest(axis, sample, triangles, nearby) ? ++sampling.nearest : ++sampling.fallback;
@@ -178,10 +183,10 @@ class BlockHits {
         }
         ++sampling.exact;
         if (best.hits > 1) ++sampling.ambiguous;
-        HermiteVoxel& voxel = block_.voxels[sample];
+        EdgeCrossing& crossing = *crossing_[axis][sample];
         const double turn = best.consistent ? 1.0 : -1.0;
-        voxel.offset[axis] = static_cast<float>(best.offset);
-        for (int a = 0; a < 3; ++a) voxel.normal[axis][a] = static_cast<float>(turn * best.normal[a]);
+        crossing.offset = static_cast<float>(best.offset);
+        for (int a = 0; a < 3; ++a) crossing.normal[a] = static_cast<float>(turn * best.normal[a]);
       });
   }
 
@@ -197,12 +202,12 @@ class BlockHits {
   /// faces the way that the signs say, met as near to the edge as the edge's ends allow.
   bool take_nearest(int axis, int sample, const std::vector<IndexTriangle>& triangles,
                     std::span<const std::uint32_t> nearby) const {
-    HermiteVoxel& voxel = block_.voxels[sample];
+    EdgeCrossing& found = *crossing_[axis][sample];
     const Eigen::Vector3d start(lower_[0] + (sample >> 6), lower_[1] + ((sample >> 3) & 7),
                                 lower_[2] + (sample & 7));
     Eigen::Vector3d crossing = start;
-    crossing[axis] += voxel.offset[axis];
-    const double outwards = voxel.inside ? 1.0 : -1.0;
+    crossing[axis] += found.offset;
+    const double outwards = test(leaf_.inside, sample) ? 1.0 : -1.0;
     const IndexTriangle* nearest = nullptr;
     double least = kNearby * kNearby;
     for (const std::uint32_t t : nearby) {
@@ -212,8 +217,8 @@ class BlockHits {
     }
     if (!nearest) return false;
     const double met = nearest->normal.dot(nearest->corner[0] - start) / nearest->normal[axis];
-    voxel.offset[axis] = static_cast<float>(std::clamp(met, 0.0, 1.0));
-    for (int a = 0; a < 3; ++a) voxel.normal[axis][a] = static_cast<float>(nearest->normal[a]);
+    found.offset = static_cast<float>(std::clamp(met, 0.0, 1.0));
+    for (int a = 0; a < 3; ++a) found.normal[a] = static_cast<float>(nearest->normal[a]);
     return true;
   }
 
@@ -226,11 +231,10 @@ class BlockHits {
       int local[3];
       local[axis] = k, local[u] = pu, local[v] = pv;
       const int sample = sample_index(local[0], local[1], local[2]);
-      if (!test(block_.crossing[axis], sample)) continue;
-      const HermiteVoxel& voxel = block_.voxels[sample];
+      if (!test(edges_[axis], sample)) continue;
       Best& best = best_[axis][sample];
-      const bool consistent = (normal[axis] > 0) == voxel.inside;
-      const double away = std::abs(offset - voxel.offset[axis]);
+      const bool consistent = (normal[axis] > 0) == test(leaf_.inside, sample);
+      const double away = std::abs(offset - crossing_[axis][sample]->offset);
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
       const bool better = consistent != best.consistent ? consistent : away < best.away;
@@ -238,23 +242,26 @@ class BlockHits {
     }
   }
 
-  const HermiteBlock& block_;
+  const SignLeaf& leaf_;
+  const std::array<BlockMask, 3> edges_;
   std::array<double, 3> lower_{};
+  std::array<std::array<EdgeCrossing*, 512>, 3> crossing_;  ///< of crossing edges
   std::array<std::array<Best, 512>, 3> best_{};
 };
 
 }  // namespace
 
-HermiteGrid sample_polygons(const BlockGrid& grid, const PolygonMesh& mesh, RunContext& context,
-                            PolygonSampling* sampling) {
-  HermiteGrid result = sample_level_set(grid, context);
+FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const PolygonMesh& mesh,
+                             RunContext& context, PolygonSampling* sampling) {
+  FloatHermite result = sample_level_set(level_set, isovalue, context);
   Stage stage(context, "Hermite data from the polygons");
-  const std::vector<IndexTriangle> triangles = to_index_space(mesh, result.placement());
+  const std::vector<IndexTriangle> triangles = to_index_space(mesh, result.placement);
   const TriangleBins bins = bin_triangles(triangles, result, context);
-  const std::vector<HermiteBlock>& blocks = result.blocks();
-  std::vector<PolygonSampling> counts(blocks.size());
-  parallel_blocks(blocks.size(), context, [&](std::size_t b) {
-    const auto hits = std::make_unique<BlockHits>(blocks[b], result.placement().base);
+  std::vector<PolygonSampling> counts(result.leaves.size());
+  parallel_blocks(result.leaves.size(), context, [&](std::size_t b) {
+    const std::size_t size = result.crossings_of(b).size();
+    const auto hits = std::make_unique<LeafHits>(
+        result.leaves[b], std::span(result.crossings).subspan(result.leaves[b].first, size), result.placement.base);
     const std::span<const std::uint32_t> nearby(bins.list.data() + bins.first[b],
                                                 bins.first[b + 1] - bins.first[b]);
     for (const std::uint32_t t : nearby)

@@ -1,16 +1,26 @@
 // Samplers: where Hermite data comes from (Aldén 2011, §2.8 and §5.2).
 #pragma once
 
-#include "algorithms/core/blocks.h"
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include "algorithms/core/level_set.h"
 #include "algorithms/core/polygon_mesh.h"
-#include "algorithms/hermite/hermite_grid.h"
+#include "algorithms/hermite/sparse_hermite.h"
 
 namespace hermesh {
 
-/// From samples of a scalar field: crossings by linear interpolation along the edge, normals from the
-/// interpolated gradient (central differences of active samples, one-sided at the end of the data; the
-/// background is never read unless an end of the edge itself lies in it).
-HermiteGrid sample_level_set(const BlockGrid& grid, RunContext& context);
+/// From samples of a scalar field: crossings by linear interpolation along the edge, normals from the interpolated
+/// gradient (central differences of active samples, one-sided at the end of the data; the background is never read
+/// unless an end of the edge itself lies in it). In a level set samples less than the isovalue are inside; in any other
+/// volume those on the other side of it than the background. @throws Error for an isovalue or sample that is not
+/// finite, and for a grid with perspective.
+FloatHermite sample_level_set(const LevelSet& level_set, double isovalue, RunContext& context);
+
+/// The same, packed as it is computed.
+PackedHermite sample_level_set_packed(const LevelSet& level_set, double isovalue, NormalCodeId code,
+                                      RunContext& context);
 
 /// What became of the crossing edges of sample_polygons().
 struct PolygonSampling {
@@ -26,7 +36,23 @@ struct PolygonSampling {
 /// crossing. Of several hits the one taken passes from inside to outside as the signs of the edge's ends say
 /// and lies nearest to the level set's own crossing; equal ones go to the lowest triangle number. So the
 /// result does not depend on the order of the work.
-HermiteGrid sample_polygons(const BlockGrid& grid, const PolygonMesh& mesh, RunContext& context,
-                            PolygonSampling* sampling = nullptr);
+FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const PolygonMesh& mesh,
+                             RunContext& context, PolygonSampling* sampling = nullptr);
+
+/// A surface given by a function: negative inside.
+struct AnalyticSurface {
+  std::function<double(const Eigen::Vector3d&)> value;
+  /// Need not be of unit length; where it vanishes the edge's direction is taken.
+  std::function<Eigen::Vector3d(const Eigen::Vector3d&)> gradient;
+  /// Bound of the slope of `value`, so that blocks far from the surface can be skipped; 1 for a distance.
+  double lipschitz = 1.0;
+};
+
+/// Samples lower…upper (index coordinates, inclusive) of the lattice at `placement`; all beyond is outside, and the
+/// function must be positive on the box's border. A crossing is found to within `tolerance` of the edge's length by
+/// bracketing, whatever the function's shape. @throws Error for a box or a function for which this does not hold.
+FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld& placement,
+                             const std::array<std::int32_t, 3>& lower, const std::array<std::int32_t, 3>& upper,
+                             double tolerance, RunContext& context);
 
 }  // namespace hermesh

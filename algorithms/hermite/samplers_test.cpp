@@ -15,16 +15,14 @@ using Eigen::Vector3d;
 
 /// Calls f(position, normal) for every crossing, in index space.
 template <class F>
-void for_each_crossing(const HermiteGrid& grid, F&& f) {
-  for (const HermiteBlock& block : grid.blocks())
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(block.crossing[axis], [&](int sample) {
-        const HermiteVoxel& voxel = block.voxels[sample];
-        Vector3d at(block.lower[0] + (sample >> 6), block.lower[1] + ((sample >> 3) & 7),
-                    block.lower[2] + (sample & 7));
-        at[axis] += voxel.offset[axis];
-        f(at, Vector3d(voxel.normal[axis][0], voxel.normal[axis][1], voxel.normal[axis][2]));
-      });
+void for_each_crossing(const FloatHermite& hermite, F&& f) {
+  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
+    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+      const auto& lower = hermite.leaves[leaf].lower;
+      Vector3d at(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
+      at[axis] += crossing.offset;
+      f(at, Vector3d(crossing.normal[0], crossing.normal[1], crossing.normal[2]));
+    });
 }
 
 LevelSet sphere(float radius) {
@@ -35,7 +33,7 @@ LevelSet sphere(float radius) {
 
 TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
   RunContext context;
-  const HermiteGrid grid = sample_level_set(BlockGrid(sphere(20.0f), 0.0, context), context);
+  const FloatHermite grid = sample_level_set(sphere(20.0f), 0.0, context);
   const Vector3d centre(0.3, 0.1, -0.2);
   std::size_t crossings = 0;
   for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
@@ -44,7 +42,7 @@ TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
     ASSERT_GT(normal.dot((at - centre).normalized()), 0.998);
     ASSERT_NEAR(normal.norm(), 1.0, 1e-5);
   });
-  EXPECT_EQ(crossings, grid.crossing_edges());
+  EXPECT_EQ(crossings, grid.crossings.size());
   EXPECT_NEAR(static_cast<double>(crossings), 6.0 * M_PI * 400.0,
               200.0);  // two for each lattice line through the disc
 }
@@ -66,7 +64,7 @@ TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
       }
   RunContext context;
   int checked = 0;
-  for_each_crossing(sample_level_set(BlockGrid(make_level_set(grid), 0.0, context), context),
+  for_each_crossing(sample_level_set(make_level_set(grid), 0.0, context),
                     [&](const Vector3d& at, const Vector3d& found) {
                       if ((at.array() < 3).any() || (at.array() > 16).any()) return;
                       ++checked;
@@ -109,10 +107,10 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
   RunContext context;
   for (const bool reversed : {false, true}) {
     PolygonSampling sampling;
-    const HermiteGrid grid = sample_polygons(BlockGrid(octahedron_level_set(radius, centre), 0.0, context),
-                                             octahedron(radius, centre, reversed), context, &sampling);
+    const FloatHermite grid = sample_polygons(octahedron_level_set(radius, centre), 0.0,
+                                              octahedron(radius, centre, reversed), context, &sampling);
     EXPECT_EQ(sampling.fallback, 0u);
-    EXPECT_EQ(sampling.exact, grid.crossing_edges());
+    EXPECT_EQ(sampling.exact, grid.crossings.size());
     for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
       ASSERT_NEAR((at - centre).cwiseAbs().sum(), radius, 2e-5);
       const Vector3d face = (at - centre).cwiseSign() / std::sqrt(3.0);
@@ -145,8 +143,7 @@ TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
   plane(-30.0f, false);  // makes the whole wound outwards, as a solid's surface is
   RunContext context;
   PolygonSampling sampling;
-  const HermiteGrid hermite =
-      sample_polygons(BlockGrid(make_level_set(grid), 0.0, context), mesh, context, &sampling);
+  const FloatHermite hermite = sample_polygons(make_level_set(grid), 0.0, mesh, context, &sampling);
   EXPECT_GT(sampling.ambiguous, 0u);
   int checked = 0;
   for_each_crossing(hermite, [&](const Vector3d& at, const Vector3d& normal) {

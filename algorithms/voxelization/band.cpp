@@ -4,6 +4,8 @@
 
 #include <cstring>
 #include <deque>
+#include <numeric>
+#include <utility>
 
 #include "algorithms/core/parallel.h"
 
@@ -234,71 +236,78 @@ std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, 
   return leaf;
 }
 
-std::unique_ptr<LeafTriangles> nearest_triangles(const kernels::Distances& distances) {
-  auto result = std::make_unique<LeafTriangles>();
+/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. A part of a slab at a time, so that
+/// this thread can report between them. Few blocks to a task: one of a fine mesh takes a good part of a
+/// millisecond, and a slab's last tasks are waited for.
+template <class F>
+void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span<const std::uint32_t> blocks,
+                   RunContext& context, F&& f) {
+  std::vector<std::vector<std::uint32_t>> slabs(bins.slab_count());
+  for (const std::uint32_t block : blocks) slabs[bins.slab_of(at[block])].push_back(block);
+  const std::size_t part = std::max<std::size_t>(1024, blocks.size() / 64);
+  std::size_t done = 0;
+  for (std::size_t slab = 0; slab < slabs.size(); ++slab) {
+    if (slabs[slab].empty()) continue;
+    bins.go_to_slab(slab);
+    for (std::size_t first = 0; first < slabs[slab].size(); first += part) {
+      context.progress("distances", double(done + first) / double(blocks.size()));
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, std::min(slabs[slab].size(), first + part), 2),
+                        [&](const auto& range) {
+                          context.check();
+                          for (std::size_t i = range.begin(); i != range.end(); ++i) f(slabs[slab][i]);
+                        });
+    }
+    done += slabs[slab].size();
+  }
+  bins.forget_slabs();
+}
+
+LeafTriangles nearest_triangles(const kernels::Distances& distances) {
+  LeafTriangles result;
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y)
       for (int z = 0; z < 8; ++z)
-        (*result)[std::size_t(x * 64 + y * 8 + z)] = distances.id[kernels::position(x, y, z)];
+        result[std::size_t(x * 64 + y * 8 + z)] = distances.id[kernels::position(x, y, z)];
   return result;
 }
 
 }  // namespace
 
-Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size,
-                  bool nearest, RunContext& context) {
-  Band band;
-  band.voxel_size = voxel_size;
-  band.blocks = bins.blocks().blocks();
-  const std::size_t n = band.blocks.size();
-  band.leaves.resize(n);
-  band.crossed.resize(n);
-  if (nearest) band.nearest.resize(n);
-  tbb::enumerable_thread_specific<LeafWork> works([&] { return LeafWork(soup, bins, reach, nearest); });
-  // A part at a time, so that this thread can report between them.
-  const std::size_t part = std::max<std::size_t>(1024, n / 64);
-  for (std::size_t first = 0; first < n; first += part) {
-    context.progress("distances", double(first) / double(n));
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, std::min(n, first + part), 8),
-                      [&](const auto& range) {
-                        LeafWork& work = works.local();
-                        alignas(64) float values[512];
-                        std::uint64_t active[8];
-                        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                          context.check();
-                          if (!work.run(band.blocks[i], std::uint32_t(i), float(voxel_size), values, active,
-                                        band.crossed[i]))
-                            continue;
-                          band.leaves[i] = make_leaf(band.blocks[i], values, active);
-                          if (nearest) band.nearest[i] = nearest_triangles(work.distances());
-                        }
-                      });
+void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
+                 const std::function<void(const FoundLeaf&)>& found) {
+  const std::vector<BlockAt> at = bins.blocks().blocks();
+  std::vector<std::uint32_t> all;
+  if (!work.blocks) {
+    all.resize(at.size());
+    std::iota(all.begin(), all.end(), 0u);
   }
-  return band;
+  tbb::enumerable_thread_specific<LeafWork> works(
+      [&] { return LeafWork(soup, bins, work.reach, work.nearest, work.without); });
+  for_each_slab(bins, at, work.blocks ? *work.blocks : all, context, [&](std::uint32_t block) {
+    LeafWork& of_thread = works.local();
+    FoundLeaf leaf;
+    leaf.block = block;
+    leaf.any =
+        of_thread.run(at[block], block, float(work.voxel_size), leaf.values, leaf.active, leaf.crossed);
+    if (work.nearest && leaf.any) leaf.nearest = nearest_triangles(of_thread.distances());
+    found(leaf);
+  });
 }
 
-std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(
-    const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-    const std::vector<std::uint32_t>& blocks, const std::vector<std::uint32_t>& without, double reach,
-    double voxel_size, std::vector<std::unique_ptr<LeafTriangles>>* nearest, RunContext& context) {
-  std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
-  if (nearest) nearest->resize(blocks.size());
-  tbb::enumerable_thread_specific<LeafWork> works(
-      [&] { return LeafWork(soup, bins, reach, nearest != nullptr, &without); });
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 8), [&](const auto& range) {
-    LeafWork& work = works.local();
-    alignas(64) float values[512];
-    std::uint64_t active[8];
-    kernels::EdgeBits crossed;
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      context.check();
-      const BlockAt& at = band.blocks[blocks[i]];
-      if (!work.run(at, blocks[i], float(voxel_size), values, active, crossed)) continue;
-      leaves[i] = make_leaf(at, values, active);
-      if (nearest) (*nearest)[i] = nearest_triangles(work.distances());
-    }
+Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context) {
+  Band band;
+  band.voxel_size = work.voxel_size;
+  band.blocks = bins.blocks().blocks();
+  band.leaves.resize(band.blocks.size());
+  band.crossed.resize(band.blocks.size());
+  if (work.nearest) band.nearest.resize(band.blocks.size());
+  find_leaves(soup, bins, work, context, [&](const FoundLeaf& leaf) {
+    band.crossed[leaf.block] = leaf.crossed;
+    if (!leaf.any) return;
+    band.leaves[leaf.block] = make_leaf(band.blocks[leaf.block], leaf.values, leaf.active);
+    if (work.nearest) band.nearest[leaf.block] = std::make_unique<LeafTriangles>(leaf.nearest);
   });
-  return leaves;
+  return band;
 }
 
 }  // namespace hermesh

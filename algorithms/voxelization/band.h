@@ -3,6 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -27,16 +28,31 @@ struct Band {
   std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless asked for
 };
 
-/// Exact to some 1e-6 voxel: every triangle that can be nearest to a voxel within `reach` (voxels, at least
-/// 1) is looked at. @throws Cancelled.
-Band compute_band(const IndexSoup& soup, const TriangleBins& bins, double reach, double voxel_size,
-                  bool nearest, RunContext& context);
+/// One block's share.
+struct FoundLeaf {
+  std::uint32_t block = 0;  ///< number
+  bool any = false;         ///< whether a voxel is within reach; without, nothing below but `crossed` counts
+  alignas(64) float values[512];
+  std::uint64_t active[8];
+  kernels::EdgeBits crossed;
+  LeafTriangles nearest;  ///< where asked for
+};
 
-/// The leaves of some of the band's blocks once more, without some of the triangles (ascending numbers).
-/// Leaves that have no voxel left are null; `nearest` is filled if it is not null.
-std::vector<std::unique_ptr<FloatLeaf>> recompute_leaves(
-    const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-    const std::vector<std::uint32_t>& blocks, const std::vector<std::uint32_t>& without, double reach,
-    double voxel_size, std::vector<std::unique_ptr<LeafTriangles>>* nearest, RunContext& context);
+struct BandWork {
+  double reach = 3.0;  ///< voxels, at least 1
+  double voxel_size = 1.0;
+  bool nearest = false;                                 ///< the nearest triangles, too
+  const std::vector<std::uint32_t>* blocks = nullptr;   ///< numbers of those to do; null for all
+  const std::vector<std::uint32_t>* without = nullptr;  ///< triangles to leave out, ascending; may be null
+};
+
+/// Calls found(leaf) once for each block, in any order and from several threads at once. Distances are exact
+/// to some 1e-6 voxel: every triangle that can be nearest to a voxel within reach is looked at.
+/// @throws Cancelled.
+void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
+                 const std::function<void(const FoundLeaf&)>& found);
+
+/// All leaves. @throws Cancelled.
+Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context);
 
 }  // namespace hermesh

@@ -6,22 +6,21 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
+#include <numeric>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/segment.h"
+#include "algorithms/voxelization/surface_probe.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// How far off a side the way to a voxel starts, in voxels: beyond rounding and beyond doubled faces.
-constexpr double kOff = 1e-3;
 /// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that
 /// four places can stand for.
 constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
-constexpr std::size_t kKept = 4;  ///< neighbourhoods that a thread keeps
 
 struct Piece : Facet {
   using Facet::Facet;
@@ -42,92 +41,16 @@ struct Piece : Facet {
   }
 };
 
-VoxelBits spread(VoxelBits bits) {
-  VoxelBits wide;
-  for (std::size_t x = 0; x < 8; ++x)
-    wide[x] = bits[x] | (x > 0 ? bits[x - 1] : 0) | (x < 7 ? bits[x + 1] : 0);
-  for (std::uint64_t& w : wide) w |= (w & kBelowTopY) << 8 | w >> 8;
-  for (std::uint64_t& w : wide) w |= (w & kBelowTopZ) << 1 | (w >> 1 & kBelowTopZ);
-  return wide;
-}
-
 using Voxel = std::array<std::int32_t, 3>;
 
-/// The triangles of one block of cells, by cell.
-struct Neighbourhood {
-  std::vector<Piece> pieces;
-  struct Hull {
-    Vector3d low, high;  ///< box
-    Vector3d normal;     ///< not of unit length
-    double offset, slack;
-  };
-  std::vector<Hull> hulls;
-  std::array<std::vector<std::uint32_t>, 512>
-      cells;  ///< numbers of those that touch the cell up from each voxel
-
-  Neighbourhood(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& block) {
-    bins.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
-      for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.low[a] > block[a] * 8.0 + 8.1 || cluster.box.high[a] < block[a] * 8.0 - 0.1) return;
-      for (const std::uint32_t t : cluster.triangles) add(Piece(soup.corners(t)), block);
-    });
-    if (const std::uint32_t i = bins.blocks().find(block); i != BlockTable::kNone)
-      for (const std::uint32_t t : bins.large(i)) add(Piece(soup.corners(t)), block);
-  }
-
-  /// Whether a triangle of the cell is in the way.
-  bool blocked(const Vector3d& from, const Vector3d& to, unsigned cell) const {
-    const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
-    for (const std::uint32_t i : cells[cell]) {
-      const Hull& hull = hulls[i];
-      if ((low.array() > hull.high.array()).any() || (high.array() < hull.low.array()).any()) continue;
-      const double a = hull.normal.dot(from) - hull.offset, b = hull.normal.dot(to) - hull.offset;
-      if (std::min(a, b) > hull.slack || std::max(a, b) < -hull.slack) continue;
-      if (meeting(from, to, pieces[i]) >= 0) return true;
-    }
-    return false;
-  }
-
- private:
-  void add(const Piece& piece, const BlockAt& block) {
-    int from[3], to[3];
-    for (int a = 0; a < 3; ++a) {
-      const double origin = block[std::size_t(a)] * 8.0;
-      const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
-      from[a] = int(std::clamp(std::floor(low - origin - 1e-6), 0.0, 8.0));
-      to[a] = int(std::clamp(std::floor(high - origin + 1e-6), -1.0, 7.0));
-      if (from[a] > to[a]) return;
-    }
-    const std::uint32_t number = std::uint32_t(pieces.size());
-    pieces.push_back(piece);
-    const Vector3d margin = Vector3d::Constant(1e-6);
-    const Vector3d normal = piece.normal();
-    hulls.push_back({piece.low() - margin, piece.high() + margin, normal, normal.dot(piece.corner[0]),
-                     1e-6 * normal.norm()});
-    for (int x = from[0]; x <= to[0]; ++x)
-      for (int y = from[1]; y <= to[1]; ++y)
-        for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
-  }
-};
-
-/// What is certain about a place of the surface, or just off it: the outside is next to it, only the inside
-/// is, or neither can be told, as in a crevice narrower than a voxel.
-enum class Side { outer, inner, unknown };
-
-/// Asks what is where; each thread has its own.
+/// What a thread asks about pieces.
 class Prober {
  public:
   Prober(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
-         const std::vector<VoxelBits>& suspicious)
-      : soup_(soup), bins_(bins), inside_(inside), suspicious_(suspicious), finder_(bins.blocks()) {}
+         const std::vector<VoxelBits>& suspicious, bool thorough, const WindingNumber* winding)
+      : probe_(soup, bins, inside, thorough, winding), suspicious_(suspicious), finder_(bins.blocks()) {}
 
-  /// Whether the solid is on both sides of the surface at q with this unit normal.
-  Side side(const Vector3d& q, const Vector3d& normal) {
-    const Side above = seen_from(q + kOff * normal);
-    if (above == Side::outer) return above;
-    const Side below = seen_from(q - kOff * normal);
-    return below == Side::inner ? above : below;
-  }
+  Side side(const Vector3d& q, const Vector3d& normal) { return probe_.side(q, normal); }
 
   /// Whether a suspicious voxel is in or next to the piece's box.
   bool suspicious(const Piece& piece) {
@@ -140,68 +63,33 @@ class Prober {
     for (std::int32_t x = from[0]; x <= to[0]; ++x)
       for (std::int32_t y = from[1]; y <= to[1]; ++y)
         for (std::int32_t z = from[2]; z <= to[2]; ++z)
-          if (bit_of(suspicious_, {x, y, z}) == 1) return true;
+          if (is_suspicious({x, y, z})) return true;
     return false;
   }
 
  private:
-  /// A few blocks are kept, since places next to each other are asked for one after another.
-  const Neighbourhood& around(const Voxel& voxel) {
-    const BlockAt block = tile_of(voxel);
-    if (last_ && block == last_block_) return *last_;
-    auto known = blocks_.find(block);
-    if (known == blocks_.end()) {
-      if (blocks_.size() >= kKept) blocks_.clear();
-      known = blocks_.emplace(block, std::make_unique<Neighbourhood>(soup_, bins_, block)).first;
-    }
-    last_block_ = block;
-    last_ = known->second.get();
-    return *last_;
-  }
-
-  /// 0 or 1, or 2 where there is no block.
-  int bit_of(const std::vector<VoxelBits>& bits, const Voxel& voxel) {
+  bool is_suspicious(const Voxel& voxel) {
     const std::uint32_t block = finder_.find(tile_of(voxel));
-    if (block == BlockTable::kNone) return 2;
+    if (block == BlockTable::kNone) return false;
     const unsigned place = place_in_tile(voxel);
-    return int(bits[block][place >> 6] >> (place & 63) & 1);
+    return suspicious_[block][place >> 6] >> (place & 63) & 1;
   }
 
-  Side seen_from(const Vector3d& p) {
-    Voxel lower;
-    for (int a = 0; a < 3; ++a) lower[std::size_t(a)] = std::int32_t(std::floor(p[a]));
-    const Neighbourhood& triangles = around(lower);
-    bool inside_seen = false;
-    for (int i = 0; i < 8; ++i) {
-      const Voxel voxel{lower[0] + (i >> 2), lower[1] + (i >> 1 & 1), lower[2] + (i & 1)};
-      const int inside = bit_of(inside_, voxel);
-      if (inside == 2 || (inside == 1 && inside_seen)) continue;
-      const Vector3d to(voxel[0], voxel[1], voxel[2]);
-      if (triangles.blocked(p, to, place_in_tile(lower))) continue;
-      if (inside == 0) return Side::outer;
-      inside_seen = true;
-    }
-    return inside_seen ? Side::inner : Side::unknown;
-  }
-
-  const IndexSoup& soup_;
-  const TriangleBins& bins_;
-  const std::vector<VoxelBits>& inside_;
+  SurfaceProbe probe_;
   const std::vector<VoxelBits>& suspicious_;
   BlockFinder finder_;
-  std::map<BlockAt, std::unique_ptr<Neighbourhood>> blocks_;
-  const Neighbourhood* last_ = nullptr;
-  BlockAt last_block_{};
 };
 
 /// What of a triangle is left.
 struct Remains {
-  bool some_inner = false;
+  bool seen_inner = false, some_inner = false;
   std::vector<Piece> outer;
+  std::vector<Piece> doubtful;  ///< of which something is unknown
 };
 
-/// Cuts a piece up until each part is inner or outer as a whole, as far as four places tell.
-void cut(const Piece& piece, const Vector3d& normal, Prober& prober, Remains& remains) {
+/// Cuts a piece up until each part is inner or outer as a whole, as far as four places tell. `last`: nothing
+/// may stay doubtful, and what is unknown stays.
+void cut(const Piece& piece, const Vector3d& normal, Prober& prober, bool last, Remains& remains) {
   const double size = piece.size();
   const Vector3d centroid = piece.centroid();
   if (!prober.suspicious(piece)) {
@@ -209,7 +97,7 @@ void cut(const Piece& piece, const Vector3d& normal, Prober& prober, Remains& re
     return;
   }
   if (size > kCoarse) {
-    for (const Piece& half : piece.halves()) cut(half, normal, prober, remains);
+    for (const Piece& half : piece.halves()) cut(half, normal, prober, last, remains);
     return;
   }
   std::array<int, 3> places{};  // by Side
@@ -218,9 +106,12 @@ void cut(const Piece& piece, const Vector3d& normal, Prober& prober, Remains& re
     for (const Vector3d& corner : piece.corner)
       ++places[std::size_t(prober.side(0.98 * corner + 0.02 * centroid, normal))];
   const auto [outer, inner, unknown] = places;
+  remains.seen_inner |= inner > 0;
   const bool seam = inner > 0 && (outer > 0 || (unknown > 0 && size > kMiddle));
   if (seam && size > kFine)
-    for (const Piece& half : piece.halves()) cut(half, normal, prober, remains);
+    for (const Piece& half : piece.halves()) cut(half, normal, prober, last, remains);
+  else if (unknown > 0 && !last)
+    remains.doubtful.push_back(piece);
   else if (inner > unknown)
     remains.some_inner = true;
   else
@@ -240,7 +131,8 @@ class Finder {
     for (const std::uint32_t block : suspects_) add_triangles(block, triangles);
     std::sort(triangles.begin(), triangles.end());
     triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
-    const std::vector<Remains> remains = cut_all(triangles);
+    std::vector<Remains> remains = cut_all(triangles);
+    settle_doubts(triangles, remains);
     for (std::size_t i = 0; i < triangles.size(); ++i) {
       if (!remains[i].some_inner) continue;
       sheets.triangles.push_back(triangles[i]);
@@ -251,29 +143,86 @@ class Finder {
   }
 
  private:
-  /// Blocks with an edge between two voxels inside that an odd number of sheets cross, and the voxels around
-  /// such edges. An even number is most often a gap narrower than a voxel, whose walls do bound the solid.
+  /// Voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
+  /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the
+  /// solid; but inner sheets near a seam look the same, so they count in blocks that others with an odd
+  /// number lead to.
   void find_suspects() {
-    suspicious_.assign(band_.blocks.size(), VoxelBits{});
-    std::vector<char> found(band_.blocks.size(), 0);
-    parallel_blocks(found.size(), context_, [&](std::size_t i) {
+    std::vector<VoxelBits> marked(band_.blocks.size(), VoxelBits{});
+    std::vector<char> counts(band_.blocks.size(), 0);
+    parallel_blocks(marked.size(), context_, [&](std::size_t i) {
       std::vector<InnerEdge> edges = inner_edges(std::uint32_t(i));
       if (edges.empty()) return;
       find_hits(std::uint32_t(i), edges);
-      VoxelBits voxels{};
       for (InnerEdge& edge : edges) {
-        if (edge.sheets() % 2 == 0) continue;
         const unsigned place = place_in_tile(edge.voxel);
-        voxels[place >> 6] |= std::uint64_t(1) << (place & 63);
-        found[i] = 1;
+        const int sheets = edge.sheets();
+        if (sheets > 0) marked[i][place >> 6] |= std::uint64_t(1) << (place & 63);
+        if (sheets % 2 == 1) counts[i] = 1;
       }
-      if (found[i]) suspicious_[i] = spread(spread(voxels));
     });
-    for (std::uint32_t i = 0; i < found.size(); ++i)
-      if (found[i]) suspects_.push_back(i);
+    spread_over_neighbours(marked, counts);
+    suspicious_.assign(band_.blocks.size(), VoxelBits{});
+    for (std::uint32_t i = 0; i < marked.size(); ++i) {
+      if (!counts[i]) continue;
+      const BlockAt& at = band_.blocks[i];
+      for (std::int32_t x = 0; x < 8; ++x)
+        for (std::uint64_t bits = marked[i][std::size_t(x)]; bits; bits &= bits - 1) {
+          const int place = __builtin_ctzll(bits);
+          suspect_around({at[0] * 8 + x, at[1] * 8 + place / 8, at[2] * 8 + place % 8});
+        }
+    }
+    for (std::uint32_t i = 0; i < suspicious_.size(); ++i)
+      if (suspicious_[i] != VoxelBits{}) suspects_.push_back(i);
   }
 
-  /// A grid edge up from a voxel, both of its ends inside, that some triangle crosses.
+  /// Lets all blocks count that have a mark and that a chain of such blocks joins to one that counts.
+  void spread_over_neighbours(const std::vector<VoxelBits>& marked, std::vector<char>& counts) const {
+    std::vector<std::uint32_t> stack;
+    for (std::uint32_t i = 0; i < counts.size(); ++i)
+      if (counts[i]) stack.push_back(i);
+    while (!stack.empty()) {
+      const BlockAt at = band_.blocks[stack.back()];
+      stack.pop_back();
+      for (std::int32_t x = -1; x <= 1; ++x)
+        for (std::int32_t y = -1; y <= 1; ++y)
+          for (std::int32_t z = -1; z <= 1; ++z) {
+            const std::uint32_t i = bins_.blocks().find({at[0] + x, at[1] + y, at[2] + z});
+            if (i == BlockTable::kNone || counts[i] || marked[i] == VoxelBits{}) continue;
+            counts[i] = 1;
+            stack.push_back(i);
+          }
+    }
+  }
+
+  /// Marks the voxels at most two away on every axis.
+  void suspect_around(const Voxel& voxel) {
+    constexpr std::int32_t kAway = 2;
+    BlockAt low, high;
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = (voxel[a] - kAway) >> 3;
+      high[a] = (voxel[a] + kAway) >> 3;
+    }
+    const auto within = [&](std::size_t axis, std::int32_t block) {
+      return std::pair(std::max(voxel[axis] - kAway - 8 * block, 0),
+                       std::min(voxel[axis] + kAway - 8 * block, 7));
+    };
+    for (std::int32_t x = low[0]; x <= high[0]; ++x)
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+          const std::uint32_t block = bins_.blocks().find({x, y, z});
+          if (block == BlockTable::kNone) continue;
+          const auto [x0, x1] = within(0, x);
+          const auto [y0, y1] = within(1, y);
+          const auto [z0, z1] = within(2, z);
+          const std::uint64_t row = (std::uint64_t(2) << z1) - (std::uint64_t(1) << z0);
+          std::uint64_t plane = 0;
+          for (int i = y0; i <= y1; ++i) plane |= row << (8 * i);
+          for (int i = x0; i <= x1; ++i) suspicious_[block][std::size_t(i)] |= plane;
+        }
+  }
+
+  /// A grid edge up from a voxel, both of its ends inside, that some triangle may cross.
   struct InnerEdge {
     Voxel voxel;
     int axis;
@@ -294,7 +243,8 @@ class Finder {
       }
       const Vector3d from(voxel[0], voxel[1], voxel[2]);
       const double along = meeting(from, from + Vector3d::Unit(axis), piece);
-      // At an end the surface goes through the voxel, as faces along the grid do, and is beside the edge, not across.
+      // At an end the surface goes through the voxel, as faces along the grid do, and is beside the edge, not
+      // across.
       if (along > 1e-6 && along < 1.0 - 1e-6) hits.push_back(along);
     }
   };
@@ -312,7 +262,7 @@ class Finder {
       const Piece piece = Piece(soup_.corners(t));
       for (InnerEdge& edge : edges) edge.meet(piece);
     };
-    bins_.for_each_cluster(band_.blocks[block], [&](const TriangleBins::Cluster& cluster) {
+    bins_.for_each_cluster(band_.blocks[block], box, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > box.high[a] + 1e-6 || cluster.box.high[a] < box.low[a] - 1e-6) return;
       for (const std::uint32_t t : cluster.triangles) meet(t);
@@ -355,7 +305,7 @@ class Finder {
   void add_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
     context_.check();
     const BlockAt& at = band_.blocks[block];
-    bins_.for_each_cluster(at, [&](const TriangleBins::Cluster& cluster) {
+    bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > at[a] * 8.0 + 9.0 || cluster.box.high[a] < at[a] * 8.0 - 1.0) return;
       triangles.insert(triangles.end(), cluster.triangles.begin(), cluster.triangles.end());
@@ -365,27 +315,59 @@ class Finder {
   }
 
   std::vector<Remains> cut_all(const std::vector<std::uint32_t>& triangles) const {
+    std::vector<std::uint32_t> all(triangles.size());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<Remains> remains(triangles.size());
+    for_each_triangle(triangles, all, false, nullptr,
+                      [&](const Piece& piece, const Vector3d& normal, std::uint32_t i, Prober& prober) {
+                        cut(piece, normal, prober, false, remains[i]);
+                      });
+    return remains;
+  }
+
+  /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
+  /// them, and only winding numbers tell an overlap from a gap. They are not asked where all that is inner or
+  /// doubtful may be the walls of gaps: they take longer than all the rest of the signs.
+  void settle_doubts(const std::vector<std::uint32_t>& triangles, std::vector<Remains>& remains) const {
+    std::vector<std::uint32_t> doubtful;
+    bool seen_inner = false;
+    for (std::uint32_t i = 0; i < remains.size(); ++i) {
+      if (!remains[i].doubtful.empty()) doubtful.push_back(i);
+      seen_inner |= remains[i].seen_inner;
+    }
+    if (doubtful.empty() || !seen_inner) return;
+    const OrientedWinding winding(soup_);
+    for_each_triangle(triangles, doubtful, true, winding.usable() ? &winding.number() : nullptr,
+                      [&](const Piece&, const Vector3d& normal, std::uint32_t i, Prober& prober) {
+                        for (const Piece& piece : remains[i].doubtful)
+                          cut(piece, normal, prober, true, remains[i]);
+                      });
+  }
+
+  /// Calls f(triangle, its unit normal, number, prober) for some of the triangles, given by number, in
+  /// parallel.
+  template <class F>
+  void for_each_triangle(const std::vector<std::uint32_t>& triangles, const std::vector<std::uint32_t>& some,
+                         bool thorough, const WindingNumber* winding, F&& f) const {
     // Block by block, so that a neighbourhood is looked up once.
-    std::vector<std::pair<BlockAt, std::uint32_t>> order(triangles.size());
+    std::vector<std::pair<BlockAt, std::uint32_t>> order(some.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) {
-      const Vector3d centre = Piece(soup_.corners(triangles[i])).centroid();
+      const Vector3d centre = Piece(soup_.corners(triangles[some[i]])).centroid();
       for (int a = 0; a < 3; ++a) order[i].first[std::size_t(a)] = std::int32_t(std::floor(centre[a])) >> 3;
-      order[i].second = i;
+      order[i].second = some[i];
     }
     std::sort(order.begin(), order.end());
-    std::vector<Remains> remains(triangles.size());
     tbb::enumerable_thread_specific<Prober> probers(
-        [&] { return Prober(soup_, bins_, inside_, suspicious_); });
+        [&] { return Prober(soup_, bins_, inside_, suspicious_, thorough, winding); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 64), [&](const auto& range) {
       Prober& prober = probers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         context_.check();
         const Piece piece = Piece(soup_.corners(triangles[order[i].second]));
         const Vector3d normal = piece.normal();
-        if (normal.norm() > 0) cut(piece, normal.normalized(), prober, remains[order[i].second]);
+        if (normal.norm() > 0) f(piece, normal.normalized(), order[i].second, prober);
       }
     });
-    return remains;
   }
 
   static void add_piece(const Piece& piece, double voxel_size, std::uint32_t parent, InnerSheets& sheets) {

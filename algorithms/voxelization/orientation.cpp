@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 /// Share of the area beyond which faces that tell no side leave the whole mesh without one.
 constexpr double kMost = 0.5;
-/// An open sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
+/// A flat sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
 constexpr double kNoVolume = 1e-6;
 
 /// Calls f for each range of equal items in a sorted sequence.
@@ -95,7 +95,8 @@ class Orienter {
     std::size_t begin = 0, end = 0;  ///< in queue_
     bool consistent = true, orientable = true, closed = true;
     double given = 0.0, turned = 0.0;  ///< area that keeps the given winding, and that does not
-    double volume = 0.0;               ///< after the turns
+    double volume = 0.0;               ///< after the turns, about centre_
+    Eigen::Vector3d vector = Eigen::Vector3d::Zero();  ///< sum of the area vectors; zero if it is closed
   };
 
   Eigen::Vector3d corner(std::size_t face, int c) const {
@@ -136,7 +137,7 @@ class Orienter {
     return t[(start + 1) % 3] == sorted[1];
   }
 
-  /// The area, and its centre, about which volumes are taken.
+  /// The area, its centre, about which volumes are taken, and its box.
   void measure() {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t face = 0; face < triangles_.size(); ++face) {
@@ -144,6 +145,8 @@ class Orienter {
       const double area = area_vector(face).norm();
       area_ += area;
       sum += area / 3 * (corner(face, 0) + corner(face, 1) + corner(face, 2));
+      if (area > 0)
+        for (int c = 0; c < 3; ++c) box_.add(corner(face, c));
     }
     if (area_ > 0) centre_ = sum / area_;
   }
@@ -187,16 +190,18 @@ class Orienter {
     std::vector<std::int8_t> turns(triangles_.size(), 0);  // 0: not met yet
     std::vector<Patch> patches;
     double given_volume = 0.0;
+    Eigen::Vector3d given_vector = Eigen::Vector3d::Zero();
     queue_.reserve(triangles_.size());
     for (std::size_t face = 0; face < triangles_.size(); ++face) {
       if (turns[face] != 0 || result_.turns[face] == 0 || is_degenerate(triangles_[face])) continue;
       Patch patch = spread(static_cast<std::uint32_t>(face), turns);
       if (patch.turned > patch.given) turn_over(patch, turns);
       given_volume += patch.volume;
+      given_vector += patch.vector;
       if (!follows_given(patch) && patch.volume < 0) turn_over(patch, turns);
       patches.push_back(patch);
     }
-    const bool inside_out = given_volume < -kNoVolume * std::pow(area_, 1.5);
+    const bool inside_out = largest_volume(given_volume, given_vector) < -kNoVolume * std::pow(area_, 1.5);
     for (Patch& patch : patches) {
       if (inside_out && follows_given(patch)) turn_over(patch, turns);
       result_.non_orientable_patches += !patch.orientable;
@@ -204,6 +209,16 @@ class Orienter {
     }
     result_.patches = patches.size();
     for (const std::uint32_t face : queue_) result_.turns[face] = turns[face];
+  }
+
+  /// The volume of an open surface, which is that of the cone to it, depends on where the cone's apex is: it
+  /// is linear in the apex, and so the largest in one of the corners of the box.
+  double largest_volume(double about_centre, const Eigen::Vector3d& vector) const {
+    double volume = about_centre;
+    for (int a = 0; a < 3; ++a)
+      volume +=
+          std::max(vector[a] * (centre_[a] - box_.lower[a]), vector[a] * (centre_[a] - box_.upper[a])) / 3;
+    return volume;
   }
 
   /// Walks over a patch breadth first and turns its faces to agree with its first.
@@ -217,6 +232,7 @@ class Orienter {
       const Eigen::Vector3d n = area_vector(face);
       (turns[face] > 0 ? patch.given : patch.turned) += n.norm();
       patch.volume += turns[face] * n.dot(corner(face, 0) - centre_) / 3;
+      patch.vector += turns[face] * n;
       for (const std::uint32_t entry : neighbours_[face]) {
         if (entry == kNone) {
           patch.closed = false;
@@ -242,6 +258,7 @@ class Orienter {
   void turn_over(Patch& patch, std::vector<std::int8_t>& turns) const {
     std::swap(patch.given, patch.turned);
     patch.volume = -patch.volume;
+    patch.vector = -patch.vector;
     for (std::size_t i = patch.begin; i < patch.end; ++i) turns[queue_[i]] = -turns[queue_[i]];
   }
 
@@ -251,6 +268,7 @@ class Orienter {
   std::vector<std::array<std::uint32_t, 3>> neighbours_;
   std::vector<std::uint32_t> queue_;  ///< faces patch by patch
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  Bounds box_;
   double area_ = 0.0, cancelling_area_ = 0.0, one_sided_area_ = 0.0;
   Orientation result_;
 };

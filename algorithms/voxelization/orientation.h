@@ -36,10 +36,10 @@ struct Orientation {
 /// are.
 ///
 /// In each patch faces are turned to agree, to the winding that more of its area was given with. If the
-/// volume of all patches together is then negative, the mesh was given inside out and every patch is turned
-/// over. So patches that agreed from the start keep their winding relative to each other, by which shells
-/// inside one another say which is a hole. Only a closed patch whose faces did not agree gets positive volume
-/// whatever its winding was.
+/// volume of all patches together is then negative, wherever in the mesh's box the apex is that an open one's
+/// is measured from, the mesh was given inside out and every patch is turned over. So patches that agreed
+/// from the start keep their winding relative to each other, by which shells inside one another say which is
+/// a hole. Only a closed patch whose faces did not agree gets positive volume whatever its winding was.
 ///
 /// The same for every number of threads. Takes O(n log n) time, and about 70 bytes a face while it runs.
 /// Fewer than 2^31 faces.

@@ -218,6 +218,24 @@ TEST(Orientation, LeavesAFlatSheetAlone) {
   EXPECT_EQ(sheet.orient().flipped, 0u);
 }
 
+TEST(Orientation, TurnsNoSheetWhoseVolumeDependsOnThePlace) {
+  // A ridge of height 1 and a valley of depth 2 beside it, unit length in y. About an apex at height z the
+  // cone to the ridge has volume (2 − 2z)/3, to the valley (−4 − 2z)/3, together (−2 − 4z)/3: from 2 at the
+  // valley's bottom to −2 at the ridge's top, and −0.11 about the centre of the area at −0.42.
+  Soup sheet;
+  for (const float y : {0.0f, 1.0f})
+    for (const auto& [x, z] :
+         {std::pair{-1.0f, 0.0f}, {0.0f, 1.0f}, {1.0f, 0.0f}, {2.0f, -2.0f}, {3.0f, 0.0f}})
+      sheet.points.push_back({x, y, z});
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    sheet.triangles.push_back({i, i + 1, i + 6});
+    sheet.triangles.push_back({i, i + 6, i + 5});
+  }
+  EXPECT_EQ(sheet.orient().flipped, 0u);
+  sheet.flip_all();
+  EXPECT_EQ(sheet.orient().flipped, 0u);
+}
+
 TEST(Orientation, DoesNotJoinFacesOverEdgesOfMoreThanTwo) {
   Soup fan;
   fan.points = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}};

@@ -83,7 +83,7 @@ class PocketOpener {
   }
 
   bool sees_outside(const Voxel& voxel) const {
-    const std::vector<Facet> facets = facets_near(voxel);
+    std::vector<Obstacle> obstacles = obstacles_near(voxel);
     const Vector3d from = position(voxel);
     // Near ones first.
     for (std::int32_t far = 1; far <= kFar; ++far)
@@ -92,32 +92,39 @@ class PocketOpener {
           for (std::int32_t z = -far; z <= far; ++z) {
             if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
             const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (is_outside(other) && free(from, position(other), facets)) return true;
+            if (is_outside(other) && free(from, position(other), obstacles)) return true;
           }
     return false;
   }
 
-  static bool free(const Vector3d& from, const Vector3d& to, const std::vector<Facet>& facets) {
+  /// Leaves what is in the way in front, since it is often in the way to the next voxel, too.
+  static bool free(const Vector3d& from, const Vector3d& to, std::vector<Obstacle>& obstacles) {
     // A triangle in whose plane the way lies is met by no test, so the way is taken a little to one side.
     const Vector3d aside = to + Vector3d(1.1e-5, 1.7e-5, 2.3e-5);
-    return std::none_of(facets.begin(), facets.end(), [&](const Facet& f) {
-      return meeting(from, to, f) >= 0 || meeting(from, aside, f) >= 0;
+    const auto met = std::find_if(obstacles.begin(), obstacles.end(), [&](const Obstacle& o) {
+      return o.meeting(from, to) >= 0 || o.meeting(from, aside) >= 0;
     });
+    if (met == obstacles.end()) return true;
+    std::iter_swap(obstacles.begin(), met);
+    return false;
   }
 
-  std::vector<Facet> facets_near(const Voxel& voxel) const {
+  std::vector<Obstacle> obstacles_near(const Voxel& voxel) const {
     const Vector3d at = position(voxel), reach = Vector3d::Constant(kFar + 0.01);
-    std::vector<Facet> facets;
+    std::vector<Obstacle> obstacles;
     const auto add = [&](std::uint32_t t) {
       const Facet facet(soup_.corners(t));
       if ((facet.low().array() <= (at + reach).array()).all() &&
           (facet.high().array() >= (at - reach).array()).all())
-        facets.push_back(facet);
+        obstacles.emplace_back(facet);
     };
     const BlockAt block = tile_of(voxel);
-    bins_.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
-      for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.low[a] > voxel[a] + reach[0] || cluster.box.high[a] < voxel[a] - reach[0]) return;
+    VoxelBox near;
+    for (std::size_t a = 0; a < 3; ++a) {
+      near.low[a] = voxel[a] - reach[0];
+      near.high[a] = voxel[a] + reach[0];
+    }
+    bins_.for_each_cluster(block, near, [&](const TriangleBins::Cluster& cluster) {
       for (const std::uint32_t t : cluster.triangles) add(t);
     });
     // A large triangle two voxels away may be filed under the blocks around only.
@@ -127,7 +134,7 @@ class PocketOpener {
           if (const std::uint32_t i = bins_.blocks().find({block[0] + x, block[1] + y, block[2] + z});
               i != BlockTable::kNone)
             for (const std::uint32_t t : bins_.large(i)) add(t);
-    return facets;
+    return obstacles;
   }
 
   const IndexSoup& soup_;

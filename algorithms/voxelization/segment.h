@@ -42,4 +42,32 @@ inline double meeting(const Eigen::Vector3d& from, const Eigen::Vector3d& to, co
   return along >= -kOn && along <= 1.0 + kOn ? std::max(along, 0.0) : -1.0;
 }
 
+/// A triangle that many ways are tried against, most of which pass it by.
+class Obstacle {
+ public:
+  explicit Obstacle(const Facet& facet)
+      : facet_(facet),
+        low_(facet.low().array() - kMargin),
+        high_(facet.high().array() + kMargin),
+        normal_(facet.normal()),
+        offset_(normal_.dot(facet.corner[0])),
+        slack_(kMargin * normal_.norm()) {}
+
+  /// As meeting() has it.
+  double meeting(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    if ((from.cwiseMin(to).array() > high_.array()).any() || (from.cwiseMax(to).array() < low_.array()).any())
+      return -1.0;
+    const double a = normal_.dot(from) - offset_, b = normal_.dot(to) - offset_;
+    if (std::min(a, b) > slack_ || std::max(a, b) < -slack_) return -1.0;
+    return hermesh::meeting(from, to, facet_);
+  }
+
+ private:
+  static constexpr double kMargin = 1e-6;
+  Facet facet_;
+  Eigen::Vector3d low_, high_;
+  Eigen::Vector3d normal_;  ///< not of unit length
+  double offset_, slack_;
+};
+
 }  // namespace hermesh

@@ -1,7 +1,7 @@
 #include "algorithms/voxelization/signs.h"
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/voxelization/orientation.h"
+#include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/pockets.h"
 #include "algorithms/voxelization/winding_signs.h"
 
@@ -17,28 +17,6 @@ std::vector<VoxelBits> enclosed_voxels(const Regions& regions, std::size_t block
         for (std::size_t x = 0; x < 8; ++x) result[i][x] |= regions.components[c].voxels[x];
   return result;
 }
-
-/// The winding numbers of a mesh, its faces first made to agree.
-class Winding {
- public:
-  explicit Winding(const IndexSoup& soup) : Winding(soup.mesh(), soup.scale()) {}
-  Winding(const PolygonMesh& mesh, double scale)
-      : triangles_(mesh.quads.empty() ? std::vector<Triangle>() : triangulated(mesh)),
-        faces_(mesh.quads.empty() ? std::span<const Triangle>(mesh.triangles) : triangles_),
-        orientation_(orient_faces(mesh.points, faces_)),
-        tree_(mesh.points, faces_, scale),
-        number_(tree_, orientation_.turns) {}
-
-  const Orientation& orientation() const { return orientation_; }
-  const WindingNumber& number() const { return number_; }
-
- private:
-  std::vector<Triangle> triangles_;
-  std::span<const Triangle> faces_;
-  Orientation orientation_;
-  TriangleTree tree_;
-  WindingNumber number_;
-};
 
 /// A crossed edge both of whose ends the flood reached.
 struct OpenEdge {
@@ -126,9 +104,9 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
     if (flood.leaks.empty() && flood.share > 0) return signs;
   }
   context.check();
-  const Winding winding(soup);
+  const OrientedWinding winding(soup);
   context.check();
-  if (winding.orientation().verdict != Orientation::Verdict::usable) {
+  if (!winding.usable()) {
     // Faces that cancel can still enclose something.
     if (rule == SignRule::automatic && flood.share > 0.5) return signs;
     context.note(std::string("The distances have no sign: ") + explanation(winding.orientation().verdict) +
@@ -142,7 +120,8 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
     context.note(
         "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
   }
-  return winding_signs(winding.number(), bins.blocks(), band, regions, reach, context);
+  const bool open = winding.orientation().boundary_edges + winding.orientation().non_manifold_edges > 0;
+  return winding_signs(winding.number(), bins.blocks(), band, regions, open, reach, context);
 }
 
 }  // namespace hermesh

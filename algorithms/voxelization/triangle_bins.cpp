@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "algorithms/core/parallel.h"
 
@@ -12,6 +14,13 @@ namespace {
 /// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
 /// each, so small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
+/// Triangles of a slab, about, and slabs at most: few enough triangles that the clusters of three slabs are
+/// small beside the volume, few enough slabs that each keeps all threads busy.
+constexpr std::size_t kInSlab = 1 << 16;
+constexpr std::size_t kMostSlabs = 16;
+/// A thread that asks in any order keeps the bins around its block, and more while they are small: as many
+/// bins, or as many triangles.
+constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kMany = 1024;
 
@@ -150,28 +159,71 @@ void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, doub
   for (std::size_t i = 0; i < centres.size(); ++i) sorted[next[cell[i]]++] = centres[i];
 }
 
+std::size_t packed_size(std::uint32_t step) {
+  std::size_t bytes = 1;
+  for (; step >= 128; step >>= 7) ++bytes;
+  return bytes;
+}
+
+void write_packed(std::uint32_t step, std::uint8_t*& at) {
+  for (; step >= 128; step >>= 7) *at++ = std::uint8_t(step | 128);
+  *at++ = std::uint8_t(step);
+}
+
+/// What a piece of the work files in a bin.
+struct BinRun {
+  explicit BinRun(std::uint32_t of_bin) : code(of_bin) {}
+  std::uint32_t code;  ///< of the bin in the piece's set
+  BinBox box;
+  std::uint32_t count = 0, first = 0, last = 0;  ///< triangles
+  std::uint64_t bytes = 0;                       ///< packed, of all but the first; later, where they go
+};
+
+/// Numbers for the codes of a set, in the order in which they first come.
+class CodeNumbers {
+ public:
+  /// The code's number, which is `next` if it has none.
+  std::uint32_t operator()(std::uint32_t code, std::uint32_t next) {
+    if (code >= numbers_.size()) numbers_.resize((code | 511) + 1, BlockTable::kNone);
+    if (numbers_[code] == BlockTable::kNone) numbers_[code] = next;
+    return numbers_[code];
+  }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+};
+
 }  // namespace
 
-TriangleBins::FloatBox TriangleBins::box_of(std::size_t triangle) const {
-  const Triangle t = soup_.triangle(triangle);
-  const Eigen::Vector3f &a = soup_.point(t[0]), &b = soup_.point(t[1]), &c = soup_.point(t[2]);
-  return {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};
-}
+/// What a first pass over the triangles tells, by piece of the work.
+struct TriangleBins::Survey {
+  std::vector<BlockSet> bins;  ///< of small triangles
+  std::vector<std::vector<BinRun>> runs;
+};
 
-VoxelBox TriangleBins::in_voxels(const FloatBox& box) const {
-  VoxelBox result;
-  for (int a = 0; a < 3; ++a) {
-    result.low[a] = double(box.low[a]) * soup_.scale();
-    result.high[a] = double(box.high[a]) * soup_.scale();
+void BinBox::add(const VoxelBox& box, const BlockAt& bin) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[a] - 3.0;
+    low[a] = std::min(low[a], std::uint8_t(std::clamp(16.0 * (box.low[a] - start), 0.0, 255.0)));
+    high[a] = std::max(high[a], std::uint8_t(std::clamp(16.0 * (box.high[a] - start) + 1.0, 0.0, 255.0)));
   }
-  return result;
 }
 
-TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& context)
-    : soup_(soup), reach_(reach), rings_(int(std::ceil((reach + 0.5 * kLargest) / 8.0))) {
-  file_small(context);
-  make_clusters(context);
-  choose_blocks(context);
+void BinBox::add(const BinBox& other) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    low[a] = std::min(low[a], other.low[a]);
+    high[a] = std::max(high[a], other.high[a]);
+  }
+}
+
+VoxelBox BinBox::in_voxels(const BlockAt& bin) const {
+  VoxelBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[a] - 3.0;
+    box.low[a] = start + low[a] / 16.0;
+    box.high[a] = start + high[a] / 16.0;
+  }
+  return box;
 }
 
 bool TriangleBins::is_large(const VoxelBox& box) {
@@ -180,136 +232,279 @@ bool TriangleBins::is_large(const VoxelBox& box) {
   return longest > kLargest;
 }
 
-void TriangleBins::file_small(RunContext& context) {
+TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& context)
+    : soup_(soup), context_(context), reach_(reach), rings_(int(std::ceil((reach + 0.5 * kLargest) / 8.0))) {
+  Survey found = survey();
+  choose_blocks(found);
+  pack(found);
+  choose_slabs();
+  if (slabs_.size() == 1) go_to_slab(0);
+}
+
+TriangleBins::Survey TriangleBins::survey() {
   const Chunks chunks(soup_.size());
-  std::vector<BlockSet> sets(chunks.count);
-  std::vector<std::vector<std::uint32_t>> found(
-      chunks.count);  ///< triangles by the code of their block in the set
+  Survey found;
+  found.bins.resize(chunks.count);
+  found.runs.resize(chunks.count);
   all_large_.resize(chunks.count);
-  parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) {
+    std::vector<BinRun>& runs = found.runs[chunk];
+    CodeNumbers numbers;
+    for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
       const VoxelBox box = in_voxels(box_of(t));
       if (is_large(box)) {
-        all_large_[chunk].push_back(std::uint32_t(t));
+        all_large_[chunk].push_back(t);
         continue;
       }
-      const std::uint32_t code = sets[chunk].insert(block_of_centre(box));
-      if (code >= found[chunk].size()) found[chunk].resize((code | 511) + 1, 0);
-      ++found[chunk][code];
+      const BlockAt block = block_of_centre(box);
+      const std::uint32_t code = found.bins[chunk].insert(block);
+      const std::uint32_t number = numbers(code, std::uint32_t(runs.size()));
+      if (number == runs.size()) runs.emplace_back(code);
+      BinRun& run = runs[number];
+      run.box.add(box, block);
+      if (run.count++ == 0)
+        run.first = t;
+      else
+        run.bytes += packed_size(t - run.last);
+      run.last = t;
     }
   });
-  bins_ = BlockTable(sets);
-  // next[chunk · bins + bin]: first how many, then where the chunk's next triangle of the bin goes.
-  std::vector<std::uint32_t> next(chunks.count * bins_.size(), 0);
-  parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    const std::vector<std::uint32_t> translation = bins_.translation(sets[chunk]);
-    for (std::uint32_t code = 0; code < found[chunk].size(); ++code)
-      if (found[chunk][code] > 0)
-        next[chunk * bins_.size() + bins_.number(translation, code)] = found[chunk][code];
-    found[chunk] = {};
-  });
-  first_.resize(bins_.size() + 1);
-  std::uint32_t total = 0;
-  for (std::size_t bin = 0; bin < bins_.size(); ++bin) {
-    first_[bin] = total;
-    for (std::size_t chunk = 0; chunk < chunks.count; ++chunk)
-      total += std::exchange(next[chunk * bins_.size() + bin], total);
+  bins_ = BlockTable(found.bins);
+  bin_at_ = bins_.blocks();
+  return found;
+}
+
+/// The boxes are made again rather than remembered, which for ten million triangles would take more memory
+/// than the volume.
+void TriangleBins::pack(Survey& survey) {
+  const std::size_t bins = bins_.size();
+  first_byte_.assign(bins + 1, 0);
+  count_.assign(bins, 0);
+  box_of_bin_.assign(bins, {});
+  std::vector<std::uint32_t> before(bins, 0);  // the last triangle so far
+  for (std::size_t chunk = 0; chunk < survey.runs.size(); ++chunk) {
+    const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
+    for (BinRun& run : survey.runs[chunk]) {
+      const std::uint32_t bin = bins_.number(translation, run.code);
+      const std::uint64_t size = run.bytes + packed_size(run.first - before[bin]);
+      run.bytes = std::exchange(first_byte_[bin], first_byte_[bin] + size);
+      count_[bin] += run.count;
+      box_of_bin_[bin].add(run.box);
+      run.first = std::exchange(before[bin], run.last);
+    }
   }
-  first_.back() = total;
-  order_.resize(total);
-  // The blocks are found again rather than remembered, which for ten million triangles would take more memory
-  // than the volume.
-  parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    BlockFinder finder(bins_);
-    for (std::size_t t = chunks.begin(chunk); t < chunks.end(chunk); ++t) {
+  std::uint64_t total = 0;
+  for (std::uint64_t& bytes : first_byte_) total += std::exchange(bytes, total);
+  packed_.resize(total);
+  const Chunks chunks(soup_.size());
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) {
+    std::vector<BinRun>& runs = survey.runs[chunk];
+    const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
+    std::vector<std::uint8_t*> to;
+    CodeNumbers numbers;
+    for (const BinRun& run : runs) {
+      numbers(run.code, std::uint32_t(to.size()));
+      to.push_back(packed_.data() + first_byte_[bins_.number(translation, run.code)] + run.bytes);
+    }
+    for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
       const VoxelBox box = in_voxels(box_of(t));
-      if (!is_large(box))
-        order_[next[chunk * bins_.size() + finder.find(block_of_centre(box))]++] = std::uint32_t(t);
+      if (is_large(box)) continue;
+      const std::uint32_t run = numbers(survey.bins[chunk].insert(block_of_centre(box)), 0);
+      write_packed(t - std::exchange(runs[run].first, t), to[run]);
     }
+    runs = {};
   });
 }
 
-void TriangleBins::make_clusters(RunContext& context) {
-  first_cluster_.resize(bins_.size() + 1);
-  std::uint32_t total = 0;
-  for (std::size_t bin = 0; bin < bins_.size(); ++bin) {
-    first_cluster_[bin] = total;
-    total += std::uint32_t((first_[bin + 1] - first_[bin] + kClusterSize - 1) / kClusterSize);
+/// Across x unless another side is much longer: blocks are numbered along x first, so that those who ask for
+/// them in their order stay in a slab for long.
+void TriangleBins::choose_slabs() {
+  place_.resize(bins_.size());
+  std::array<std::map<std::int32_t, std::size_t>, 3> layers;  // how many triangles
+  for (std::size_t bin = 0; bin < bins_.size(); ++bin)
+    for (std::size_t a = 0; a < 3; ++a) layers[a][bin_at_[bin][a]] += count_[bin];
+  for (std::size_t a = 1; a < 3; ++a)
+    if (layers[a].size() > 2 * layers[axis_].size()) axis_ = a;
+  std::size_t left = 0, filed = 0;
+  for (const auto& [layer, count] : layers[axis_]) left += count;
+  const std::size_t share = std::max(kInSlab, (left + kMostSlabs - 1) / kMostSlabs);
+  std::int32_t begin = left == 0 ? 0 : layers[axis_].begin()->first;
+  for (const auto& [layer, count] : layers[axis_]) {
+    filed += count;
+    left -= count;
+    // A slab at least as thick as triangles reach, so that none but its neighbours matter to it.
+    if (left == 0 || filed < share || layer + 1 - begin < rings_) continue;
+    slabs_.push_back({.end = begin = layer + 1, .bins = {}, .files = {}});
+    filed = 0;
   }
-  first_cluster_.back() = total;
-  clusters_.resize(total);
-  const std::vector<BlockAt> blocks = bins_.blocks();
-  const Chunks chunks(bins_.size(), 64);
-  parallel_chunks(chunks, context, [&](std::size_t chunk) {
-    std::vector<Centre> centres, sorted;
-    std::vector<std::uint32_t> cells;
-    for (std::size_t bin = chunks.begin(chunk); bin < chunks.end(chunk); ++bin) {
-      context.check();
-      const std::span<std::uint32_t> triangles(order_.data() + first_[bin], first_[bin + 1] - first_[bin]);
-      if (triangles.size() > kClusterSize) {
-        centres.clear();
-        for (const std::uint32_t t : triangles) {
-          const FloatBox box = box_of(t);
-          centres.push_back({box.low + box.high, t});
-        }
-        if (centres.size() > kMany) {
-          sort_by_cell(centres, blocks[bin], soup_.scale(), cells, sorted);
-          centres.swap(sorted);
-        } else {
-          make_compact(centres);
-        }
-        std::transform(centres.begin(), centres.end(), triangles.begin(),
-                       [](const Centre& c) { return c.triangle; });
-      }
-      FloatBox* cluster = clusters_.data() + first_cluster_[bin];
-      for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++cluster) {
-        *cluster = box_of(triangles[first]);
-        for (std::size_t i = first + 1; i < std::min(first + kClusterSize, triangles.size()); ++i) {
-          const FloatBox box = box_of(triangles[i]);
-          cluster->low = cluster->low.cwiseMin(box.low);
-          cluster->high = cluster->high.cwiseMax(box.high);
-        }
-      }
-    }
-  });
+  slabs_.push_back({.end = std::numeric_limits<std::int32_t>::max(), .bins = {}, .files = {}});
+  for (std::uint32_t bin = 0; bin < bins_.size(); ++bin) {
+    std::vector<std::uint32_t>& bins = slabs_[slab_of(bin_at_[bin])].bins;
+    place_[bin] = std::uint32_t(bins.size());
+    bins.push_back(bin);
+  }
 }
 
-void TriangleBins::choose_blocks(RunContext& context) {
-  const Chunks bins(bins_.size(), 64);
-  std::vector<BlockSet> sets(bins.count + all_large_.size());
-  parallel_chunks(bins, context, [&](std::size_t chunk) {
-    const std::size_t end = first_cluster_[bins.end(chunk)];
-    for (std::size_t c = first_cluster_[bins.begin(chunk)]; c < end; ++c)
-      for_each_block_near(in_voxels(clusters_[c]), reach_,
+void TriangleBins::choose_blocks(const Survey& survey) {
+  const std::size_t chunks = survey.bins.size();
+  std::vector<BlockSet> sets(2 * chunks);
+  std::vector<Pairs> pairs(chunks);
+  tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {
+    for (const BinRun& run : survey.runs[chunk]) {
+      context_.check();
+      for_each_block_near(run.box.in_voxels(survey.bins[chunk].block(run.code)), reach_,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
-  });
-  // Pairs of a block and a large triangle near it.
-  using Pair = std::pair<std::uint32_t, std::uint32_t>;
-  std::vector<std::vector<Pair>> pairs(all_large_.size());
-  tbb::parallel_for(std::size_t(0), all_large_.size(), [&](std::size_t chunk) {
-    BlockSet& set = sets[bins.count + chunk];
-    for (const std::uint32_t t : all_large_[chunk]) {
-      const VoxelBox box = in_voxels(box_of(t));
-      context.check();
-      const TriangleSlab slab(soup_.corners(t));
-      for_each_block_near(box, reach_, [&](const BlockAt& block) {
-        if (slab.near(block, reach_)) pairs[chunk].emplace_back(set.insert(block), t);
-      });
     }
+    pairs[chunk] = file_large(all_large_[chunk], sets[chunks + chunk]);
   });
   blocks_ = BlockTable(sets);
   first_large_.assign(blocks_.size() + 1, 0);
-  for (std::size_t chunk = 0; chunk < pairs.size(); ++chunk) {
-    const std::vector<std::uint32_t> translation = blocks_.translation(sets[bins.count + chunk]);
-    for (Pair& pair : pairs[chunk]) ++first_large_[pair.first = blocks_.number(translation, pair.first)];
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    const std::vector<std::uint32_t> translation = blocks_.translation(sets[chunks + chunk]);
+    for (auto& [block, triangle] : pairs[chunk]) ++first_large_[block = blocks_.number(translation, block)];
   }
   std::uint64_t total = 0;
   for (std::uint64_t& count : first_large_) total += std::exchange(count, total);
   large_.resize(total);
   std::vector<std::uint64_t> next(first_large_.begin(), first_large_.end() - 1);
-  for (std::vector<Pair>& chunk : pairs) {
-    for (const Pair& pair : chunk) large_[next[pair.first]++] = pair.second;
+  for (Pairs& chunk : pairs) {
+    for (const auto& [block, triangle] : chunk) large_[next[block]++] = triangle;
     chunk = {};
+  }
+  all_large_ = {};
+}
+
+TriangleBins::Pairs TriangleBins::file_large(const std::vector<std::uint32_t>& triangles,
+                                             BlockSet& blocks) const {
+  Pairs pairs;
+  for (const std::uint32_t t : triangles) {
+    context_.check();
+    const TriangleSlab slab(soup_.corners(t));
+    for_each_block_near(in_voxels(box_of(t)), reach_, [&](const BlockAt& block) {
+      if (slab.near(block, reach_)) pairs.emplace_back(blocks.insert(block), t);
+    });
+  }
+  return pairs;
+}
+
+// ---- Clusters.
+
+std::size_t TriangleBins::slab_of(const BlockAt& block) const {
+  std::size_t slab = 0;
+  while (block[axis_] >= slabs_[slab].end && slab + 1 < slabs_.size()) ++slab;
+  return slab;
+}
+
+void TriangleBins::go_to_slab(std::size_t slab) {
+  for (std::size_t i = 0; i < slabs_.size(); ++i)
+    if (i + 1 < slab || i > slab + 1) slabs_[i].files.reset();
+  for (std::size_t i = slab == 0 ? 0 : slab - 1; i < std::min(slab + 2, slabs_.size()); ++i)
+    if (!slabs_[i].files)
+      slabs_[i].files = std::make_unique<Files>(make_files(slabs_[i].bins, Purpose::all_blocks));
+}
+
+void TriangleBins::forget_slabs() {
+  if (slabs_.size() == 1) return;
+  for (Slab& slab : slabs_) slab.files.reset();
+}
+
+std::size_t TriangleBins::bytes_in_memory() const {
+  std::size_t bytes = packed_.size() + bins_.size() * (sizeof(BlockAt) + sizeof(BinBox) + 16);
+  for (const Slab& slab : slabs_)
+    if (slab.files) bytes += 4 * slab.files->order.size() + sizeof(FloatBox) * slab.files->clusters.size();
+  return bytes;
+}
+
+/// The thread's own. They serve few questions, so the triangles stay in the mesh's order: where that goes
+/// along the surface, its sixteens are compact, too.
+const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
+  std::unordered_map<std::uint32_t, Files>& lent = lent_.local();
+  const auto known = lent.find(bin);
+  if (known != lent.end()) return known->second;
+  std::size_t triangles = 0;
+  for (const auto& [other, files] : lent) triangles += files.order.size();
+  if (lent.size() >= kLentBins && triangles > kLentTriangles) lent.clear();
+  return lent.emplace(bin, make_files({bin}, Purpose::few_questions)).first->second;
+}
+
+/// Buffers of one thread.
+struct TriangleBins::Sorter {
+  std::vector<Centre> centres, sorted;
+  std::vector<std::uint32_t> cells;
+};
+
+TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& bins, Purpose purpose) const {
+  Files files;
+  files.first.resize(bins.size() + 1);
+  files.first_cluster.resize(bins.size() + 1);
+  std::uint32_t triangles = 0, clusters = 0;
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    files.first[i] = triangles;
+    files.first_cluster[i] = clusters;
+    triangles += count_[bins[i]];
+    clusters += (count_[bins[i]] + std::uint32_t(kClusterSize) - 1) / std::uint32_t(kClusterSize);
+  }
+  files.first.back() = triangles;
+  files.first_cluster.back() = clusters;
+  files.order.resize(triangles);
+  files.clusters.resize(clusters);
+  const auto some = [&](std::size_t begin, std::size_t end) {
+    Sorter sorter;
+    for (std::size_t i = begin; i < end; ++i) {
+      context_.check();
+      const std::span<std::uint32_t> of_bin(files.order.data() + files.first[i], count_[bins[i]]);
+      unpack(bins[i], of_bin.data());
+      if (purpose == Purpose::all_blocks) sort(bins[i], of_bin, sorter);
+      enclose(of_bin, files.clusters.data() + files.first_cluster[i]);
+    }
+  };
+  if (purpose == Purpose::few_questions) {
+    some(0, bins.size());
+    return files;
+  }
+  const Chunks chunks(bins.size(), 4);
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) { some(chunks.begin(chunk), chunks.end(chunk)); });
+  return files;
+}
+
+void TriangleBins::unpack(std::uint32_t bin, std::uint32_t* to) const {
+  const std::uint8_t* at = packed_.data() + first_byte_[bin];
+  std::uint32_t triangle = 0;
+  for (std::uint32_t i = 0; i < count_[bin]; ++i) {
+    int shift = 0;
+    for (; *at & 128; shift += 7) triangle += std::uint32_t(*at++ & 127) << shift;
+    triangle += std::uint32_t(*at++) << shift;
+    *to++ = triangle;
+  }
+}
+
+/// Orders the triangles of a bin so that each sixteen in a row are close together.
+void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, Sorter& sorter) const {
+  if (triangles.size() <= kClusterSize) return;
+  std::vector<Centre>& centres = sorter.centres;
+  centres.clear();
+  for (const std::uint32_t t : triangles) {
+    const FloatBox box = box_of(t);
+    centres.push_back({box.low + box.high, t});
+  }
+  if (centres.size() > kMany) {
+    sort_by_cell(centres, bin_at_[bin], soup_.scale(), sorter.cells, sorter.sorted);
+    centres.swap(sorter.sorted);
+  } else {
+    make_compact(centres);
+  }
+  std::transform(centres.begin(), centres.end(), triangles.begin(),
+                 [](const Centre& c) { return c.triangle; });
+}
+
+void TriangleBins::enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const {
+  for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++clusters) {
+    *clusters = box_of(triangles[first]);
+    for (std::size_t i = first + 1; i < std::min(first + kClusterSize, triangles.size()); ++i) {
+      const FloatBox box = box_of(triangles[i]);
+      clusters->low = clusters->low.cwiseMin(box.low);
+      clusters->high = clusters->high.cwiseMax(box.high);
+    }
   }
 }
 

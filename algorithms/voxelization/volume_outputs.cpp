@@ -12,6 +12,8 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/memory_estimate.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/vdb_archive.h"
+#include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/voxelization/surface_transfer.h"
 
@@ -78,8 +80,8 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   return grid;
 }
 
-HermiteGrid make_hermite(const openvdb::FloatGrid::Ptr& sdf, const PolygonMesh& mesh, RunContext& context) {
-  return sample_polygons(BlockGrid(make_level_set(sdf), 0.0, context), mesh, context);
+FloatHermite make_hermite(const openvdb::FloatGrid::Ptr& sdf, const PolygonMesh& mesh, RunContext& context) {
+  return sample_polygons(make_level_set(sdf), 0.0, mesh, context);
 }
 
 // ---- What is asked for.
@@ -111,7 +113,7 @@ void check_signs(const VolumeRequest& request, bool is_signed) {
 double bytes_of_outputs(const VolumeRequest& request, const std::vector<const MeshAttribute*>& attributes,
                         double leaves) {
   std::size_t bytes = (request.udf ? 4 : 0) + (request.fog ? 4 : 0) +
-                      (request.hermite ? sizeof(HermiteVoxel) : 0) +
+                      (request.hermite ? sizeof(FloatVoxel) : 0) +
                       (request.closest_point ? sizeof(openvdb::Vec3d) : 0);
   for (const MeshAttribute* attribute : attributes) bytes += bytes_per_voxel(*attribute);
   if (request.triangle_id || request.closest_point || !attributes.empty()) bytes += 4;
@@ -134,17 +136,6 @@ void check_fits(const PolygonMesh& mesh, const VoxelizeOptions& options, const V
       "--voxel-size or narrower bands.",
       needed / kGiB, double(*available) / kGiB);
   throw Error(text);
-}
-
-void write_grids(const std::filesystem::path& target, const AtomicFile& file,
-                 const std::vector<openvdb::GridBase::Ptr>& grids) {
-  try {
-    openvdb::io::File out(file.path().string());
-    out.write(grids);
-    out.close();
-  } catch (const openvdb::Exception& e) {
-    throw Error(target.string() + " cannot be written (" + e.what() + ")");
-  }
 }
 
 }  // namespace
@@ -216,13 +207,13 @@ void write_volume_outputs(const std::filesystem::path& path, const VolumeOutputs
                           RunContext& context) {
   const Stage stage(context, "write volumes");
   AtomicFile volumes(path);
-  write_grids(path, volumes, outputs.grids);
+  write_sealed(volumes.path(), openvdb::GridCPtrVec(outputs.grids.begin(), outputs.grids.end()), path);
   if (!outputs.hermite) {
     volumes.commit();
     return;
   }
   AtomicFile hermite(hermite_path(path));
-  outputs.hermite->write(hermite.path(), context);
+  write_hermite(hermite.path(), *outputs.hermite, context);
   commit_together(hermite, volumes);
 }
 

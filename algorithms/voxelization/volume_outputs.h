@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/hermite/hermite_grid.h"
+#include "algorithms/hermite/sparse_hermite.h"
 #include "algorithms/voxelization/voxelize.h"
 
 namespace hermesh {
@@ -40,7 +40,7 @@ struct VolumeOutputs {
   /// set), "udf" and "fog" (fog volume, background 0, active where above 0), int32 "triangle-id", vec3d
   /// "closest-point", attributes.
   std::vector<openvdb::GridBase::Ptr> grids;
-  std::optional<HermiteGrid> hermite;
+  std::optional<FloatHermite> hermite;
   std::size_t active_voxels = 0;  ///< of the band
 };
 

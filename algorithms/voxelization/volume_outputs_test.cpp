@@ -251,16 +251,14 @@ TEST_F(VolumeOutputsTest, HermiteDataHasExactHits) {
   ASSERT_TRUE(outputs.hermite);
   EXPECT_TRUE(find<openvdb::FloatGrid>(outputs, "sdf"));
   std::size_t edges = 0;
-  for (const HermiteBlock& block : outputs.hermite->blocks())
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(block.crossing[axis], [&](int sample) {
-        const std::array local = {sample >> 6, (sample >> 3) & 7, sample & 7};
-        const int index = block.lower[axis] + local[std::size_t(axis)];
-        const HermiteVoxel& voxel = block.voxels[sample];
-        EXPECT_NEAR(std::abs((index + voxel.offset[axis]) * 0.3), 1.0, 1e-6);
-        EXPECT_NEAR(std::abs(voxel.normal[axis][axis]), 1.0, 1e-6);
-        ++edges;
-      });
+  for (std::size_t leaf = 0; leaf < outputs.hermite->leaves.size(); ++leaf)
+    for_each_crossing(*outputs.hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+      const std::array local = {sample >> 6, (sample >> 3) & 7, sample & 7};
+      const int index = outputs.hermite->leaves[leaf].lower[axis] + local[std::size_t(axis)];
+      EXPECT_NEAR(std::abs((index + crossing.offset) * 0.3), 1.0, 1e-6);
+      EXPECT_NEAR(std::abs(crossing.normal[axis]), 1.0, 1e-6);
+      ++edges;
+    });
   EXPECT_EQ(edges, 6u * 7u * 7u);  // indices −3 to 3 are inside
 }
 

@@ -8,9 +8,15 @@
 #include "algorithms/voxelization/band.h"
 #include "algorithms/voxelization/inner_sheets.h"
 #include "algorithms/voxelization/signs.h"
+#include "algorithms/voxelization/wide_band.h"
 
 namespace hermesh {
 namespace {
+
+/// Where a band is wider than `kWide` voxels, the triangles look for the voxels within `kNear` alone, which
+/// is as far as they get by looking at the blocks next to theirs, and each voxel beyond looks for its
+/// triangle.
+constexpr double kWide = 16.0, kNear = 6.0;
 
 /// Widths of the band in world units.
 struct Widths {
@@ -38,11 +44,11 @@ PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_
 }
 
 /// Takes the smaller distance of each voxel.
-void lower(FloatLeaf& leaf, const FloatLeaf& other) {
-  float* values = leaf.buffer().data();
-  for (unsigned i = 0; i < 512; ++i) values[i] = std::min(values[i], other.buffer().data()[i]);
+void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
+  float* own = leaf.buffer().data();
+  for (unsigned i = 0; i < 512; ++i) own[i] = std::min(own[i], values[i]);
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
-  mask |= other.getValueMask();
+  for (openvdb::Index x = 0; x < 8; ++x) mask.getWord<openvdb::Index64>(x) |= active[x];
   leaf.setValueMask(mask);
 }
 
@@ -51,13 +57,15 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
               RunContext& context) {
   const PolygonMesh caps = to_mesh(signs.caps, voxel_size);
   const IndexSoup soup(caps, voxel_size);
-  const TriangleBins bins(soup, reach, context);
-  Band near_caps = compute_band(soup, bins, reach, voxel_size, false, context);
+  TriangleBins bins(soup, reach, context);
+  Band near_caps = compute_band(soup, bins, {.reach = reach, .voxel_size = voxel_size}, context);
   for (std::size_t i = 0; i < near_caps.blocks.size(); ++i) {
     if (!near_caps.leaves[i]) continue;
     const std::uint32_t known = table.find(near_caps.blocks[i]);
     if (known != BlockTable::kNone && band.leaves[known]) {
-      lower(*band.leaves[known], *near_caps.leaves[i]);
+      FloatLeaf& cap = *near_caps.leaves[i];
+      FloatLeaf::NodeMaskType mask = cap.getValueMask();
+      lower(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
       continue;
     }
     band.leaves.push_back(std::move(near_caps.leaves[i]));
@@ -71,47 +79,51 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
   }
 }
 
-/// Gives the voxels inside the values of `other`, which may be null where nothing is near.
-void replace_inside(FloatLeaf& leaf, const FloatLeaf* other, const VoxelBits& inside, float reach) {
+bool has(const VoxelBits& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
+
+/// Gives the voxels inside the values of `other`.
+void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   for (unsigned i = 0; i < 512; ++i) {
-    if (!(inside[i >> 6] >> (i & 63) & 1)) continue;
-    leaf.buffer().data()[i] = other ? other->buffer().data()[i] : reach;
-    mask.set(i, other && other->isValueOn(i));
+    if (!has(inside, i)) continue;
+    leaf.buffer().data()[i] = other.any ? other.values[i] : reach;
+    mask.set(i, other.any && (other.active[i >> 6] >> (i & 63) & 1));
   }
   leaf.setValueMask(mask);
 }
 
-/// Distances of the voxels inside, once more without what does not bound the solid.
-void leave_out_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Signs& signs,
-                            double voxel_size, double reach, Band& band, RunContext& context) {
-  const InnerSheets sheets = find_inner_sheets(soup, bins, band, signs.inside, reach, voxel_size, context);
-  if (sheets.triangles.empty()) return;
-  std::vector<std::unique_ptr<LeafTriangles>> nearest;
-  const bool ids = !band.nearest.empty();
-  const auto leaves = recompute_leaves(soup, bins, band, sheets.blocks, sheets.triangles, reach, voxel_size,
-                                       ids ? &nearest : nullptr, context);
-  for (std::uint32_t i = 0; i < sheets.blocks.size(); ++i) {
-    const std::uint32_t block = sheets.blocks[i];
-    if (!band.leaves[block]) continue;
-    replace_inside(*band.leaves[block], leaves[i].get(), signs.inside[block], float(reach * voxel_size));
-    if (ids && nearest[i])
+/// Distances of the voxels inside, once more without what does not bound the solid. Leaf by leaf, since all
+/// of the new ones at once could outweigh a small volume.
+InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
+                                   BandWork work, Band& band, RunContext& context) {
+  InnerSheets sheets =
+      find_inner_sheets(soup, bins, band, signs.inside, work.reach, work.voxel_size, context);
+  if (sheets.triangles.empty()) return sheets;
+  work.blocks = &sheets.blocks;
+  work.without = &sheets.triangles;
+  find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
+    if (!band.leaves[found.block]) return;
+    const VoxelBits& inside = signs.inside[found.block];
+    replace_inside(*band.leaves[found.block], found, inside, float(work.reach * work.voxel_size));
+    if (!work.nearest || !found.any) return;
+    for (unsigned v = 0; v < 512; ++v)
+      if (has(inside, v)) (*band.nearest[found.block])[v] = found.nearest[v];
+  });
+  if (sheets.pieces.triangles.empty()) return sheets;
+  const IndexSoup pieces(sheets.pieces, work.voxel_size);
+  TriangleBins piece_bins(pieces, work.reach, context);
+  work.blocks = work.without = nullptr;
+  const std::vector<BlockAt> at = piece_bins.blocks().blocks();
+  find_leaves(pieces, piece_bins, work, context, [&](const FoundLeaf& found) {
+    const std::uint32_t block = found.any ? bins.blocks().find(at[found.block]) : BlockTable::kNone;
+    if (block == BlockTable::kNone || !band.leaves[block]) return;
+    if (work.nearest)
       for (unsigned v = 0; v < 512; ++v)
-        if (signs.inside[block][v >> 6] >> (v & 63) & 1) (*band.nearest[block])[v] = (*nearest[i])[v];
-  }
-  if (sheets.pieces.triangles.empty()) return;
-  const IndexSoup pieces(sheets.pieces, voxel_size);
-  const TriangleBins piece_bins(pieces, reach, context);
-  const Band near_pieces = compute_band(pieces, piece_bins, reach, voxel_size, ids, context);
-  for (std::size_t i = 0; i < near_pieces.blocks.size(); ++i) {
-    const std::uint32_t block = bins.blocks().find(near_pieces.blocks[i]);
-    if (!near_pieces.leaves[i] || block == BlockTable::kNone || !band.leaves[block]) continue;
-    if (ids)
-      for (unsigned v = 0; v < 512; ++v)
-        if (near_pieces.leaves[i]->buffer().data()[v] < band.leaves[block]->buffer().data()[v])
-          (*band.nearest[block])[v] = std::int32_t(sheets.parents[std::size_t((*near_pieces.nearest[i])[v])]);
-    lower(*band.leaves[block], *near_pieces.leaves[i]);
-  }
+        if (found.values[v] < band.leaves[block]->buffer().data()[v])
+          (*band.nearest[block])[v] = std::int32_t(sheets.parents[std::size_t(found.nearest[v])]);
+    lower(*band.leaves[block], found.values, found.active);
+  });
+  return sheets;
 }
 
 openvdb::math::Transform::Ptr placement(const PolygonMesh& mesh, double voxel_size) {
@@ -146,18 +158,97 @@ openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool
   return grid;
 }
 
-/// False when there is no inside.
-bool sign(const IndexSoup& soup, const VoxelizeOptions& options, double reach, const TriangleBins& bins,
-          const Widths& widths, Band& band, RunContext& context) {
-  Signs signs = find_signs(soup, options.signs, bins, band, reach, context);
-  if (!signs.usable) return false;
-  leave_out_inner_sheets(soup, bins, signs, options.voxel_size, reach, band, context);
-  if (!signs.caps.empty()) add_caps(signs, options.voxel_size, reach, bins.blocks(), band, context);
+/// What the search for the sides found, beside the sides.
+struct Boundary {
+  bool is_signed = false;  ///< false when there is no inside
+  InnerSheets sheets;
+  std::vector<TriangleCorners> caps;
+};
+
+Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, TriangleBins& bins,
+              const Widths& widths, Band& band, RunContext& context) {
+  const Stage stage(context, "signs");
+  Signs signs = find_signs(soup, rule, bins, band, work.reach, context);
+  if (!signs.usable) return {};
+  Boundary boundary{.is_signed = true,
+                    .sheets = leave_out_inner_sheets(soup, bins, signs, work, band, context),
+                    .caps = {}};
+  if (!signs.caps.empty()) add_caps(signs, work.voxel_size, work.reach, bins.blocks(), band, context);
   const kernels::Kernels& kernels = kernels::chosen();
   parallel_blocks(band.leaves.size(), context, [&](std::size_t i) {
     if (band.leaves[i]) sign_leaf(*band.leaves[i], signs.inside[i], widths, kernels);
   });
-  return true;
+  boundary.caps = std::move(signs.caps);
+  return boundary;
+}
+
+/// The mesh's triangles without the inner ones, the outer pieces of those, and the caps of its holes.
+BoundaryTriangles boundary_triangles(const IndexSoup& soup, const Boundary& boundary) {
+  BoundaryTriangles result;
+  result.points = soup.mesh().points;
+  auto inner = boundary.sheets.triangles.begin();
+  for (std::uint32_t t = 0; t < soup.size(); ++t) {
+    if (inner != boundary.sheets.triangles.end() && *inner == t) {
+      ++inner;
+      continue;
+    }
+    result.triangles.push_back(soup.triangle(t));
+    result.ids.push_back(std::int32_t(t));
+  }
+  const auto add = [&](const PolygonMesh& mesh, const std::vector<std::uint32_t>& parents) {
+    const std::uint32_t first = std::uint32_t(result.points.size());
+    result.points.insert(result.points.end(), mesh.points.begin(), mesh.points.end());
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      const auto [a, b, c] = mesh.triangles[i];
+      result.triangles.push_back({first + a, first + b, first + c});
+      result.ids.push_back(parents.empty() ? -1 : std::int32_t(parents[i]));
+    }
+  };
+  add(boundary.sheets.pieces, boundary.sheets.parents);
+  add(to_mesh(boundary.caps, 1.0 / soup.scale()), {});
+  return result;
+}
+
+Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& options, const BandWidths& near,
+                             RunContext& context) {
+  const BandWidths wide{options.exterior_band, options.interior_band};
+  const BandWork work{.reach = std::max(near.exterior, near.interior),
+                      .voxel_size = options.voxel_size,
+                      .nearest = options.nearest};
+  const IndexSoup soup(mesh, options.voxel_size);
+  std::optional<TriangleBins> bins;
+  {
+    const Stage stage(context, "triangles to blocks");
+    bins.emplace(soup, work.reach, context);
+  }
+  Band band;
+  {
+    const Stage stage(context, "distances");
+    band = compute_band(soup, *bins, work, context);
+  }
+  Boundary boundary;
+  if (options.signs != SignRule::none) {
+    const Widths widths{float(near.exterior * options.voxel_size), float(near.interior * options.voxel_size)};
+    boundary = sign(soup, options.signs, work, *bins, widths, band, context);
+  }
+  bins.reset();
+  Voxelization result;
+  result.is_signed = boundary.is_signed;
+  {
+    const Stage stage(context, "tree");
+    const Widths widths{float(wide.exterior * options.voxel_size), float(wide.interior * options.voxel_size)};
+    if (options.nearest) result.nearest = assemble_nearest(band);
+    result.distance = assemble_distance(band, widths, result.is_signed);
+  }
+  if (result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior)) {
+    const Stage stage(context, "wide band");
+    band = {};
+    widen_band(boundary_triangles(soup, boundary), options.voxel_size, near, wide, *result.distance,
+               result.nearest.get(), context);
+  }
+  result.distance->setTransform(placement(mesh, options.voxel_size));
+  if (result.nearest) result.nearest->setTransform(placement(mesh, options.voxel_size));
+  return result;
 }
 
 }  // namespace
@@ -165,33 +256,16 @@ bool sign(const IndexSoup& soup, const VoxelizeOptions& options, double reach, c
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
   initialize_openvdb();
-  const Widths widths{float(options.exterior_band * options.voxel_size),
-                      float(options.interior_band * options.voxel_size)};
-  const double reach = std::max(options.exterior_band, options.interior_band);
-  const IndexSoup soup(mesh, options.voxel_size);
-  bool is_signed = false;
-  std::optional<TriangleBins> bins;
-  {
-    const Stage stage(context, "triangles to blocks");
-    bins.emplace(soup, reach, context);
-  }
-  Band band;
-  {
-    const Stage stage(context, "distances");
-    band = compute_band(soup, *bins, reach, options.voxel_size, options.nearest, context);
-  }
-  {
-    const Stage stage(context, "signs");
-    is_signed = options.signs != SignRule::none && sign(soup, options, reach, *bins, widths, band, context);
-  }
-  const Stage stage(context, "tree");
-  Voxelization result;
-  if (options.nearest) result.nearest = assemble_nearest(band);
-  result.distance = assemble_distance(band, widths, is_signed);
-  result.is_signed = is_signed;
-  result.distance->setTransform(placement(mesh, options.voxel_size));
-  if (result.nearest) result.nearest->setTransform(placement(mesh, options.voxel_size));
-  return result;
+  const BandWidths wide{options.exterior_band, options.interior_band};
+  if (options.signs == SignRule::none || std::max(wide.exterior, wide.interior) <= kWide)
+    return voxelize_within(mesh, options, wide, context);
+  Voxelization result = voxelize_within(
+      mesh, options, {std::min(wide.exterior, kNear), std::min(wide.interior, kNear)}, context);
+  if (result.is_signed) return result;
+  // Without an inside there is one width for all.
+  VoxelizeOptions unsigned_options = options;
+  unsigned_options.signs = SignRule::none;
+  return voxelize_within(mesh, unsigned_options, wide, context);
 }
 
 }  // namespace hermesh

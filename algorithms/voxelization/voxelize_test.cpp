@@ -219,6 +219,24 @@ TEST(Voxelize, UnionOfOverlappingSpheres) {
   EXPECT_LT(worst, 0.15) << "facets are 0.03 off the spheres, and seams may be 0.1 off";
 }
 
+TEST(Voxelize, WallsOfAGapStayWhereInnerSheetsGo) {
+  // Two boxes with a gap of 0.3 voxels that no voxel lies in, and a bar across it, above z = 5.2. The walls
+  // of the gap bound the solid below the bar, and are inside it within the bar: both are two sheets on the
+  // same edge.
+  PolygonMesh mesh = box({-20, -10.2, -10.2}, {0.35, 10.2, 10.2});
+  PolygonMesh right = box({0.65, -10.2, -10.2}, {20, 10.2, 10.2}), bar = box({-8.5, -30, 5.2}, {9.5, 30, 15});
+  append(mesh, right);
+  append(mesh, bar);
+  const Voxelization v = run(mesh);
+  EXPECT_NEAR(at(v, 0, 0, 0), -0.35, 1e-5);
+  EXPECT_NEAR(at(v, 1, 0, 0), -0.35, 1e-5);
+  EXPECT_NEAR(at(v, 0, 3, -6), -0.35, 1e-5);
+  EXPECT_FLOAT_EQ(at(v, 0, 0, 9), -3.0f);
+  EXPECT_FLOAT_EQ(at(v, 1, 0, 9), -3.0f);
+  EXPECT_FALSE(v.distance->tree().isValueOn({0, 0, 9}));
+  EXPECT_NEAR(at(v, 0, 0, 7), -std::hypot(0.35, 1.8), 0.1) << "the bar's bottom above the gap";
+}
+
 TEST(Voxelize, NestedShellsAreFilledOrKept) {
   PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
   append(mesh, sphere({0, 0, 0}, 10.0), true);

@@ -297,13 +297,14 @@ double WindingNumber::at(const Eigen::Vector3d& p) const {
   return value;
 }
 
-void WindingNumber::at(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
+void WindingNumber::evaluate(std::span<const Eigen::Vector3d> points, std::span<float> values,
+                             double far) const {
   for (std::size_t first = 0; first < points.size(); first += kMaxBatch) {
     const std::size_t count = std::min(kMaxBatch, points.size() - first);
     if (multipoles_.empty())
       std::fill_n(values.begin() + first, count, 0.0f);
     else
-      Batch(tree_, multipoles_, turns_, far_, points.subspan(first, count))
+      Batch(tree_, multipoles_, turns_, far, points.subspan(first, count))
           .evaluate(values.subspan(first, count));
   }
 }

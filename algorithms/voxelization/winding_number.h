@@ -33,11 +33,19 @@ class WindingNumber {
   /// At many points near each other, such as a block's samples in any order: they share one descent.
   /// Positions count to 1e-7 of the extent of each 512 consecutive points.
   /// @param values as many as points
-  void at(std::span<const Eigen::Vector3d> points, std::span<float> values) const;
+  void at(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
+    evaluate(points, values, far_);
+  }
+  /// The same with an error that is some sixty times smaller, in ten times the time or more.
+  void at_finely(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
+    evaluate(points, values, 4.0 * far_);
+  }
 
   std::size_t byte_size() const { return multipoles_.size() * sizeof(winding::Multipole); }
 
  private:
+  void evaluate(std::span<const Eigen::Vector3d> points, std::span<float> values, double far) const;
+
   const TriangleTree& tree_;
   std::span<const std::int8_t> turns_;
   double far_;

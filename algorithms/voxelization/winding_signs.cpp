@@ -11,6 +11,8 @@ namespace {
 
 /// Components whose winding number is this near ½ have every voxel asked.
 constexpr float kDoubt = 0.25f;
+/// Voxels whose number is this near ½, twice its error, are asked once more.
+constexpr float kError = 0.02f;
 
 using Samples = std::array<float, 512>;  ///< winding numbers of a block, in OpenVDB's order
 
@@ -36,8 +38,8 @@ struct Asked {
 class WindingSigns {
  public:
   WindingSigns(const WindingNumber& winding, const BlockTable& table, const Band& band,
-               const Regions& regions, const RunContext& context)
-      : winding_(winding), table_(table), band_(band), regions_(regions), context_(context) {}
+               const Regions& regions, bool open, const RunContext& context)
+      : winding_(winding), table_(table), band_(band), regions_(regions), open_(open), context_(context) {}
 
   /// `rings`: how many blocks away from a cap its distance matters.
   Signs run(int rings) {
@@ -79,13 +81,27 @@ class WindingSigns {
   bool sure(std::uint32_t component) const { return std::abs(value_[component] - 0.5f) > kDoubt; }
   bool side(std::uint32_t component) const { return value_[component] > 0.5f; }
 
+  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the
+  /// number is another one there, and changes within the component.
+  bool goes_round(std::uint32_t block, std::uint32_t component) const {
+    const VoxelBits& voxels = regions_.components[component].voxels;
+    const auto& crossed = band_.crossed[block].word;
+    for (std::size_t x = 0; x < 8; ++x) {
+      const std::uint64_t v = voxels[x];
+      if ((crossed[0][x] & v & (x < 7 ? voxels[x + 1] : 0)) || (crossed[1][x] & v & v >> 8 & kBelowTopY) ||
+          (crossed[2][x] & v & v >> 1 & kBelowTopZ))
+        return true;
+    }
+    return false;
+  }
+
   /// Blocks with a component in doubt, or next to one on the other side although no triangle is between.
   std::vector<BlockAt> doubtful_blocks() const {
     std::vector<char> doubtful(band_.blocks.size(), 0);
     BlockFinder finder(table_);
     for (std::uint32_t i = 0; i < doubtful.size(); ++i) {
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-        if (!sure(c)) doubtful[i] = 1;
+        if (!sure(c) || (open_ && goes_round(i, c))) doubtful[i] = 1;
       for (int axis = 0; axis < 3; ++axis) {
         BlockAt at = band_.blocks[i];
         ++at[std::size_t(axis)];
@@ -111,6 +127,19 @@ class WindingSigns {
     return false;
   }
 
+  void ask_again(const BlockAt& block, Samples& values) const {
+    std::vector<Eigen::Vector3d> points;
+    std::vector<unsigned> places;
+    for (unsigned place = 0; place < 512; ++place)
+      if (std::abs(values[place] - 0.5f) < kError) {
+        points.push_back(voxel_at(block, place));
+        places.push_back(place);
+      }
+    std::vector<float> again(points.size());
+    winding_.at_finely(points, again);
+    for (std::size_t i = 0; i < places.size(); ++i) values[places[i]] = again[i];
+  }
+
   void ask(const std::vector<BlockAt>& blocks) {
     std::vector<Asked> found(blocks.size());
     tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
@@ -119,6 +148,7 @@ class WindingSigns {
       for (unsigned place = 0; place < 512; ++place) points[place] = voxel_at(blocks[i], place);
       found[i].winding = std::make_unique<Samples>();
       winding_.at(points, *found[i].winding);
+      ask_again(blocks[i], *found[i].winding);
       for (unsigned place = 0; place < 512; ++place)
         found[i].inside[place >> 6] |= std::uint64_t((*found[i].winding)[place] > 0.5f) << (place & 63);
     });
@@ -290,6 +320,7 @@ class WindingSigns {
   const BlockTable& table_;
   const Band& band_;
   const Regions& regions_;
+  bool open_;
   const RunContext& context_;
   std::vector<float> value_;  ///< of each component
   std::map<BlockAt, Asked> asked_;
@@ -298,8 +329,8 @@ class WindingSigns {
 }  // namespace
 
 Signs winding_signs(const WindingNumber& winding, const BlockTable& table, const Band& band,
-                    const Regions& regions, double reach, const RunContext& context) {
-  return WindingSigns(winding, table, band, regions, context).run(int(std::ceil(reach / 8.0)));
+                    const Regions& regions, bool open, double reach, const RunContext& context) {
+  return WindingSigns(winding, table, band, regions, open, context).run(int(std::ceil(reach / 8.0)));
 }
 
 }  // namespace hermesh

@@ -9,8 +9,9 @@ namespace hermesh {
 
 /// Inside where `winding` is above ½. Where neighbouring components disagree or the number is near ½, as it
 /// is around a hole, every voxel is asked; the surface of the value ½ across the hole is followed through
-/// space without blocks and returned as the caps.
+/// space without blocks and returned as the caps. `open`: whether the surface may have holes at all; a closed
+/// one is not searched for their rims.
 Signs winding_signs(const WindingNumber& winding, const BlockTable& table, const Band& band,
-                    const Regions& regions, double reach, const RunContext& context);
+                    const Regions& regions, bool open, double reach, const RunContext& context);
 
 }  // namespace hermesh

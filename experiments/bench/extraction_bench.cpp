@@ -10,14 +10,13 @@
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/variants.h"
+#include "experiments/bench/failures.h"
 #include "experiments/bench/sphere_level_set.h"
 #include "reference/variants.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
-
-int failures = 0;  // SkipWithError leaves Google Benchmark's own exit code at 0
 
 const LevelSet& sphere(int resolution) {
   static std::map<int, LevelSet> cache;

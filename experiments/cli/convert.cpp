@@ -84,7 +84,7 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
   const ChosenExtractor chosen = choose_extractor(arguments);
   check_mesh_output(paths.out);
   std::optional<PolygonMesh> source;
-  if (!arguments.source.empty()) source = read_mesh(arguments.source, session.context);
+  if (!arguments.source.empty()) source = read_polygons(arguments.source, session);
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
   save(paths.out, extract(level_set, source ? &*source : nullptr, chosen, arguments.isovalue, session),
        session);
@@ -96,7 +96,7 @@ int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const Ex
   const ChosenVoxelizer voxelizer = choose_voxelizer(voxelizing);
   const ChosenExtractor chosen = choose_extractor(extracting);
   check_mesh_output(paths.out);
-  const PolygonMesh mesh = read_mesh(paths.in, session.context);
+  const PolygonMesh mesh = read_polygons(paths.in, session);
   const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
   save(paths.out, extract(level_set, &mesh, chosen, extracting.isovalue, session), session);
   return kDone;

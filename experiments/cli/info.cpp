@@ -5,6 +5,7 @@
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/core/vdb_file.h"
+#include "algorithms/hermite/hermite_file.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 
@@ -41,11 +42,28 @@ void print_grid(const GridSummary& grid) {
             << " bytes\n";
 }
 
-void print_volume(const std::filesystem::path& path) {
+/// What describe_vdb() cannot tell of grids that hold Hermite data.
+void print_hermite(const std::filesystem::path& path, RunContext& context) {
+  const HermiteSummary hermite = summary_of(read_hermite(path, context));
+  std::cout << "Hermite data\n  voxels       " << hermite.representation << "\n  normals      " << hermite.normal_code
+            << "\n  crossings    " << hermite.crossings << ", in " << hermite.leaves << " leaves\n  memory       "
+            << hermite.memory_bytes << " bytes";
+  if (hermite.crossings > 0)
+    std::cout << ", " << text(static_cast<double>(hermite.memory_bytes) / static_cast<double>(hermite.crossings))
+              << " a crossing";
+  std::cout << '\n';
+}
+
+void print_volume(const std::filesystem::path& path, RunContext& context) {
   const std::vector<GridSummary> grids = describe_vdb(path);
   std::cout << "file           " << path.string() << "\nkind           OpenVDB, " << grids.size()
             << (grids.size() == 1 ? " grid\n" : " grids\n");
-  for (const GridSummary& grid : grids) print_grid(grid);
+  bool has_hermite = false;
+  for (const GridSummary& grid : grids) {
+    print_grid(grid);
+    has_hermite |= grid.name == "hermite_signs" || grid.value_type.find("hermite_") != std::string::npos;
+  }
+  if (has_hermite) print_hermite(path, context);
 }
 
 }  // namespace
@@ -60,7 +78,7 @@ void add_info(CLI::App& app, Session& session) {
       if (is_mesh_path(path))
         print_mesh(path, session.context);
       else if (path.extension() == ".vdb")
-        print_volume(path);
+        print_volume(path, session.context);
       else
         throw Error("cannot tell what '" + *file + "' is: its name ends neither in .vdb nor in " +
                     ".ply, .obj, .off or .stl (.gz may follow)");

@@ -4,6 +4,7 @@
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/core/vdb_file.h"
+#include "algorithms/voxelization/grid_frame.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 #include "algorithms/voxelization/volume_outputs.h"
 #include "experiments/cli/output_path.h"
@@ -20,6 +21,15 @@ struct Arguments {
   bool fog_exterior = false;
 };
 
+/// @throws Error
+void check_like(const Arguments& arguments, const VolumeRequest& request) {
+  if (!arguments.voxelizing.like) return;
+  if (arguments.voxelizing.voxelizer != "hermesh")
+    throw Error("only the voxelizer hermesh takes --like, not " + arguments.voxelizing.voxelizer);
+  if (request.hermite || request.any_attributes())
+    throw Error("--like makes the grids sdf, udf, fog, triangle-id and closest-point alone");
+}
+
 VolumeRequest requested(const Arguments& arguments) {
   return as_usage([&] {
     VolumeRequest request = parse_volume_request(arguments.grids);
@@ -29,6 +39,7 @@ VolumeRequest requested(const Arguments& arguments) {
     if (arguments.voxelizing.voxelizer != "hermesh" && !request.only_sdf())
       throw Error("only the voxelizer hermesh makes other --grids than sdf, not " +
                   arguments.voxelizing.voxelizer);
+    check_like(arguments, request);
     return request;
   });
 }
@@ -43,17 +54,28 @@ std::string names_of(const std::vector<openvdb::GridBase::Ptr>& grids) {
 void write_outputs(const Arguments& arguments, const VolumeRequest& request, const ChosenVoxelizer& chosen,
                    Session& session) {
   const Paths& paths = arguments.paths;
-  const PolygonMesh mesh = read_mesh(paths.in, session.context, {.attributes = request.any_attributes()});
-  const VoxelizationInput input = voxelization_input(mesh, paths.in, arguments.voxelizing, chosen, session);
+  PolygonMesh mesh = read_polygons(paths.in, session, {.attributes = request.any_attributes()});
+  VoxelizeArguments voxelizing = arguments.voxelizing;
+  GridFrame frame;
+  std::array<int, 3> first{};
+  if (voxelizing.like) {
+    frame = read_grid_frame(*voxelizing.like);
+    voxelizing.voxel_size = frame.voxel_size;
+    FramedMesh framed = into_frame(mesh, frame);
+    mesh = std::move(framed.mesh);
+    first = framed.first;
+  }
+  const VoxelizationInput input = voxelization_input(mesh, paths.in, voxelizing, chosen, session);
   const Stopwatch watch;
   const VolumeOutputs outputs = make_volume_outputs(mesh, voxelize_options(input), request, session.context);
+  if (voxelizing.like) out_of_frame(outputs.grids, frame, first);
   session.context.check();
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
   write_volume_outputs(paths.out, outputs, session.context);
   print_summary(session, "wrote " + paths.out + ": " + names_of(outputs.grids));
   if (outputs.hermite)
     print_summary(session, "wrote " + hermite_path(paths.out).string() + ": hermite, " +
-                               std::to_string(outputs.hermite->crossing_edges()) + " crossing edges");
+                               std::to_string(outputs.hermite->crossings.size()) + " crossing edges");
 }
 
 int run_voxelize(const Arguments& arguments, Session& session) {
@@ -64,7 +86,7 @@ int run_voxelize(const Arguments& arguments, Session& session) {
   if (chosen.voxelizer.name == "hermesh") {
     write_outputs(arguments, request, chosen, session);
   } else {
-    const PolygonMesh mesh = read_mesh(arguments.paths.in, session.context);
+    const PolygonMesh mesh = read_polygons(arguments.paths.in, session);
     const LevelSet level_set = voxelize(mesh, arguments.paths.in, arguments.voxelizing, chosen, session);
     write_level_set(arguments.paths.out, level_set, session.context);
   }
@@ -79,7 +101,7 @@ void add_voxelize(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
   add_paths(*command, arguments->paths, kMeshIn, "Volumes: .vdb");
-  add_voxelize_options(*command, arguments->voxelizing);
+  add_voxelize_options(*command, arguments->voxelizing, true);
   command->add_option(
       "--grids", arguments->grids,
       "Which volumes, separated by commas: sdf (the default), udf, closest-point, triangle-id, fog, "

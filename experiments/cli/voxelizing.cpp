@@ -7,6 +7,7 @@
 #include <map>
 
 #include "algorithms/core/memory_estimate.h"
+#include "algorithms/voxelization/quad_diagonals.h"
 #include "experiments/cli/format.h"
 #include "experiments/harness.h"
 
@@ -38,13 +39,18 @@ void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std
   command.add_option("OUT", paths.out, out)->required();
 }
 
-void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments) {
-  // Exactly one of the two, or the program would have to guess a size.
+void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
+  // Exactly one of them, or the program would have to guess a size.
   CLI::Option_group* size = command.add_option_group("Voxel size, exactly one of");
   size->add_option("--voxel-size", arguments.voxel_size, "Edge of a voxel in world units")
       ->check(at_least(std::numeric_limits<double>::min(), "a finite number above 0"));
   size->add_option("--resolution", arguments.resolution, "Voxels along the longest side of the mesh")
       ->check(at_least(1.0, "a whole number of at least 1"));
+  if (with_like)
+    size->add_option(
+        "--like", arguments.like,
+        "A .vdb whose first float grid gives voxel size, rotation and place, so that both volumes "
+        "share one lattice");
   size->require_option(1);
   command.add_option("--voxelizer", arguments.voxelizer,
                      "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
@@ -84,6 +90,12 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
     if (arguments.signs) options.push_back("signs=" + *arguments.signs);
     return ChosenVoxelizer{voxelizer, parse_options(voxelizer.name, voxelizer.options, options)};
   });
+}
+
+PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options) {
+  PolygonMesh mesh = read_mesh(path, session.context, options);
+  choose_diagonals(mesh);
+  return mesh;
 }
 
 VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/core/mesh_file.h"
 #include "algorithms/core/variant.h"
 #include "experiments/cli/session.h"
 
@@ -18,6 +19,7 @@ struct Paths {
 struct VoxelizeArguments {
   std::optional<double> voxel_size;  ///< world units
   std::optional<std::int64_t> resolution;
+  std::optional<std::string> like;                  ///< a volume whose lattice to take
   double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
   std::string voxelizer = "hermesh";
   std::optional<std::string> signs;  ///< shorthand for the option of that name
@@ -31,13 +33,17 @@ struct ChosenVoxelizer {
 };
 
 void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
-void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments);
+/// `with_like`: the command also takes the lattice of a volume.
+void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
 
 /// key=value texts, checked. @throws Error also for an option that is given twice.
 Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,
                       const std::vector<std::string>& texts);
 /// @throws UsageError
 ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments);
+
+/// A mesh to voxelize: its quads are cut along the better diagonal.
+PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options = {});
 
 /// @throws Error where a resolution is asked of a mesh without extent.
 VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algorithms/core/blocks.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
+#include "algorithms/hermite/representation.h"
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
@@ -36,7 +36,7 @@ struct BlockOutput {
 
 class Contourer {
  public:
-  Contourer(const HermiteGrid& grid, const DualContouringOptions& options)
+  Contourer(const HermiteView& grid, const DualContouringOptions& options)
       : grid_(grid), options_(options), outputs_(grid.blocks().size()) {}
 
   PolygonMesh run(RunContext& context) {
@@ -82,7 +82,7 @@ class Contourer {
   /// A cell is active if any of its twelve edges is crossed.
   std::uint64_t find_active_cells(std::int32_t b) {
     static constexpr BlockMask kNone{};
-    const HermiteBlock& block = grid_.blocks()[b];
+    const HermiteView::Block& block = grid_.blocks()[b];
     BlockOutput& output = outputs_[b];
     for (int axis = 0; axis < 3; ++axis)
       for (int step = 0; step < 4; ++step) {
@@ -113,18 +113,18 @@ class Contourer {
         d[(axis + 2) % 3] = step >> 1;
         const Location at = locate(b, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
         if (at.block < 0) continue;
-        const HermiteVoxel& voxel = grid_.blocks()[at.block].voxels[at.sample];
-        if (!voxel.crosses(axis)) continue;
+        if (!test(grid_.blocks()[at.block].crossing[axis], at.sample)) continue;
+        const EdgeCrossing crossing = grid_.crossing(at.block, at.sample, axis);
         Eigen::Vector3d point = corner + Eigen::Vector3d(d[0], d[1], d[2]);
-        point[axis] += voxel.offset[axis];
-        const auto& n = voxel.normal[axis];
+        point[axis] += crossing.offset;
+        const auto& n = crossing.normal;
         qef.add_plane(point, Eigen::Vector3d(n[0], n[1], n[2]));
       }
     return qef;
   }
 
   void place_points(std::int32_t b, PolygonMesh& mesh) {
-    const HermiteBlock& block = grid_.blocks()[b];
+    const HermiteView::Block& block = grid_.blocks()[b];
     const IndexToWorld& placement = grid_.placement();
     const Eigen::Vector3d lower(block.lower[0] - placement.base[0], block.lower[1] - placement.base[1],
                                 block.lower[2] - placement.base[2]);
@@ -150,7 +150,7 @@ class Contourer {
   }
 
   void connect(std::int32_t b, PolygonMesh& mesh) const {
-    const HermiteBlock& block = grid_.blocks()[b];
+    const HermiteView::Block& block = grid_.blocks()[b];
     const IndexToWorld& placement = grid_.placement();
     Quad* next = mesh.quads.data() + outputs_[b].first_quad;
     for (int axis = 0; axis < 3; ++axis)
@@ -167,12 +167,11 @@ class Contourer {
           const Location there = locate(b, cell[0], cell[1], cell[2]);
           quad[i] = outputs_[there.block].point_in(there.sample);
         }
-        const HermiteVoxel& voxel = block.voxels[sample];
         Eigen::Vector3d hit;
         for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
-        hit[axis] += voxel.offset[axis];
+        hit[axis] += grid_.crossing(b, sample, axis).offset;
         if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
-        if (voxel.inside == placement.mirrors()) std::swap(quad[1], quad[3]);
+        if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
         *next++ = quad;
       });
   }
@@ -203,7 +202,7 @@ class Contourer {
     return d13 < d02;
   }
 
-  const HermiteGrid& grid_;
+  const HermiteView& grid_;
   const DualContouringOptions options_;
   std::vector<BlockOutput> outputs_;
   std::vector<Eigen::Vector3d> positions_;  ///< index space, relative to the placement's base
@@ -211,39 +210,72 @@ class Contourer {
 
 }  // namespace
 
-PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options,
+PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
                             RunContext& context) {
   return Contourer(grid, options).run(context);
 }
 
-PolygonMesh dual_contouring(const ExtractionInput& input) {
-  RunContext& context = input.context;
-  const BlockGrid grid = [&] {
-    Stage stage(context, "read signs");
-    return BlockGrid(input.level_set, input.isovalue, context);
-  }();
-  DualContouringOptions options;
-  if (input.options.text("placement") == "average")
-    options.placement = DualContouringOptions::Placement::average;
-  options.truncation = input.options.number("truncation");
-  options.reach = input.options.number("reach");
+namespace {
 
+FloatHermite sample(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
   const bool exact = source == "exact" || (source == "auto" && input.source);
   if (exact && !input.source)
     throw Error(
         "dual-contouring was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
         "-o hermite=level-set");
-  if (!exact) return dual_contouring(sample_level_set(grid, context), options, context);
+  if (!exact) return sample_level_set(input.level_set, input.isovalue, input.context);
   PolygonSampling sampling;
-  const HermiteGrid hermite = sample_polygons(grid, *input.source, context, &sampling);
+  FloatHermite hermite =
+      sample_polygons(input.level_set, input.isovalue, *input.source, input.context, &sampling);
   const std::size_t missed = sampling.nearest + sampling.fallback;
   if (missed > 0)
-    context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
-                 " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
-                 " took the nearest one's plane, the others the level set's gradient");
-  return dual_contouring(hermite, options, context);
+    input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
+                       " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
+                       " took the nearest one's plane, the others the level set's gradient");
+  return hermite;
 }
+
+void report_figures(const Represented& data, const ExtractionInput& input) {
+  const auto bytes = static_cast<double>(data.bytes);
+  input.context.figure("hermite_bytes", bytes);
+  if (data.crossings > 0)
+    input.context.figure("hermite_bytes_per_crossing", bytes / static_cast<double>(data.crossings));
+  const std::size_t voxels = input.level_set.active_voxels();
+  if (voxels > 0) input.context.figure("hermite_bytes_per_voxel", bytes / static_cast<double>(voxels));
+  input.context.figure("lost_crossings", static_cast<double>(data.lost));
+  if (data.lost > 0)
+    input.context.note(std::to_string(data.lost) + " of " + std::to_string(data.crossings) +
+                       " edge crossings were lost by the representation of the Hermite data and stand in the middle "
+                       "of their edges");
+}
+
+}  // namespace
+
+PolygonMesh dual_contouring(const ExtractionInput& input) {
+  DualContouringOptions options;
+  if (input.options.text("placement") == "average")
+    options.placement = DualContouringOptions::Placement::average;
+  options.truncation = input.options.number("truncation");
+  options.reach = input.options.number("reach");
+  const Representation representation = parse_representation(input.options.text("representation"));
+  if (representation == Representation::directed && options.placement == DualContouringOptions::Placement::optimal)
+    throw Error("directed distances have no normals to place points by; use -o placement=average with them");
+  const Represented data = through(representation, parse_normal_code(input.options.text("normals")), sample(input),
+                                   input.context);
+  report_figures(data, input);
+  return dual_contouring(view_of(data.hermite, input.context), options, input.context);
+}
+
+namespace {
+
+std::vector<std::string> normal_code_names() {
+  std::vector<std::string> names;
+  for (const NormalCodeId id : kNormalCodes) names.emplace_back(name(id));
+  return names;
+}
+
+}  // namespace
 
 std::vector<OptionSpec> dual_contouring_options() {
   return {{"placement",
@@ -256,6 +288,15 @@ std::vector<OptionSpec> dual_contouring_options() {
            "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
            "polygons are at hand",
            {"auto", "exact", "level-set"}},
+          {"representation",
+           "sparse-float",
+           "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: 'dense-float' (52 "
+           "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
+           {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
+          {"normals",
+           "octahedral",
+           "code of 16 bits for normals in 'sparse' and 'fixed'",
+           normal_code_names()},
           {"truncation",
            "0.1",
            "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "

@@ -3,7 +3,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/variant.h"
-#include "algorithms/hermite/hermite_grid.h"
+#include "algorithms/hermite/hermite_view.h"
 
 namespace hermesh {
 
@@ -24,7 +24,7 @@ struct DualContouringOptions {
 /// One point for each active cell and one quad for each crossing edge. Closed and oriented; not manifold
 /// where several sheets pass through one cell, for they share its point. A quad's split runs along the
 /// diagonal whose two triangles turn less against each other, so that a crease is not cut across.
-PolygonMesh dual_contouring(const HermiteGrid& grid, const DualContouringOptions& options,
+PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
                             RunContext& context);
 
 /// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source

@@ -1,10 +1,13 @@
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "algorithms/core/blocks.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
+#include "algorithms/hermite/representation.h"
+#include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
 namespace {
@@ -39,9 +42,14 @@ void for_each_active_cell(const BlockGrid& grid, std::int32_t block, F&& f) {
   });
 }
 
-void write_points(const BlockGrid& grid, std::int32_t index, const BlockOutput& output, PolygonMesh& mesh) {
+/// Where the surface meets an edge of a block, 0 to 1 along it: by linear interpolation of the samples, or, where there
+/// are crossings, theirs, which are in the order of the edges.
+void write_points(const BlockGrid& grid, std::int32_t index, const FloatHermite* hermite, const BlockOutput& output,
+                  PolygonMesh& mesh) {
   const Block& block = grid.blocks()[index];
   const IndexToWorld& placement = grid.placement();
+  const SignLeaf* leaf = hermite ? hermite->find(block.lower) : nullptr;
+  const EdgeCrossing* crossing = leaf ? hermite->crossings.data() + leaf->first : nullptr;
   for (int axis = 0; axis < 3; ++axis)
     for_each_bit(output.edges[axis], [&](int sample) {
       const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
@@ -51,7 +59,8 @@ void write_points(const BlockGrid& grid, std::int32_t index, const BlockOutput& 
       const double to = grid.signed_value(grid.blocks()[end.block], end.sample);
       Eigen::Vector3d position;
       for (int a = 0; a < 3; ++a) position[a] = block.lower[a] - placement.base[a] + local[a];
-      position[axis] += std::clamp(from / (from - to), kCrossingMargin, 1.0 - kCrossingMargin);
+      const double offset = crossing ? double((crossing++)->offset) : from / (from - to);
+      position[axis] += std::clamp(offset, kCrossingMargin, 1.0 - kCrossingMargin);
       mesh.points[output.point_on(axis, sample)] = placement.local(position).cast<float>();
     });
 }
@@ -72,13 +81,25 @@ void write_triangles(const BlockGrid& grid, std::int32_t index, const std::vecto
   });
 }
 
+/// Exact crossings through the representation that needs no more than offsets (§2.7), or none if the samples are to be
+/// interpolated.
+std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
+  if (input.options.text("crossings") == "samples") return std::nullopt;
+  if (!input.source)
+    throw Error(
+        "marching-cubes was asked for exact crossings, which need the polygons; use 'remesh', or -o crossings=samples");
+  return through(Representation::directed, NormalCodeId::octahedral,
+                 sample_polygons(input.level_set, input.isovalue, *input.source, input.context), input.context)
+      .hermite;
+}
+
 }  // namespace
 
-PolygonMesh marching_cubes(const ExtractionInput& input) {
-  RunContext& context = input.context;
+PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const FloatHermite* crossings,
+                           RunContext& context) {
   const BlockGrid grid = [&] {
     Stage stage(context, "read signs");
-    return BlockGrid(input.level_set, input.isovalue, context);
+    return BlockGrid(level_set, isovalue, context);
   }();
   const std::size_t blocks = grid.blocks().size();
   std::vector<BlockOutput> outputs(blocks);
@@ -111,10 +132,23 @@ PolygonMesh marching_cubes(const ExtractionInput& input) {
   Stage stage(context, "fill");
   parallel_blocks(blocks, context, [&](std::size_t i) {
     const auto index = static_cast<std::int32_t>(i);
-    write_points(grid, index, outputs[i], mesh);
+    write_points(grid, index, crossings, outputs[i], mesh);
     write_triangles(grid, index, outputs, mesh);
   });
   return mesh;
+}
+
+PolygonMesh marching_cubes(const ExtractionInput& input) {
+  const std::optional<FloatHermite> crossings = directed_distances(input);
+  return marching_cubes(input.level_set, input.isovalue, crossings ? &*crossings : nullptr, input.context);
+}
+
+std::vector<OptionSpec> marching_cubes_options() {
+  return {{"crossings",
+           "samples",
+           "where points go: 'samples' interpolates the level set, 'exact' takes the polygons' hits as directed "
+           "distances",
+           {"samples", "exact"}}};
 }
 
 }  // namespace hermesh

@@ -3,6 +3,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/variant.h"
+#include "algorithms/hermite/sparse_hermite.h"
 
 namespace hermesh {
 
@@ -14,6 +15,14 @@ inline constexpr double kCrossingMargin = 1.0 / 1024.0;
 /// Triangles with one point on each crossing edge. Closed, manifold and oriented for every finite volume;
 /// neighbouring surface sheets within one cell may touch. No triangle degenerates: three points inside three
 /// edges of a cell lie on a line only if one edge holds two of them.
+///
+/// Points interpolate the samples along their edges, or, if there are `crossings`, which must be those of the same level
+/// set and isovalue, take their offsets (directed distances, Aldén 2011, §2.7).
+PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const FloatHermite* crossings,
+                           RunContext& context);
+
+/// The table's entry.
 PolygonMesh marching_cubes(const ExtractionInput& input);
+std::vector<OptionSpec> marching_cubes_options();
 
 }  // namespace hermesh

@@ -2,9 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cstdlib>
 
-#include "algorithms/core/error.h"
+#include "algorithms/core/simd_level.h"
 #include "algorithms/voxelization/kernels/constants.h"
 
 namespace hermesh::kernels {
@@ -20,24 +19,6 @@ extern const Kernels kKernels;
 }
 
 namespace {
-
-struct Level {
-  const char* name;
-  const Kernels* kernels;
-  bool available;
-};
-
-std::array<Level, 3> all_levels() {
-  return {{{"sse2", &sse2::kKernels, true},
-           {"avx2", &avx2::kKernels, __builtin_cpu_supports("avx2") != 0},
-           {"avx512", &avx512::kKernels, __builtin_cpu_supports("avx512f") != 0}}};
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 void put(Batch& batch, int row, int lane, const Eigen::Vector3d& v) {
   for (int axis = 0; axis < 3; ++axis) batch.f[row + axis][lane] = float(v[axis]);
@@ -73,26 +54,27 @@ void set_up_segment(const Corners& corners, int triangle, Batch& batch) {
 
 std::vector<std::string> levels() {
   std::vector<std::string> names;
-  for (const Level& level : all_levels())
-    if (level.available) names.push_back(level.name);
+  for (const SimdLevel level : available_simd_levels()) names.emplace_back(name(level));
   return names;
 }
 
-const Kernels& at_level(std::string_view name) {
-  for (const Level& level : all_levels()) {
-    if (name != level.name) continue;
-    if (!level.available)
-      throw Error("HERMESH_SIMD=" + std::string(name) +
-                  " asks for vector code that this machine cannot run; it has " + joined(levels()) + ".");
-    return *level.kernels;
+namespace {
+
+const Kernels& kernels_of(SimdLevel level) {
+  switch (level) {
+    case SimdLevel::avx2:
+      return avx2::kKernels;
+    case SimdLevel::avx512:
+      return avx512::kKernels;
+    case SimdLevel::sse2:
+      break;
   }
-  throw Error("HERMESH_SIMD is '" + std::string(name) +
-              "', which is no level of vector code; this machine has " + joined(levels()) + ".");
+  return sse2::kKernels;
 }
 
-const Kernels& chosen() {
-  const char* name = std::getenv("HERMESH_SIMD");
-  return at_level(name && *name ? std::string(name) : levels().back());
-}
+}  // namespace
+
+const Kernels& at_level(std::string_view name) { return kernels_of(parse_simd_level(name)); }
+const Kernels& chosen() { return kernels_of(chosen_simd_level()); }
 
 }  // namespace hermesh::kernels

@@ -1,0 +1,297 @@
+#include "algorithms/core/leaf_table.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+namespace {
+
+using openvdb::Coord;
+using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
+
+/// Signs of 64 samples; `not_finite` is set where one of them is no number. A shift of signs, because a comparison a
+/// sample would cost more than reading it.
+std::uint64_t signs_of_64(const float* values, const InsideRule& rule, bool& not_finite) {
+  std::uint64_t bits = 0;
+#if defined(__SSE2__)
+  const __m128 iso = _mm_set1_ps(rule.isovalue);
+  const __m128i magnitude = _mm_set1_epi32(0x7fffffff), largest = _mm_set1_epi32(0x7f7fffff);
+  __m128i bad = _mm_setzero_si128();
+  for (int i = 0; i < 16; ++i) {
+    const __m128 v = _mm_loadu_ps(values + 4 * i);
+    const __m128 inside = rule.scale > 0 ? _mm_cmplt_ps(v, iso) : _mm_cmpgt_ps(v, iso);
+    bits |= static_cast<std::uint64_t>(_mm_movemask_ps(inside)) << (4 * i);
+    bad = _mm_or_si128(bad, _mm_cmpgt_epi32(_mm_and_si128(_mm_castps_si128(v), magnitude), largest));
+  }
+  if (_mm_movemask_epi8(bad) != 0) not_finite = true;
+#else
+  for (int i = 0; i < 64; ++i) {
+    bits |= static_cast<std::uint64_t>(rule(values[i])) << i;
+    if (!std::isfinite(values[i])) not_finite = true;
+  }
+#endif
+  return bits;
+}
+
+constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
+
+}  // namespace
+
+InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
+  if (!std::isfinite(isovalue)) throw Error("the isovalue must be a finite number");
+  if (!std::isfinite(grid.background())) throw Error("the volume's background value is not finite");
+  InsideRule rule;
+  const bool greater_is_inside =
+      grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
+  rule.scale = greater_is_inside ? -1.0f : 1.0f;
+  // The isovalue is rounded away from the inside, so that a comparison of floats decides as one with the isovalue
+  // itself does.
+  constexpr float kLargest = std::numeric_limits<float>::max();
+  rule.isovalue = static_cast<float>(std::clamp(isovalue, -double(kLargest), double(kLargest)));
+  if (!greater_is_inside && rule.isovalue < isovalue) rule.isovalue = std::nextafter(rule.isovalue, kLargest);
+  if (greater_is_inside && rule.isovalue > isovalue) rule.isovalue = std::nextafter(rule.isovalue, -kLargest);
+  return rule;
+}
+
+std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
+                                       RunContext& context) {
+  // Where two tiles differ in sign, one of them is unlike the background; the others may fill space without end.
+  const bool background = is_inside(tree.background());
+  std::vector<openvdb::CoordBBox> tiles;
+  openvdb::FloatTree::ValueAllCIter it = tree.cbeginValueAll();
+  it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; it; ++it)
+    if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
+  std::vector<std::vector<Coord>> found(tiles.size());
+  parallel_blocks(tiles.size(), context, [&](std::size_t i) {
+    Accessor access(tree);
+    const Coord size = tiles[i].dim();
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int side : {-1, 1})
+        for (int a = 0; a < size[(axis + 1) % 3]; a += 8)
+          for (int b = 0; b < size[(axis + 2) % 3]; b += 8) {
+            Coord own = tiles[i].min();
+            own[(axis + 1) % 3] += a, own[(axis + 2) % 3] += b;
+            if (side > 0) own[axis] += size[axis] - 8;
+            Coord there = own;
+            there[axis] += 8 * side;
+            if (access.probeConstLeaf(there) || is_inside(access.getValue(there)) != background) continue;
+            found[i].push_back(own);
+            found[i].push_back(there);
+          }
+  });
+  std::vector<Coord> all;
+  for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
+  return all;
+}
+
+LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& context) {
+  const openvdb::FloatGrid& grid = *level_set.grid().grid;
+  rule_ = inside_rule(grid, isovalue);
+  tree_ = grid.constTreePtr();
+  number_leaves(context);
+  read_signs(context);
+  if (is_complete(context)) return;
+  // Rare: bands thinner than a voxel, tiles that were made by hand. A new leaf may meet further tiles of the other sign
+  // only where the tile it was made from did, so one round is enough; the loop does not rely on it.
+  auto copy = std::make_shared<openvdb::FloatTree>(*tree_);
+  do {
+    for (const Coord& lower : missing_leaves(context)) copy->touchLeaf(lower);
+    tree_ = copy;
+    number_leaves(context);
+    read_signs(context);
+  } while (!is_complete(context));
+}
+
+void LeafTable::number_leaves(RunContext& context) {
+  std::vector<const TreeNode*> sources;
+  tree_->getNodes(sources);
+  nodes_.assign(sources.size(), {});
+  std::unordered_map<Coord, std::int32_t> index;
+  std::vector<std::uint64_t> counts(sources.size());
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    index.emplace(sources[i]->origin(), static_cast<std::int32_t>(i));
+    counts[i] = sources[i]->getChildMask().countOn();
+  }
+  const std::uint64_t total = exclusive_scan(counts, "leaves");
+  places_.resize(total);
+  leaves_.resize(total);
+  values_.resize(total);
+  constexpr int kWidth = TreeNode::DIM;
+  static_assert(TreeNode::NUM_VALUES == 64 * kWords);
+  parallel_blocks(sources.size(), context, [&](std::size_t i) {
+    Node& node = nodes_[i];
+    node.source = sources[i];
+    node.lower = node.source->origin();
+    auto next = static_cast<std::uint32_t>(counts[i]);
+    for (int word = 0; word < kWords; ++word) {
+      node.child[word] = node.source->getChildMask().getWord<std::uint64_t>(word);
+      node.rank[word] = next;
+      for (std::uint64_t bits = node.child[word]; bits != 0; bits &= bits - 1) {
+        const auto slot = static_cast<std::uint32_t>(64 * word + std::countr_zero(bits));
+        const Leaf* leaf = node.source->getTable()[slot].getChild();
+        places_[next] = {static_cast<std::uint32_t>(i), slot};
+        leaves_[next] = leaf;
+        values_[next++] = leaf->buffer().data();
+      }
+      for (int bit = 0; bit < 64; ++bit) {
+        const std::uint64_t is_tile = ~(node.child[word] >> bit) & 1;
+        if (is_tile && rule_(node.source->getTable()[64 * word + bit].getValue()))
+          node.tile_inside[word] |= std::uint64_t{1} << bit;
+      }
+    }
+    Accessor access(*tree_);
+    for (int slot = 0; slot < 27; ++slot) {
+      const Coord there = node.lower.offsetBy(kWidth * (slot / 9 - 1), kWidth * (slot / 3 % 3 - 1), kWidth * (slot % 3 - 1));
+      const auto found = index.find(there);
+      node.neighbours[slot] = found != index.end() ? found->second : uniform(rule_(access.getValue(there)));
+    }
+  });
+}
+
+void LeafTable::read_signs(RunContext& context) {
+  inside_.resize(size());
+  std::atomic<bool> not_finite{false};
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
+    context.check();
+    bool bad = false;
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      for (int word = 0; word < 8; ++word) inside_[i][word] = signs_of_64(values_[i] + 64 * word, rule_, bad);
+    if (bad) not_finite = true;
+  });
+  if (not_finite) throw Error("the volume holds a value that is not finite; replace it before the extraction");
+}
+
+BlockMask LeafTable::active(std::size_t leaf) const {
+  BlockMask mask;
+  for (int word = 0; word < 8; ++word) mask[word] = leaves_[leaf]->getValueMask().getWord<std::uint64_t>(word);
+  return mask;
+}
+
+Coord LeafTable::lower(std::size_t leaf) const { return leaves_[leaf]->origin(); }
+
+std::int32_t LeafTable::find(const Node& node, std::uint32_t slot) const {
+  const std::uint64_t bit = std::uint64_t{1} << (slot & 63), word = node.child[slot >> 6];
+  if (word & bit) return static_cast<std::int32_t>(node.rank[slot >> 6]) + std::popcount(word & (bit - 1));
+  return uniform((node.tile_inside[slot >> 6] & bit) != 0);
+}
+
+std::int32_t LeafTable::neighbour(std::size_t leaf, int dx, int dy, int dz) const {
+  const Place place = places_[leaf];
+  const Node& node = nodes_[place.node];
+  const int x = static_cast<int>(place.slot >> 8) + dx, y = static_cast<int>((place.slot >> 4) & 15) + dy,
+            z = static_cast<int>(place.slot & 15) + dz;
+  const auto slot = static_cast<std::uint32_t>(((x & 15) << 8) | ((y & 15) << 4) | (z & 15));
+  if (((x | y | z) & ~15) == 0) return find(node, slot);
+  const std::int32_t there = node.neighbours[neighbour_slot(x >> 4, y >> 4, z >> 4)];
+  return there >= 0 ? find(nodes_[there], slot) : there;
+}
+
+/// True if two tiles of different sign touch, both within the node or one in it and one beyond. Rows of 16 along z are
+/// compared with their neighbours as bits.
+bool LeafTable::tiles_meet(const Node& node) const {
+  struct Row {
+    std::uint32_t tile, inside;
+  };
+  const auto row_of = [](const Node& in, int x, int y) {
+    const int word = 4 * x + (y >> 2), shift = 16 * (y & 3);
+    return Row{static_cast<std::uint32_t>(~in.child[word] >> shift) & 0xffff,
+               static_cast<std::uint32_t>(in.tile_inside[word] >> shift) & 0xffff};
+  };
+  const auto row_at = [&](int x, int y, int dz) {
+    const std::int32_t there = node.neighbours[neighbour_slot(x >> 4, y >> 4, dz)];
+    if (there < 0) return Row{0xffff, there == kUniformInside ? 0xffffu : 0};
+    return row_of(nodes_[there], x & 15, y & 15);
+  };
+  const auto meet = [](Row a, Row b) { return a.tile & b.tile & (a.inside ^ b.inside); };
+  std::uint32_t met = 0;
+  for (int x = 0; x < 16; ++x)
+    for (int y = 0; y < 16; ++y) {
+      const Row own = row_of(node, x, y);
+      if (own.tile == 0) continue;
+      const Row next = {own.tile >> 1, own.inside >> 1}, above = row_at(x, y, 1), below = row_at(x, y, -1);
+      met |= meet(own, next) & 0x7fff;
+      met |= meet({own.tile >> 15, own.inside >> 15}, above) & 1;
+      met |= meet(own, {below.tile >> 15, below.inside >> 15}) & 1;
+      met |= meet(own, y < 15 ? row_of(node, x, y + 1) : row_at(x, 16, 0));
+      met |= meet(own, x < 15 ? row_of(node, x + 1, y) : row_at(16, y, 0));
+      if (y == 0) met |= meet(own, row_at(x, -1, 0));
+      if (x == 0) met |= meet(own, row_at(-1, y, 0));
+    }
+  return met != 0;
+}
+
+/// True if there is no leaf below along the axis, and the tile there is not of the sign of all samples of the leaf's
+/// first layer.
+bool LeafTable::differs_from_tile_below(std::size_t leaf, int axis) const {
+  const std::int32_t there = neighbour(leaf, -(axis == 0), -(axis == 1), -(axis == 2));
+  if (there >= 0) return false;
+  constexpr std::uint64_t kLayer[3] = {~std::uint64_t{0}, 0xff, 0x0101010101010101u};
+  const std::uint64_t expected = there == kUniformInside ? kLayer[axis] : 0;
+  for (int x = 0; x < (axis == 0 ? 1 : 8); ++x)
+    if ((inside_[leaf][x] & kLayer[axis]) != expected) return true;
+  return false;
+}
+
+/// True if every edge with a change of sign starts in a leaf.
+bool LeafTable::is_complete(RunContext& context) const {
+  std::atomic<bool> complete{true};
+  parallel_blocks(nodes_.size(), context, [&](std::size_t i) {
+    if (complete && tiles_meet(nodes_[i])) complete = false;
+  });
+  parallel_blocks(size(), context, [&](std::size_t i) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (differs_from_tile_below(i, axis)) complete = false;
+  });
+  if (!complete) return false;
+  // Tiles as large as a node or larger: only those unlike the background need a look, and there are few.
+  const bool background = rule_(tree_->background());
+  openvdb::FloatTree::ValueAllCIter it = tree_->cbeginValueAll();
+  it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 2);
+  Accessor access(*tree_);
+  for (; it; ++it) {
+    if (rule_(*it) == background) continue;
+    const openvdb::CoordBBox box = it.getBoundingBox();
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int side : {-1, 1}) {
+        Coord there = box.min();
+        there[axis] += side > 0 ? box.dim()[axis] : -1;
+        // Smaller tiles beyond were compared with this one from their own side.
+        for (int a = 0; a < box.dim()[(axis + 1) % 3]; a += TreeNode::DIM)
+          for (int b = 0; b < box.dim()[(axis + 2) % 3]; b += TreeNode::DIM) {
+            Coord at = there;
+            at[(axis + 1) % 3] += a, at[(axis + 2) % 3] += b;
+            if (!access.probeConstNode<TreeNode>(at) && rule_(access.getValue(at)) == background) return false;
+          }
+      }
+  }
+  return true;
+}
+
+std::vector<Coord> LeafTable::missing_leaves(RunContext& context) const {
+  std::vector<Coord> missing = tiles_between_signs(*tree_, rule_, context);
+  for (std::size_t i = 0; i < size(); ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!differs_from_tile_below(i, axis)) continue;
+      Coord there = lower(i);
+      there[axis] -= 8;
+      missing.push_back(there);
+    }
+  return missing;
+}
+
+}  // namespace hermesh

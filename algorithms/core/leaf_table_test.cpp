@@ -1,0 +1,125 @@
+#include "algorithms/core/leaf_table.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+
+namespace hermesh {
+namespace {
+
+using openvdb::Coord;
+
+class LeafTableTest : public testing::Test {
+ protected:
+  void SetUp() override { initialize_openvdb(); }
+  LeafTable table(const openvdb::FloatGrid::Ptr& grid, double isovalue = 0.0) {
+    return LeafTable(make_level_set(grid), isovalue, context_);
+  }
+
+  /// Every edge with a change of sign must start in a leaf: the last samples of a leaf and of each of its neighbours are
+  /// compared with what the tree itself says.
+  static void expect_complete(const LeafTable& table, const openvdb::CoordBBox& box) {
+    const auto inside = [&](const Coord& at) { return table.rule()(table.tree().getValue(at)); };
+    for (auto it = box.begin(); it; ++it)
+      for (int axis = 0; axis < 3; ++axis) {
+        Coord next = *it;
+        ++next[axis];
+        if (inside(*it) == inside(next)) continue;
+        EXPECT_NE(table.tree().probeConstLeaf(*it), nullptr) << *it;
+      }
+  }
+
+  RunContext context_;
+};
+
+TEST_F(LeafTableTest, NeighboursAndSignsAreTheTrees) {
+  const auto sphere =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(90.0f, openvdb::Vec3f(3.0f, -70.0f, 5.0f), 1.0f);
+  const LeafTable leaves = table(sphere);
+  ASSERT_EQ(leaves.size(), sphere->tree().leafCount());
+  std::size_t across_nodes = 0;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    const Coord lower = leaves.lower(i);
+    for (int sample = 0; sample < 512; sample += 37) {
+      const Coord at = lower.offsetBy(sample >> 6, (sample >> 3) & 7, sample & 7);
+      ASSERT_EQ(test(leaves.inside(i), sample), sphere->tree().getValue(at) < 0.0f);
+      ASSERT_EQ(test(leaves.active(i), sample), sphere->tree().isValueOn(at));
+    }
+    for (int slot = 0; slot < 27; ++slot) {
+      const int dx = slot / 9 - 1, dy = slot / 3 % 3 - 1, dz = slot % 3 - 1;
+      const Coord there = lower.offsetBy(8 * dx, 8 * dy, 8 * dz);
+      const std::int32_t found = leaves.neighbour(i, dx, dy, dz);
+      if (const auto* leaf = sphere->tree().probeConstLeaf(there)) {
+        ASSERT_GE(found, 0);
+        ASSERT_EQ(leaves.values(static_cast<std::size_t>(found)), leaf->buffer().data());
+        across_nodes += (lower.x() >> 7) != (there.x() >> 7);
+      } else {
+        ASSERT_EQ(found, sphere->tree().getValue(there) < 0.0f ? kUniformInside : kUniformOutside);
+      }
+    }
+  }
+  EXPECT_GT(across_nodes, 100u);
+}
+
+TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
+  // A tile of 8³, one of 128³ and one of 4096³, all inside, in a background that is outside.
+  const auto grid = openvdb::FloatGrid::create(3.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->tree().addTile(1, Coord(0, 0, 0), -3.0f, false);
+  const LeafTable small = table(grid);
+  EXPECT_EQ(small.size(), 7u);  // the tile and those beside it, of which three own edges that lead into it
+  expect_complete(small, openvdb::CoordBBox(Coord(-10), Coord(18)));
+
+  grid->tree().addTile(2, Coord(256, 0, 0), -3.0f, false);
+  const LeafTable both = table(grid);
+  expect_complete(both, openvdb::CoordBBox(Coord(250, -4, -4), Coord(262, 8, 8)));
+  expect_complete(both, openvdb::CoordBBox(Coord(378, 120, 120), Coord(390, 132, 132)));
+}
+
+TEST_F(LeafTableTest, ALeafBesideATileOfTheOtherSignBringsTheTileIn) {
+  // One sample inside at the leaf's first corner: the edges that lead to it start in three neighbours without leaves.
+  const auto grid = openvdb::FloatGrid::create(3.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->tree().setValue(Coord(0, 0, 0), -1.0f);
+  EXPECT_EQ(grid->tree().leafCount(), 1u);
+  const LeafTable leaves = table(grid);
+  EXPECT_EQ(leaves.size(), 4u);
+  EXPECT_EQ(grid->tree().leafCount(), 1u);  // the input is as it was
+  expect_complete(leaves, openvdb::CoordBBox(Coord(-9), Coord(9)));
+}
+
+TEST_F(LeafTableTest, AComparisonWithARoundedIsovalueDecidesAsWithTheExactOne) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> isovalues(-2.0, 2.0);
+  for (const bool level_set : {true, false})
+    for (int i = 0; i < 1000; ++i) {
+      const auto grid = openvdb::FloatGrid::create(level_set ? 5.0f : -5.0f);
+      if (level_set) grid->setGridClass(openvdb::GRID_LEVEL_SET);
+      const double isovalue = isovalues(random);
+      const InsideRule rule = inside_rule(*grid, isovalue);
+      const float near = static_cast<float>(isovalue);
+      for (const float value : {near, std::nextafter(near, 9.0f), std::nextafter(near, -9.0f)}) {
+        const bool expected = level_set ? double(value) < isovalue : double(value) > isovalue;
+        ASSERT_EQ(rule(value), expected) << value << " against " << isovalue;
+        ASSERT_EQ(rule.signed_value(value) < 0.0f, expected);
+      }
+    }
+}
+
+TEST_F(LeafTableTest, ValuesThatAreNotFiniteAreRefused) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                          -std::numeric_limits<float>::infinity()}) {
+    const auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->tree().setValue(Coord(3, 4, 5), bad);
+    EXPECT_THROW(table(grid), Error);
+  }
+  EXPECT_THROW(table(openvdb::FloatGrid::create(1.0f), std::nan("")), Error);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,24 @@
+// Which vector instructions the program uses. All levels give the same bytes.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace hermesh {
+
+enum class SimdLevel { sse2, avx2, avx512 };
+
+std::string_view name(SimdLevel level);
+
+/// Those that this machine can run, in ascending order.
+std::vector<SimdLevel> available_simd_levels();
+
+/// @throws Error for a name that is no level and for a level that this machine cannot run.
+SimdLevel parse_simd_level(std::string_view name);
+
+/// What the environment variable HERMESH_SIMD names, or else the highest that the machine can run. @throws Error as
+/// parse_simd_level() does.
+SimdLevel chosen_simd_level();
+
+}  // namespace hermesh

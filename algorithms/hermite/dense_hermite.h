@@ -1,0 +1,69 @@
+// Hermite data in OpenVDB trees of voxels (Aldén 2011, §4.2 and figure 4.3), for what works on whole voxels, for
+// OpenVDB's own tools, and to compare with: what SparseHermite saves is measured against these.
+//
+// Light: the tree itself is in dense_tree.h.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/hermite/voxels.h"
+
+namespace hermesh {
+
+template <class Voxel>
+struct DenseTree;  // dense_tree.h
+
+/// There is a leaf for each that owns a crossing edge. A voxel is active if it owns one, and every voxel of a leaf has
+/// its sign. Tiles and the background have no crossings, are inactive, and have the sign of their samples. So no leaf
+/// is uniform, and OpenVDB's pruning removes none.
+template <DenseVoxel Voxel>
+struct DenseHermite {
+  using VoxelType = Voxel;
+  IndexToWorld placement;
+  NormalCodeId normal_code =
+      NormalCodeId::octahedral;  ///< of FixedVoxel's and ThesisVoxel's normals; else without meaning
+  /// Copies of a DenseHermite share it; nobody changes it once it is made.
+  std::shared_ptr<const DenseTree<Voxel>> tree;
+
+  std::size_t leaves() const;
+  std::size_t crossings() const;     ///< edges that say that they have one
+  std::size_t memory_bytes() const;  ///< of the tree, allocated
+  static std::size_t bytes_per_leaf();
+};
+
+using FloatDense = DenseHermite<FloatVoxel>;
+using DirectedDense = DenseHermite<DirectedVoxel>;
+using ThesisDense = DenseHermite<ThesisVoxel>;
+using FixedDense = DenseHermite<FixedVoxel>;
+
+/// FloatVoxel loses nothing. FixedVoxel rounds, with normals in `code`; DirectedVoxel keeps offsets; ThesisVoxel loses
+/// precision, and some crossings (ThesisVoxel::crosses()).
+template <DenseVoxel Voxel>
+DenseHermite<Voxel> to_dense(const FloatHermite& hermite, RunContext& context,
+                             NormalCodeId code = NormalCodeId::octahedral);
+
+/// FixedVoxel takes the codes as they are, but has no room for tags. The others get what the codes stand for.
+template <DenseVoxel Voxel>
+DenseHermite<Voxel> to_dense(const PackedHermite& hermite, RunContext& context);
+
+/// An edge whose ends differ in sign, but whose voxel says that it has no crossing, gets one in the middle with the
+/// edge's direction as normal, towards the outside; `lost` says how many there were.
+/// @throws Error if signs change between two tiles, which only foreign hands can bring about.
+template <DenseVoxel Voxel>
+FloatHermite to_sparse(const DenseHermite<Voxel>& dense, RunContext& context, std::size_t* lost = nullptr);
+
+/// The codes as they are, with tags of 0.
+PackedHermite to_packed(const FixedDense& dense, RunContext& context, std::size_t* lost = nullptr);
+
+/// @throws Error that says what is wrong if a crossing belongs to no change of sign, if one is missing (but for those
+/// that ThesisVoxel loses), if a voxel holds what its type never writes, or for what check_consistent() finds in the
+/// same data as SparseHermite. For data from outside.
+template <DenseVoxel Voxel>
+void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context);
+
+/// Makes the four grid types known to OpenVDB's input and output; initialize_openvdb() calls it.
+void register_hermite_grids();
+
+}  // namespace hermesh

@@ -1,0 +1,62 @@
+// The OpenVDB tree inside a DenseHermite. Heavy: include it from the few .cpp files that need it.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include "algorithms/hermite/dense_hermite.h"
+
+// OpenVDB calls these functions by their full names, so that they must be specialised type by type: an overload for
+// all voxel types would be declared too late to be found.
+#define HERMESH_DECLARE_VDB_VALUE(Voxel)                                                               \
+  template <>                                                                                          \
+  inline const char* typeNameAsString<hermesh::Voxel>() {                                              \
+    return hermesh::Voxel::type_name;                                                                  \
+  }                                                                                                    \
+  template <>                                                                                          \
+  inline hermesh::Voxel zeroVal<hermesh::Voxel>() {                                                    \
+    return {};                                                                                         \
+  }                                                                                                    \
+  namespace math {                                                                                     \
+  inline hermesh::Voxel Abs(const hermesh::Voxel& voxel) { return voxel; }                             \
+  template <>                                                                                          \
+  inline bool isApproxEqual(const hermesh::Voxel& a, const hermesh::Voxel& b) {                        \
+    return a == b;                                                                                     \
+  }                                                                                                    \
+  template <>                                                                                          \
+  inline bool isApproxEqual(const hermesh::Voxel& a, const hermesh::Voxel& b, const hermesh::Voxel&) { \
+    return a == b;                                                                                     \
+  }                                                                                                    \
+  }
+
+namespace openvdb {
+namespace OPENVDB_VERSION_NAME {
+HERMESH_DECLARE_VDB_VALUE(FloatVoxel)
+HERMESH_DECLARE_VDB_VALUE(DirectedVoxel)
+HERMESH_DECLARE_VDB_VALUE(ThesisVoxel)
+HERMESH_DECLARE_VDB_VALUE(FixedVoxel)
+}  // namespace OPENVDB_VERSION_NAME
+}  // namespace openvdb
+#undef HERMESH_DECLARE_VDB_VALUE
+
+namespace hermesh {
+
+template <class Voxel>
+using DenseGrid = openvdb::Grid<typename openvdb::tree::Tree4<Voxel, 5, 4, 3>::Type>;
+
+template <class Voxel>
+struct DenseTree {
+  typename DenseGrid<Voxel>::Ptr grid;
+};
+
+/// As a grid has it: the map of index coordinates, without the split into parts near the base and the origin.
+openvdb::math::Transform::Ptr transform_of(const IndexToWorld& placement);
+
+/// A voxel without crossings, which all tiles and the background are.
+template <class Voxel>
+Voxel uniform_voxel(bool inside) {
+  Voxel voxel;
+  voxel.set_inside(inside);
+  return voxel;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,202 @@
+// The sampler against a plain one that looks up every sample in the tree.
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/simd_level.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using openvdb::Coord;
+using EdgeKey = std::array<int, 4>;  ///< first sample and axis
+
+/// A gradient from central differences of data, one-sided where data end.
+Vector3d plain_gradient(const openvdb::FloatGrid& grid, const Coord& at) {
+  const bool level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+  const auto is_data = [&](const Coord& p) {
+    const float value = grid.tree().getValue(p);
+    return level_set ? std::abs(value) < grid.background() : grid.tree().isValueOn(p);
+  };
+  Vector3d result = Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    Coord low = at, high = at;
+    --low[axis], ++high[axis];
+    const double below = grid.tree().getValue(low), here = grid.tree().getValue(at), above = grid.tree().getValue(high);
+    if (is_data(low) && is_data(high))
+      result[axis] = 0.5 * (above - below);
+    else if (is_data(high) && is_data(at))
+      result[axis] = above - here;
+    else if (is_data(low) && is_data(at))
+      result[axis] = here - below;
+  }
+  return result;
+}
+
+std::map<EdgeKey, EdgeCrossing> plain_sampler(const openvdb::FloatGrid& grid, double isovalue,
+                                              const openvdb::CoordBBox& box) {
+  const bool greater_is_inside = grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
+  const double scale = greater_is_inside ? -1.0 : 1.0;
+  const auto value = [&](const Coord& at) { return scale * (double(grid.tree().getValue(at)) - isovalue); };
+  std::map<EdgeKey, EdgeCrossing> result;
+  for (auto it = box.begin(); it; ++it)
+    for (int axis = 0; axis < 3; ++axis) {
+      Coord next = *it;
+      ++next[axis];
+      const double from = value(*it), to = value(next);
+      if ((from < 0) == (to < 0)) continue;
+      const double t = from / (from - to);
+      Vector3d normal = scale * ((1 - t) * plain_gradient(grid, *it) + t * plain_gradient(grid, next));
+      if (!(normal[axis] * (to - from) > 0)) normal[axis] = to - from;
+      normal.normalize();
+      result[EdgeKey{(*it).x(), (*it).y(), (*it).z(), axis}] = {float(t), {float(normal[0]), float(normal[1]), float(normal[2])}};
+    }
+  return result;
+}
+
+void expect_as_plain(const openvdb::FloatGrid::Ptr& grid, double isovalue, std::size_t at_least) {
+  RunContext context;
+  const FloatHermite hermite = sample_level_set(make_level_set(grid), isovalue, context);
+  check_consistent(hermite);
+  openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+  box.expand(12);
+  std::map<EdgeKey, EdgeCrossing> expected = plain_sampler(*grid, isovalue, box);
+  ASSERT_GE(expected.size(), at_least);
+  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
+    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+      const auto& lower = hermite.leaves[leaf].lower;
+      const auto found =
+          expected.find({lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7), axis});
+      ASSERT_NE(found, expected.end());
+      // Single precision divides by the difference of the ends, which is small where the surface runs along the edge.
+      ASSERT_NEAR(crossing.offset, found->second.offset, 1e-4);
+      for (int a = 0; a < 3; ++a) ASSERT_NEAR(crossing.normal[a], found->second.normal[a], 2e-5) << "axis " << a;
+      expected.erase(found);
+    });
+  EXPECT_EQ(expected.size(), 0u);
+}
+
+class LevelSetSamplerTest : public testing::Test {
+ protected:
+  void SetUp() override { initialize_openvdb(); }
+};
+
+TEST_F(LevelSetSamplerTest, SpheresAcrossNodesOfTheTree) {
+  for (const float half_width : {3.0f, 2.0f, 1.3f})
+    expect_as_plain(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+                        30.0f, openvdb::Vec3f(-2.3f, 127.6f, 1.7f), 1.0f, half_width),
+                    0.0, 10000);
+}
+
+TEST_F(LevelSetSamplerTest, AnIsovalueInsideTheBand) {
+  expect_as_plain(
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f, 3.0f),
+      1.25, 5000);
+}
+
+TEST_F(LevelSetSamplerTest, ScatteredActiveSamplesOfAVolumeThatIsNoLevelSet) {
+  // White noise, a third of it not active, over a background on either side of the isovalue.
+  for (const float background : {-1.0f, 1.0f})
+    for (const double isovalue : {0.0, 0.31}) {
+      const auto grid = openvdb::FloatGrid::create(background);
+      std::mt19937 random(11);
+      std::uniform_real_distribution<float> values(-1.0f, 1.0f);
+      for (int x = -9; x < 14; ++x)
+        for (int y = -9; y < 14; ++y)
+          for (int z = -9; z < 14; ++z) {
+            const float value = values(random);
+            if (random() % 3 == 0)
+              grid->tree().setValueOff(Coord(x, y, z), value);
+            else
+              grid->tree().setValueOn(Coord(x, y, z), value);
+          }
+      expect_as_plain(grid, isovalue, 10000);
+    }
+}
+
+TEST_F(LevelSetSamplerTest, SmoothFog) {
+  const auto grid = openvdb::FloatGrid::create(0.0f);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  for (int x = -20; x <= 20; ++x)
+    for (int y = -20; y <= 20; ++y)
+      for (int z = -20; z <= 20; ++z) {
+        const double density = 1.0 - Vector3d(x - 0.3, y + 0.4, z).norm() / 18.0;
+        if (density > 0) grid->tree().setValueOn(Coord(x, y, z), float(density));
+      }
+  expect_as_plain(grid, 0.4, 1000);
+}
+
+TEST_F(LevelSetSamplerTest, SamplesExactlyAtTheIsovalueAreOutside) {
+  // Integers with a third of zeros: offsets of exactly 0 and 1 and no NaN.
+  const auto grid = openvdb::FloatGrid::create(2.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  std::mt19937 random(5);
+  for (int x = 0; x < 20; ++x)
+    for (int y = 0; y < 20; ++y)
+      for (int z = 0; z < 20; ++z) grid->tree().setValueOn(Coord(x, y, z), float(int(random() % 3) - 1));
+  expect_as_plain(grid, 0.0, 3000);
+}
+
+TEST_F(LevelSetSamplerTest, EmptyAndFullVolumes) {
+  RunContext context;
+  const auto empty = openvdb::FloatGrid::create(3.0f);
+  EXPECT_TRUE(sample_level_set(make_level_set(empty), 0.0, context).leaves.empty());
+  // All inside but for nothing: no surface, and the outermost sign is told.
+  const auto full = openvdb::FloatGrid::create(-3.0f);
+  full->setGridClass(openvdb::GRID_LEVEL_SET);
+  const FloatHermite hermite = sample_level_set(make_level_set(full), 0.0, context);
+  EXPECT_TRUE(hermite.leaves.empty());
+  EXPECT_TRUE(hermite.outermost_inside);
+}
+
+TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
+  const LevelSet volume = make_level_set(
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
+  RunContext context;
+  const FloatHermite expected = sample_level_set(volume, 0.0, context);
+  const PackedHermite packed = sample_level_set_packed(volume, 0.0, NormalCodeId::octahedral, context);
+  EXPECT_EQ(pack(expected, NormalCodeId::octahedral, context).crossings, packed.crossings);
+  const auto expect_same = [&](const std::string& how) {
+    const FloatHermite again = sample_level_set(volume, 0.0, context);
+    EXPECT_TRUE(again.leaves == expected.leaves && again.crossings == expected.crossings) << how;
+  };
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    expect_same(std::string(name(level)));
+  }
+  unsetenv("HERMESH_SIMD");
+  for (const int threads : {1, 2, 7}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    expect_same(std::to_string(threads) + " threads");
+  }
+}
+
+TEST_F(LevelSetSamplerTest, CrossingsAreInAscendingOrderOfLeavesAndSignsFollowFromThem) {
+  RunContext context;
+  const auto sphere =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(40.0f, openvdb::Vec3f(0.0f, 0.0f, 0.0f), 1.0f);
+  const FloatHermite hermite = sample_level_set(make_level_set(sphere), 0.0, context);
+  EXPECT_TRUE(std::is_sorted(hermite.leaves.begin(), hermite.leaves.end(),
+                             [](const SignLeaf& a, const SignLeaf& b) { return a.lower < b.lower; }));
+  int missing_inside = 0;
+  for (int x = -64; x < 64; x += 8)
+    for (int y = -64; y < 64; y += 8)
+      for (int z = -64; z < 64; z += 8) {
+        if (hermite.find({x, y, z})) continue;
+        const bool inside = sphere->tree().getValue(Coord(x + 3, y + 3, z + 3)) < 0.0f;
+        ASSERT_EQ(hermite.sign_without_leaf({x, y, z}), inside);
+        missing_inside += inside;
+      }
+  EXPECT_GT(missing_inside, 100);
+}
+
+}  // namespace
+}  // namespace hermesh

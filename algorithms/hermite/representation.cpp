@@ -1,0 +1,67 @@
+#include "algorithms/hermite/representation.h"
+
+#include "algorithms/core/run_context.h"
+#include "algorithms/hermite/dense_hermite.h"
+
+namespace hermesh {
+namespace {
+
+template <class Voxel>
+void through_dense(const FloatHermite& hermite, NormalCodeId code, Represented& result, RunContext& context) {
+  const DenseHermite<Voxel> dense = [&] {
+    Stage stage(context, "store Hermite data");
+    return to_dense<Voxel>(hermite, context, code);
+  }();
+  result.bytes = dense.memory_bytes();
+  Stage stage(context, "read Hermite data");
+  result.hermite = to_sparse(dense, context, &result.lost);
+}
+
+}  // namespace
+
+Representation parse_representation(const std::string& name) {
+  if (name == "sparse-float") return Representation::sparse_float;
+  if (name == "sparse") return Representation::sparse;
+  if (name == "dense-float") return Representation::dense_float;
+  if (name == "fixed") return Representation::fixed;
+  if (name == "thesis") return Representation::thesis;
+  if (name == "directed") return Representation::directed;
+  throw Error("there is no representation of Hermite data '" + name +
+              "'; there are sparse-float, sparse, dense-float, fixed, thesis and directed");
+}
+
+Represented through(Representation representation, NormalCodeId code, FloatHermite hermite, RunContext& context) {
+  Represented result;
+  result.crossings = hermite.crossings.size();
+  switch (representation) {
+    case Representation::sparse_float:
+      result.bytes = hermite.memory_bytes();
+      result.hermite = std::move(hermite);
+      break;
+    case Representation::sparse: {
+      const PackedHermite packed = [&] {
+        Stage stage(context, "store Hermite data");
+        return pack(hermite, code, context);
+      }();
+      result.bytes = packed.memory_bytes();
+      Stage stage(context, "read Hermite data");
+      result.hermite = unpack(packed, context);
+      break;
+    }
+    case Representation::dense_float:
+      through_dense<FloatVoxel>(hermite, code, result, context);
+      break;
+    case Representation::fixed:
+      through_dense<FixedVoxel>(hermite, code, result, context);
+      break;
+    case Representation::thesis:
+      through_dense<ThesisVoxel>(hermite, code, result, context);
+      break;
+    case Representation::directed:
+      through_dense<DirectedVoxel>(hermite, code, result, context);
+      break;
+  }
+  return result;
+}
+
+}  // namespace hermesh

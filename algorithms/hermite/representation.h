@@ -1,0 +1,34 @@
+// The representations of Hermite data by name, so that one can be set against another.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "algorithms/hermite/sparse_hermite.h"
+
+namespace hermesh {
+
+enum class Representation {
+  sparse_float,  ///< FloatHermite
+  sparse,        ///< PackedHermite
+  dense_float,   ///< FloatVoxel, 52 bytes
+  fixed,         ///< FixedVoxel, 10 bytes
+  thesis,        ///< ThesisVoxel, 10 bytes
+  directed,      ///< DirectedVoxel, 12 bytes: offsets without normals
+};
+
+/// @throws Error for a name that is not one of "sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed".
+Representation parse_representation(const std::string& name);
+
+struct Represented {
+  FloatHermite hermite;       ///< what the representation gives back
+  std::size_t bytes = 0;      ///< that it takes, allocated
+  std::size_t crossings = 0;  ///< that there were before
+  std::size_t lost = 0;       ///< crossings that it lost; they came back as edges cut in the middle
+};
+
+/// Stores the data in a representation, with normals in `code` where it packs them, and reads them again.
+/// `thesis` has its own normals whatever `code` is.
+Represented through(Representation representation, NormalCodeId code, FloatHermite hermite, RunContext& context);
+
+}  // namespace hermesh

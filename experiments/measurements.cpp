@@ -1,0 +1,95 @@
+#include "experiments/measurements.h"
+
+#include <algorithm>
+
+#include "experiments/cell.h"
+#include "experiments/experiment_file.h"
+#include "experiments/provenance.h"
+#include "experiments/run_cells.h"
+
+namespace hermesh {
+namespace {
+
+/// @throws Error for what the measurement did not declare: no report would show it.
+const MeasuredTable& table_of(const MeasuredRow& row, const Measurement& measurement) {
+  const auto named = [](const std::string& name) {
+    return [&](const auto& each) { return each.name == name; };
+  };
+  const std::string who = "the measurement " + measurement.name + " gave a row of ";
+  const auto table = std::ranges::find_if(measurement.tables, named(row.table));
+  if (table == measurement.tables.end()) throw Error(who + "an unknown table \"" + row.table + "\"");
+  for (const auto& [key, value] : row.values.items())
+    if (std::ranges::none_of(table->columns, named(key)))
+      throw Error(who + row.table + " with an unknown column \"" + key + "\"");
+  return *table;
+}
+
+const Measurement& find_measurement(std::span<const Measurement> table, const std::string& name) {
+  const auto found = std::ranges::find(table, name, &Measurement::name);
+  if (found == table.end()) throw Error("there is no measurement \"" + name + "\"");
+  return *found;
+}
+
+/// Everything that a report needs, so that it does not depend on the program that made the row.
+Json to_json(const MeasuredTable& table) {
+  Json columns = Json::array();
+  for (const MeasuredColumn& column : table.columns)
+    columns.push_back({{"name", column.name}, {"header", column.header}, {"meaning", column.meaning}});
+  return {{"title", table.title},
+          {"first_column", table.first_column},
+          {"columns", columns},
+          {"printed", table.printed}};
+}
+
+Json row_json(const Json& head, const std::string& table, const std::string& label) {
+  Json row = head;
+  row["case"] = {{"name", table}};
+  row["variant"] = {{"name", label}, {"label", label}};
+  return row;
+}
+
+}  // namespace
+
+std::span<const Measurement> all_measurements() {
+  static const std::vector<Measurement> table = {normal_codes_measurement(), lost_crossings_measurement(),
+                                                 hermite_memory_measurement(), hermite_csg_measurement(),
+                                                 hermite_speed_measurement()};
+  return table;
+}
+
+std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
+                                  const std::filesystem::path& out, const std::string& filter,
+                                  const Json& head, RunContext& context) {
+  const Measurement& measurement = find_measurement(tables.measurements, experiment.measurement);
+  const Options parameters(measurement.name, measurement.parameters, tier.parameters);
+  Json full_head = head;
+  full_head["measurement"] = {
+      {"name", measurement.name}, {"parameters", parameters.canonical()}, {"seed", experiment.seed}};
+  full_head["load"] = load_averages();
+
+  std::vector<MeasuredRow> measured;
+  double seconds = 0.0;
+  const auto failure = attempt([&] {
+    seconds = timed([&] {
+      measured = measurement.measure({parameters, experiment.seed, tables, out, context});
+    });
+  });
+  if (failure) {
+    Json row = row_json(full_head, measurement.name, measurement.name);
+    row["failed"] = *failure;
+    return {row};
+  }
+  full_head["measurement"]["seconds"] = seconds;
+  std::vector<Json> rows;
+  for (const MeasuredRow& each : measured) {
+    const MeasuredTable& table = table_of(each, measurement);
+    if ((measurement.name + "/" + each.table + "/" + each.label).find(filter) == std::string::npos) continue;
+    rows.push_back(row_json(full_head, each.table, each.label));
+    rows.back()["table"] = to_json(table);
+    rows.back()["values"] = each.values.is_null() ? Json::object() : each.values;
+    if (!each.broken.empty()) rows.back()["broken"] = each.broken;
+  }
+  return rows;
+}
+
+}  // namespace hermesh
