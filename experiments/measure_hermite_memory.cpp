@@ -137,7 +137,8 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
 Measurement hermite_memory_measurement() {
   return {.name = "hermite-memory",
           .summary = "allocated bytes of uniform grids, level sets and Hermite data (tables 2.1 and 2.2)",
-          .parameters = {{"case", "bunny-closed", "model whose level set and Hermite data are set beside them"},
+          .parameters = {{"case", "bunny-closed", "model whose level set and Hermite data are set beside them",
+                          case_choices()},
                          {"resolution", "800", "voxels along its longest side", {}, 8, 20000},
                          {"largest_uniform", "1024", "width of the largest uniform grid that is allocated", {}, 0, 4096}},
           .tables = {{"uniform",

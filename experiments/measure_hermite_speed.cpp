@@ -198,7 +198,7 @@ Measurement hermite_speed_measurement() {
       {"ratio", "times as fast", "as the peer: volumeToMesh at adaptivity 0, the write floor, or the way over floats"}};
   return {.name = "hermite-speed",
           .summary = "time to make Hermite data from a level set and to unite them",
-          .parameters = {{"case", "bunny-closed", "model"},
+          .parameters = {{"case", "bunny-closed", "model", case_choices()},
                          {"resolution", "800", "voxels along its longest side", {}, 8, 20000},
                          {"repetitions", "9", "of every contender, in turns", {}, 1, 1000}},
           .tables = {{"memory",

@@ -50,6 +50,12 @@ Json row_json(const Json& head, const std::string& table, const std::string& lab
 
 }  // namespace
 
+std::vector<std::string> case_choices() {
+  std::vector<std::string> names;
+  for (const CaseInfo& info : list_cases()) names.push_back(info.name);
+  return names;
+}
+
 std::span<const Measurement> all_measurements() {
   static const std::vector<Measurement> table = {normal_codes_measurement(), lost_crossings_measurement(),
                                                  hermite_memory_measurement(), hermite_csg_measurement(),

@@ -68,6 +68,9 @@ struct Measurement {
   std::function<std::vector<MeasuredRow>(const MeasurementInput&)> measure;
 };
 
+/// For a parameter that names a case: what it may be.
+std::vector<std::string> case_choices();
+
 /// The table of measurements.
 std::span<const Measurement> all_measurements();
 

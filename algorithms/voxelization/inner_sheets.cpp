@@ -145,11 +145,10 @@ class Finder {
  private:
   /// Voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
   /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the
-  /// solid; but inner sheets near a seam look the same, so they count in blocks that others with an odd
-  /// number lead to.
+  /// solid; but inner sheets near a seam look the same, so they count where a chain of such voxels leads to
+  /// one with an odd number.
   void find_suspects() {
-    std::vector<VoxelBits> marked(band_.blocks.size(), VoxelBits{});
-    std::vector<char> counts(band_.blocks.size(), 0);
+    std::vector<VoxelBits> marked(band_.blocks.size(), VoxelBits{}), counts = marked;
     parallel_blocks(marked.size(), context_, [&](std::size_t i) {
       std::vector<InnerEdge> edges = inner_edges(std::uint32_t(i));
       if (edges.empty()) return;
@@ -157,40 +156,50 @@ class Finder {
       for (InnerEdge& edge : edges) {
         const unsigned place = place_in_tile(edge.voxel);
         const int sheets = edge.sheets();
-        if (sheets > 0) marked[i][place >> 6] |= std::uint64_t(1) << (place & 63);
-        if (sheets % 2 == 1) counts[i] = 1;
+        const std::uint64_t bit = std::uint64_t(1) << (place & 63);
+        if (sheets > 0) marked[i][place >> 6] |= bit;
+        if (sheets % 2 == 1) counts[i][place >> 6] |= bit;
       }
     });
     spread_over_neighbours(marked, counts);
     suspicious_.assign(band_.blocks.size(), VoxelBits{});
-    for (std::uint32_t i = 0; i < marked.size(); ++i) {
-      if (!counts[i]) continue;
-      const BlockAt& at = band_.blocks[i];
-      for (std::int32_t x = 0; x < 8; ++x)
-        for (std::uint64_t bits = marked[i][std::size_t(x)]; bits; bits &= bits - 1) {
-          const int place = __builtin_ctzll(bits);
-          suspect_around({at[0] * 8 + x, at[1] * 8 + place / 8, at[2] * 8 + place % 8});
-        }
-    }
+    for (std::uint32_t i = 0; i < marked.size(); ++i)
+      for_each_voxel(counts, i, [&](const Voxel& voxel) { suspect_around(voxel); });
     for (std::uint32_t i = 0; i < suspicious_.size(); ++i)
       if (suspicious_[i] != VoxelBits{}) suspects_.push_back(i);
   }
 
-  /// Lets all blocks count that have a mark and that a chain of such blocks joins to one that counts.
-  void spread_over_neighbours(const std::vector<VoxelBits>& marked, std::vector<char>& counts) const {
-    std::vector<std::uint32_t> stack;
+  /// Calls f(voxel) for the bits of a block.
+  template <class F>
+  void for_each_voxel(const std::vector<VoxelBits>& bits_of, std::uint32_t block, F&& f) const {
+    const BlockAt& at = band_.blocks[block];
+    for (std::int32_t x = 0; x < 8; ++x)
+      for (std::uint64_t bits = bits_of[block][std::size_t(x)]; bits; bits &= bits - 1) {
+        const int place = __builtin_ctzll(bits);
+        f(Voxel{at[0] * 8 + x, at[1] * 8 + place / 8, at[2] * 8 + place % 8});
+      }
+  }
+
+  /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that counts.
+  void spread_over_neighbours(const std::vector<VoxelBits>& marked, std::vector<VoxelBits>& counts) const {
+    std::vector<Voxel> stack;
     for (std::uint32_t i = 0; i < counts.size(); ++i)
-      if (counts[i]) stack.push_back(i);
+      for_each_voxel(counts, i, [&](const Voxel& voxel) { stack.push_back(voxel); });
+    BlockFinder finder(bins_.blocks());
     while (!stack.empty()) {
-      const BlockAt at = band_.blocks[stack.back()];
+      const Voxel at = stack.back();
       stack.pop_back();
       for (std::int32_t x = -1; x <= 1; ++x)
         for (std::int32_t y = -1; y <= 1; ++y)
           for (std::int32_t z = -1; z <= 1; ++z) {
-            const std::uint32_t i = bins_.blocks().find({at[0] + x, at[1] + y, at[2] + z});
-            if (i == BlockTable::kNone || counts[i] || marked[i] == VoxelBits{}) continue;
-            counts[i] = 1;
-            stack.push_back(i);
+            const Voxel there = {at[0] + x, at[1] + y, at[2] + z};
+            const std::uint32_t block = finder.find(tile_of(there));
+            if (block == BlockTable::kNone) continue;
+            const unsigned place = place_in_tile(there);
+            const std::uint64_t bit = std::uint64_t(1) << (place & 63);
+            if (!(marked[block][place >> 6] & bit) || (counts[block][place >> 6] & bit)) continue;
+            counts[block][place >> 6] |= bit;
+            stack.push_back(there);
           }
     }
   }
@@ -326,22 +335,36 @@ class Finder {
   }
 
   /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
-  /// them, and only winding numbers tell an overlap from a gap. They are not asked where all that is inner or
-  /// doubtful may be the walls of gaps: they take longer than all the rest of the signs.
+  /// them, and only winding numbers tell an overlap from a gap. They are asked where inner sheets are the rule,
+  /// and what is doubtful are the seams between them: parts of a model that overlap. Where as much is doubtful as
+  /// is inner, these are the folds and crevices of a scan, of which nothing goes far; their walls stay. For winding
+  /// numbers and the search for ways along a crevice take longer than all the rest of the signs; of a small model
+  /// they are asked in any case.
   void settle_doubts(const std::vector<std::uint32_t>& triangles, std::vector<Remains>& remains) const {
     std::vector<std::uint32_t> doubtful;
-    bool seen_inner = false;
+    std::size_t seen_inner = 0, pieces = 0;
     for (std::uint32_t i = 0; i < remains.size(); ++i) {
       if (!remains[i].doubtful.empty()) doubtful.push_back(i);
-      seen_inner |= remains[i].seen_inner;
+      seen_inner += remains[i].seen_inner ? 1 : 0;
+      pieces += remains[i].doubtful.size();
     }
-    if (doubtful.empty() || !seen_inner) return;
+    if (doubtful.empty() || seen_inner == 0) return leave_doubts(doubtful, remains);
+    constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one
+    constexpr std::size_t kFewPieces = 5000, kSmallModel = 50'000;  // some tenths of a second
+    const bool small = pieces <= kFewPieces && soup_.size() <= kSmallModel;
+    if (!small && seen_inner < kTheRule * doubtful.size()) return leave_doubts(doubtful, remains);
     const OrientedWinding winding(soup_);
-    for_each_triangle(triangles, doubtful, true, winding.usable() ? &winding.number() : nullptr,
+    if (!winding.usable()) return leave_doubts(doubtful, remains);
+    for_each_triangle(triangles, doubtful, true, &winding.number(),
                       [&](const Piece&, const Vector3d& normal, std::uint32_t i, Prober& prober) {
                         for (const Piece& piece : remains[i].doubtful)
                           cut(piece, normal, prober, true, remains[i]);
                       });
+  }
+
+  static void leave_doubts(const std::vector<std::uint32_t>& doubtful, std::vector<Remains>& remains) {
+    for (const std::uint32_t i : doubtful)
+      remains[i].outer.insert(remains[i].outer.end(), remains[i].doubtful.begin(), remains[i].doubtful.end());
   }
 
   /// Calls f(triangle, its unit normal, number, prober) for some of the triangles, given by number, in
