@@ -278,20 +278,17 @@ Experiment read_measurement(const Section& file, const Vocabulary& vocabulary, E
 }
 
 void read_extraction(const Section& file, const Vocabulary& vocabulary, Experiment& experiment) {
-  for (const char* key : {"exterior_band", "interior_band", "plots"})
+  for (const char* key : {"exterior_band", "interior_band"})
     if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"voxelization\"");
   experiment.variants = read_variants(file, "variant", vocabulary.extractors);
   if (file.has("features")) experiment.features = file.number_or("features", 30.0, 0.0, 180.0);
 }
 
-void read_voxelization(const Section& file, const Vocabulary& vocabulary, Experiment& experiment) {
+void read_voxelization(const Section& file, Experiment& experiment) {
   for (const char* key : {"variants", "features"})
     if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"extraction\"");
   experiment.exterior_band = file.number_or("exterior_band", 3.0, 1.0, 1e4);
   experiment.interior_band = file.number_or("interior_band", 3.0, 1.0, 1e4);
-  if (file.has("plots"))
-    for (const toml::node& node : file.list("plots"))
-      experiment.plots.push_back(read_plot(file, node, vocabulary));
 }
 
 }  // namespace
@@ -312,7 +309,13 @@ Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& 
   experiment.voxelizers = read_voxelizers(file, vocabulary.voxelizers);
   experiment.columns = file.names("columns", "column", vocabulary.columns);
   const bool extraction = experiment.kind == ExperimentKind::kExtraction;
-  (extraction ? read_extraction : read_voxelization)(file, vocabulary, experiment);
+  if (extraction)
+    read_extraction(file, vocabulary, experiment);
+  else
+    read_voxelization(file, experiment);
+  if (file.has("plots"))
+    for (const toml::node& node : file.list("plots"))
+      experiment.plots.push_back(read_plot(file, node, vocabulary));
   for (const std::string tier : {"quick", "full"})
     if (const toml::table* found = file.optional_table(tier))
       experiment.tiers[tier] = read_tier(file, tier, *found, experiment.kind, vocabulary.cases);

@@ -1,5 +1,7 @@
 // The laws of Boolean algebra on Hermite data of every representation, and two real scans united.
+#include <Eigen/Geometry>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
@@ -17,7 +19,9 @@ using Eigen::Vector3d;
 
 // ---- Laws.
 
-/// A few spheres and boxes with faces along the grid, whose normals are those that the thesis's layout has no code for.
+/// A few spheres, and boxes turned by 0.3° about an axis square to z, so that the upper faces lean into the positive
+/// octant, where the thesis's layout takes normals for none, and the lower ones into the negative, whence its complement
+/// turns them there.
 AnalyticSurface random_solid(std::mt19937_64& random) {
   struct Part {
     Vector3d centre, half;
@@ -30,9 +34,11 @@ AnalyticSurface random_solid(std::mt19937_64& random) {
     part.half = Vector3d(size(random), size(random), size(random));
     part.box = random() % 2 == 0;
   }
-  const auto distance = [](const Part& part, const Vector3d& p) {
+  const Eigen::Matrix3d to_box =
+      Eigen::AngleAxisd(-0.3 * std::numbers::pi / 180.0, Vector3d(-1, 1, 0).normalized()).matrix();
+  const auto distance = [=](const Part& part, const Vector3d& p) {
     const Vector3d away = p - part.centre;
-    return part.box ? (away.cwiseAbs() - part.half).maxCoeff() : away.norm() - part.half.x();
+    return part.box ? ((to_box * away).cwiseAbs() - part.half).maxCoeff() : away.norm() - part.half.x();
   };
   const auto nearest = [=](const Vector3d& p) {
     std::size_t best = 0;
@@ -45,9 +51,10 @@ AnalyticSurface random_solid(std::mt19937_64& random) {
             const Part part = nearest(p);
             const Vector3d away = p - part.centre;
             if (!part.box) return away;
+            const Vector3d local = to_box * away;
             int face = 0;
-            (away.cwiseAbs() - part.half).maxCoeff(&face);
-            return std::copysign(1.0, away[face]) * Vector3d::Unit(face);
+            (local.cwiseAbs() - part.half).maxCoeff(&face);
+            return std::copysign(1.0, local[face]) * (to_box.transpose() * Vector3d::Unit(face));
           }};
 }
 

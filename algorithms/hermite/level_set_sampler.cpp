@@ -277,9 +277,21 @@ struct LiveLeaf {
   bool operator<(const LiveLeaf& other) const { return lower < other.lower; }
 };
 
-/// The next leaf's samples: they lie where no machine can guess, and waiting for them costs more than the arithmetic.
-void prefetch(const float* values) {
-  for (int i = 0; i < 512; i += 16) __builtin_prefetch(values + i);
+/// The samples that the next leaf's stencils read: they lie where no machine can guess, and waiting for them costs more
+/// than the arithmetic. The neighbours along z are leaves that come next or came before.
+void prefetch(const LeafTable& table, std::size_t leaf) {
+  const auto lines = [&](int dx, int dy, int first, int stride, int count) {
+    const std::int32_t there = table.neighbour(leaf, dx, dy, 0);
+    if (there < 0) return;
+    const float* values = table.values(static_cast<std::size_t>(there)) + first;
+    for (int i = 0; i < count; ++i) __builtin_prefetch(values + stride * i);
+  };
+  constexpr int kLine = 16;  // samples
+  lines(0, 0, 0, kLine, 32);
+  lines(1, 0, 0, kLine, 8);              // layers 0 and 1
+  lines(-1, 0, 7 * 64, kLine, 4);        // layer 7
+  lines(0, 1, 0, 64, 8);                 // rows 0 and 1 of each layer
+  lines(0, -1, 7 * 8, 64, 8);            // row 7
 }
 
 template <class Crossing, class Make>
@@ -316,7 +328,7 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue, RunCo
   result.crossings.resize(exclusive_scan(first, "edge crossings"));
   result.leaves.resize(live.size());
   parallel_blocks(live.size(), context, [&](std::size_t i) {
-    if (i + 1 < live.size()) prefetch(table.values(live[i + 1].leaf));
+    if (i + 1 < live.size()) prefetch(table, live[i + 1].leaf);
     SignLeaf leaf = sign_leaf(table, live[i].leaf);
     leaf.lower = live[i].lower;
     leaf.first = static_cast<std::uint32_t>(first[i]);

@@ -30,6 +30,20 @@ Representation parse_representation(const std::string& name) {
               "'; there are sparse-float, sparse, dense-float, fixed, thesis and directed");
 }
 
+void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context) {
+  const auto bytes = static_cast<double>(data.bytes);
+  context.figure("hermite_bytes", bytes);
+  if (data.crossings > 0)
+    context.figure("hermite_bytes_per_crossing", bytes / static_cast<double>(data.crossings));
+  const std::size_t voxels = level_set.active_voxels();
+  if (voxels > 0) context.figure("hermite_bytes_per_voxel", bytes / static_cast<double>(voxels));
+  context.figure("lost_crossings", static_cast<double>(data.lost));
+  if (data.lost > 0)
+    context.note(std::to_string(data.lost) + " of " + std::to_string(data.crossings) +
+                       " edge crossings were lost by the representation of the Hermite data and stand in the middle "
+                       "of their edges");
+}
+
 Represented through(Representation representation, NormalCodeId code, FloatHermite hermite, RunContext& context) {
   Represented result;
   result.crossings = hermite.crossings.size();

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string>
 
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
 
 namespace hermesh {
@@ -26,6 +28,9 @@ struct Represented {
   std::size_t crossings = 0;  ///< that there were before
   std::size_t lost = 0;       ///< crossings that it lost; they came back as edges cut in the middle
 };
+
+/// Its bytes, in all, a crossing and an active voxel of the level set, and what it lost, as figures of the run.
+void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context);
 
 /// Stores the data in a representation, with normals in `code` where it packs them, and reads them again.
 /// `thesis` has its own normals whatever `code` is.

@@ -236,20 +236,6 @@ FloatHermite sample(const ExtractionInput& input) {
   return hermite;
 }
 
-void report_figures(const Represented& data, const ExtractionInput& input) {
-  const auto bytes = static_cast<double>(data.bytes);
-  input.context.figure("hermite_bytes", bytes);
-  if (data.crossings > 0)
-    input.context.figure("hermite_bytes_per_crossing", bytes / static_cast<double>(data.crossings));
-  const std::size_t voxels = input.level_set.active_voxels();
-  if (voxels > 0) input.context.figure("hermite_bytes_per_voxel", bytes / static_cast<double>(voxels));
-  input.context.figure("lost_crossings", static_cast<double>(data.lost));
-  if (data.lost > 0)
-    input.context.note(std::to_string(data.lost) + " of " + std::to_string(data.crossings) +
-                       " edge crossings were lost by the representation of the Hermite data and stand in the middle "
-                       "of their edges");
-}
-
 }  // namespace
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
@@ -263,7 +249,7 @@ PolygonMesh dual_contouring(const ExtractionInput& input) {
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");
   const Represented data = through(representation, parse_normal_code(input.options.text("normals")), sample(input),
                                    input.context);
-  report_figures(data, input);
+  report_figures(data, input.level_set, input.context);
   return dual_contouring(view_of(data.hermite, input.context), options, input.context);
 }
 

@@ -88,9 +88,11 @@ std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
   if (!input.source)
     throw Error(
         "marching-cubes was asked for exact crossings, which need the polygons; use 'remesh', or -o crossings=samples");
-  return through(Representation::directed, NormalCodeId::octahedral,
-                 sample_polygons(input.level_set, input.isovalue, *input.source, input.context), input.context)
-      .hermite;
+  Represented data =
+      through(Representation::directed, NormalCodeId::octahedral,
+              sample_polygons(input.level_set, input.isovalue, *input.source, input.context), input.context);
+  report_figures(data, input.level_set, input.context);
+  return std::move(data.hermite);
 }
 
 }  // namespace
