@@ -44,6 +44,7 @@ struct Session {
 void add_list(CLI::App& app, Session& session);
 void add_voxelize(CLI::App& app, Session& session);
 void add_conversions(CLI::App& app, Session& session);  ///< extract, remesh
+void add_combine(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_experiments(CLI::App& app, Session& session);  ///< run, report

@@ -238,12 +238,16 @@ FloatHermite sample(const ExtractionInput& input) {
 
 }  // namespace
 
-PolygonMesh dual_contouring(const ExtractionInput& input) {
+DualContouringOptions read_dual_contouring_options(const Options& given) {
   DualContouringOptions options;
-  if (input.options.text("placement") == "average")
-    options.placement = DualContouringOptions::Placement::average;
-  options.truncation = input.options.number("truncation");
-  options.reach = input.options.number("reach");
+  if (given.is("placement", "average")) options.placement = DualContouringOptions::Placement::average;
+  options.truncation = given.number("truncation");
+  options.reach = given.number("reach");
+  return options;
+}
+
+PolygonMesh dual_contouring(const ExtractionInput& input) {
+  const DualContouringOptions options = read_dual_contouring_options(input.options);
   const Representation representation = parse_representation(input.options.text("representation"));
   if (representation == Representation::directed && options.placement == DualContouringOptions::Placement::optimal)
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");

@@ -27,6 +27,9 @@ struct DualContouringOptions {
 PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
                             RunContext& context);
 
+/// From options checked against dual_contouring_options().
+DualContouringOptions read_dual_contouring_options(const Options& options);
+
 /// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source
 /// polygons.
 PolygonMesh dual_contouring(const ExtractionInput& input);
