@@ -43,13 +43,13 @@ Json run_head(const Experiment& experiment, const RunSettings& settings) {
   head["run"] = origin.at("date").get<std::string>() + "-" + std::to_string(getpid());
   head.update(origin);
   if (!experiment.columns.empty()) head["columns"] = experiment.columns;
+  if (!experiment.plots.empty()) head["plots"] = Json::array();
+  for (const Plot& plot : experiment.plots) head["plots"].push_back(to_json(plot));
   if (experiment.kind == ExperimentKind::kExtraction) return head;
   const bool voxelization = experiment.kind == ExperimentKind::kVoxelization;
   head["kind"] = voxelization ? "voxelization" : "measurement";
   if (voxelization)
     head["band"] = {{"exterior", experiment.exterior_band}, {"interior", experiment.interior_band}};
-  if (!experiment.plots.empty()) head["plots"] = Json::array();
-  for (const Plot& plot : experiment.plots) head["plots"].push_back(to_json(plot));
   return head;
 }
 

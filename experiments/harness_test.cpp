@@ -105,6 +105,22 @@ class Harness : public testing::Test {
   std::ostringstream table_;
 };
 
+TEST_F(Harness, AnExperimentOnExtractionMayHavePlots) {
+  std::ofstream(folder_ / "toy.toml") << "question = \"why?\"\nvoxelizers = [\"openvdb\"]\ncolumns = [\"points\"]\n"
+                                         "variants = [{ name = \"copier\" }]\n"
+                                         "[[plots]]\nname = \"p\"\ntitle = \"t\"\nx = \"points\"\ny = [\"triangles\"]\n"
+                                         "x_label = \"x\"\ny_label = \"y\"\n"
+                                         "[quick]\nrepetitions = 1\nsamples = 500\npixels = 0\n"
+                                         "cases = [{ name = \"ball\", resolutions = [12, 16] }]\n";
+  EXPECT_EQ(run_experiment({folder_ / "toy.toml", "quick", folder_ / "out", ""}, tables_, context_, table_), 0);
+  ASSERT_EQ(rows().back().at("plots").size(), 1u);
+  std::ifstream data(folder_ / "out" / "toy-p.dat");
+  std::string curve, point;
+  std::getline(data, curve);
+  EXPECT_EQ(curve, "# copier");
+  EXPECT_TRUE(std::getline(data, point) && !point.empty());
+}
+
 TEST_F(Harness, ARowHoldsEverythingThatTheCellIs) {
   EXPECT_EQ(run(R"({ name = "copier", label = "good", options = { size = 2 } }, { name = "openvdb" })"), 0);
   const std::vector<Json> all = rows();

@@ -43,17 +43,14 @@ struct Piece : Facet {
 
 using Voxel = std::array<std::int32_t, 3>;
 
-/// What a thread asks about pieces.
-class Prober {
+/// Which voxels are suspicious; each thread has its own, since it keeps the block that it looked up last.
+class Suspicion {
  public:
-  Prober(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
-         const std::vector<VoxelBits>& suspicious, bool thorough, const WindingNumber* winding)
-      : probe_(soup, bins, inside, thorough, winding), suspicious_(suspicious), finder_(bins.blocks()) {}
+  Suspicion(const std::vector<VoxelBits>& suspicious, const BlockTable& blocks)
+      : suspicious_(suspicious), finder_(blocks) {}
 
-  Side side(const Vector3d& q, const Vector3d& normal) { return probe_.side(q, normal); }
-
-  /// Whether a suspicious voxel is in or next to the piece's box.
-  bool suspicious(const Piece& piece) {
+  /// Whether such a voxel is in or next to the piece's box.
+  bool touches(const Piece& piece) {
     Voxel from, to;
     for (int a = 0; a < 3; ++a) {
       const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
@@ -63,21 +60,35 @@ class Prober {
     for (std::int32_t x = from[0]; x <= to[0]; ++x)
       for (std::int32_t y = from[1]; y <= to[1]; ++y)
         for (std::int32_t z = from[2]; z <= to[2]; ++z)
-          if (is_suspicious({x, y, z})) return true;
+          if (has({x, y, z})) return true;
     return false;
   }
 
  private:
-  bool is_suspicious(const Voxel& voxel) {
+  bool has(const Voxel& voxel) {
     const std::uint32_t block = finder_.find(tile_of(voxel));
     if (block == BlockTable::kNone) return false;
     const unsigned place = place_in_tile(voxel);
     return suspicious_[block][place >> 6] >> (place & 63) & 1;
   }
 
-  SurfaceProbe probe_;
   const std::vector<VoxelBits>& suspicious_;
   BlockFinder finder_;
+};
+
+/// What a thread asks about pieces.
+class Prober {
+ public:
+  Prober(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
+         const std::vector<VoxelBits>& suspicious, bool thorough, const WindingNumber* winding)
+      : probe_(soup, bins, inside, thorough, winding), suspicion_(suspicious, bins.blocks()) {}
+
+  Side side(const Vector3d& q, const Vector3d& normal) { return probe_.side(q, normal); }
+  bool suspicious(const Piece& piece) { return suspicion_.touches(piece); }
+
+ private:
+  SurfaceProbe probe_;
+  Suspicion suspicion_;
 };
 
 /// What of a triangle is left.
@@ -127,10 +138,7 @@ class Finder {
   InnerSheets run(double reach, double voxel_size) {
     find_suspects();
     InnerSheets sheets;
-    std::vector<std::uint32_t> triangles;
-    for (const std::uint32_t block : suspects_) add_triangles(block, triangles);
-    std::sort(triangles.begin(), triangles.end());
-    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    const std::vector<std::uint32_t> triangles = find_triangles();
     std::vector<Remains> remains = cut_all(triangles);
     settle_doubts(triangles, remains);
     for (std::size_t i = 0; i < triangles.size(); ++i) {
@@ -311,8 +319,22 @@ class Finder {
     return edges;
   }
 
+  /// All that touch a suspicious voxel.
+  std::vector<std::uint32_t> find_triangles() const {
+    std::vector<std::vector<std::uint32_t>> lists(suspects_.size());
+    parallel_blocks(suspects_.size(), context_, [&](std::size_t i) {
+      add_triangles(suspects_[i], lists[i]);
+      Suspicion suspicion(suspicious_, bins_.blocks());
+      std::erase_if(lists[i], [&](std::uint32_t t) { return !suspicion.touches(Piece(soup_.corners(t))); });
+    });
+    std::vector<std::uint32_t> triangles;
+    for (const auto& list : lists) triangles.insert(triangles.end(), list.begin(), list.end());
+    std::sort(triangles.begin(), triangles.end());
+    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    return triangles;
+  }
+
   void add_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
-    context_.check();
     const BlockAt& at = band_.blocks[block];
     bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)

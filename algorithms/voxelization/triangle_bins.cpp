@@ -22,7 +22,7 @@ constexpr std::size_t kMostSlabs = 16;
 /// bins, or as many triangles.
 constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
-constexpr std::size_t kMany = 1024;
+constexpr std::size_t kMany = 256;
 
 std::int32_t block_of(double voxel) { return std::int32_t(std::floor(voxel)) >> 3; }
 

@@ -185,7 +185,9 @@ TEST(Band, SameDistancesWhateverTheOrderOfTheTriangles) {
   ASSERT_EQ(other.size(), leaves);
   for (std::size_t i = 0; i < once.blocks.size(); ++i)
     for (unsigned v = 0; v < (once.leaves[i] ? 512u : 0u); ++v) {
-      ASSERT_EQ(once.leaves[i]->getValue(v), other.at(once.blocks[i])->getValue(v));
+      // Of two triangles that share the nearest point one may be left out, as its cluster cannot be nearer; their
+      // distances are equal but for the rounding of their planes.
+      ASSERT_NEAR(once.leaves[i]->getValue(v), other.at(once.blocks[i])->getValue(v), 2e-6);
     }
 }
 
