@@ -23,8 +23,8 @@ namespace {
 using openvdb::Coord;
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 
-/// Signs of 64 samples; `not_finite` is set where one of them is no number. A shift of signs, because a comparison a
-/// sample would cost more than reading it.
+/// Signs of 64 samples; `not_finite` is set where one of them is no number. Four at a time, because one after the other
+/// they would take longer than it takes to read them.
 std::uint64_t signs_of_64(const float* values, const InsideRule& rule, bool& not_finite) {
   std::uint64_t bits = 0;
 #if defined(__SSE2__)

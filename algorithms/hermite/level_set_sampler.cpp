@@ -176,7 +176,7 @@ SignLeaf sign_leaf(const LeafTable& table, std::size_t leaf) {
 struct Volume {
   const LeafTable& table;
   bool masked;         ///< samples that are not active are no data
-  float data_below;    ///< samples of at least this magnitude are no data
+  float data_below;    ///< samples of no less than this magnitude are no data
   edge_kernels::Sample* sample;
 };
 
