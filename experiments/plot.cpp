@@ -116,7 +116,11 @@ void write_data(const std::filesystem::path& file, const std::vector<Curve>& cur
 /// Paths in the script are relative to its folder, so that it can be run again anywhere.
 void write_script(const std::filesystem::path& file, const Plot& plot, const std::vector<Curve>& curves) {
   std::ofstream out(file);
-  out << "# gnuplot " << file.filename().string() << kFrame << "set title " << quoted(plot.title)
+  out << "# gnuplot " << file.filename().string() << kFrame;
+  // Above the picture a long key would leave no room for it.
+  if (curves.size() > kStyles.size())
+    out << "set key outside right center vertical maxcols 1 samplen 1 spacing 1.1 font ',9'\nset rmargin -1\n";
+  out << "set title " << quoted(plot.title)
       << " noenhanced\nset xlabel " << quoted(plot.x_label) << " noenhanced\nset ylabel "
       << quoted(plot.y_label) << " noenhanced\n";
   if (plot.log_x) out << "set logscale x\nset format x '%.0s%c'\n";
