@@ -2,13 +2,13 @@
 
 #include <sstream>
 
-#include "validation/normal_error.h"
 #include "validation/distance.h"
 #include "validation/features.h"
 #include "validation/hausdorff.h"
 #include "validation/library_counts.h"
 #include "validation/measures.h"
 #include "validation/mesh_report.h"
+#include "validation/normal_error.h"
 #include "validation/self_intersection.h"
 #include "validation/topology.h"
 
