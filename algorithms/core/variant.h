@@ -22,6 +22,8 @@ struct Promises {
   bool no_self_intersection = false;  ///< no pair of polygons meets except along a shared corner or edge
 };
 
+struct AdaptivityField;  // extraction/adaptivity_field.h
+
 /// Volume in, mesh out.
 struct ExtractionInput {
   const LevelSet& level_set;
@@ -30,6 +32,9 @@ struct ExtractionInput {
       nullptr;  ///< the polygons that the volume was made from, where they are at hand
   const Options& options;
   RunContext& context;
+  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform one
+  /// leaves it alone.
+  const AdaptivityField* field = nullptr;
 };
 
 struct Extractor {

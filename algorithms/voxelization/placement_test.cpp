@@ -1,5 +1,6 @@
 // Where a volume lies in the world, far from the origin above all.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -23,7 +24,8 @@ double to_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
 
 /// As a file of decimal numbers would bring it.
 PolygonMesh box_from_file(const Vector3d& low, const Vector3d& high) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "hermesh_placement_test.obj";
+  const auto path =
+      std::filesystem::temp_directory_path() / ("hermesh-placement-" + std::to_string(getpid()) + ".obj");
   {
     std::ofstream file(path);
     file << std::setprecision(17);
