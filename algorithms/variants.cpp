@@ -1,6 +1,8 @@
 #include "algorithms/variants.h"
 
+#include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
+#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 #include "algorithms/voxelization/thesis_voxelizer.h"
@@ -21,6 +23,16 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},
+      {.name = "adaptive-dual-contouring",
+       .summary = "cells merged into 2³, 4³ and 8³ regions within each block, as printed (Aldén 2011, chapter 6)",
+       .promises = {.closed = true, .oriented = true},
+       .options = adaptive_dual_contouring_options(),
+       .extract = adaptive_dual_contouring},
+      {.name = "manifold-dual-contouring",
+       .summary = "adaptive dual contouring within a stated tolerance: closed, manifold, free of self-intersection, sharp",
+       .promises = {.closed = true, .manifold = true, .oriented = true, .no_self_intersection = true},
+       .options = manifold_dual_contouring_options(),
+       .extract = manifold_dual_contouring},
   };
   return table;
 }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "algorithms/core/error.h"
+#include "experiments/volume_cases.h"
 
 namespace hermesh {
 
@@ -37,7 +38,9 @@ class CaseFileReader {
     result.summary = text(entry, "summary");
     if (!names_.insert(result.name).second)
       fail(entry.source(), "the case '" + result.name + "' is there twice");
-    if (entry.contains("files")) {
+    if (entry.contains("volume")) {
+      add_volume(result, entry);
+    } else if (entry.contains("files")) {
       check_keys(entry, {"name", "summary", "files", "triangles", "stand_in"});
       add_files(result, *entry.get("files"));
       result.triangles = static_cast<std::size_t>(number(*get(entry, "triangles")));
@@ -60,6 +63,30 @@ class CaseFileReader {
       result.sha256 = text(entry, "sha256");
     }
     cases_.push_back(std::move(result));
+  }
+
+  void add_volume(CaseRecipe& result, const toml::table& entry) {
+    check_keys(entry, {"name", "summary", "files", "volume", "stand_in"});
+    add_files(result, *get(entry, "files"));
+    result.is_volume = true;
+    result.stand_in = text(entry, "stand_in");
+    if (!is_volume_stand_in(result.stand_in))
+      fail(get(entry, "stand_in")->source(), "there is no stand-in for a volume '" + result.stand_in + "'");
+    const toml::table& volume = table(*get(entry, "volume"));
+    check_keys(volume, {"dims", "type", "spacing"});
+    if (volume.empty()) return;
+    RawSamples raw;
+    const std::array<double, 3> dims = three(volume, "dims");
+    for (std::size_t i = 0; i < 3; ++i) raw.dims[i] = static_cast<std::int64_t>(dims[i]);
+    raw.type = text(volume, "type");
+    raw.spacing = three(volume, "spacing");
+    result.raw = raw;
+  }
+  std::array<double, 3> three(const toml::table& entry, std::string_view key) {
+    const toml::node* const node = get(entry, key);
+    const toml::array* const list = node->as_array();
+    if (!list || list->size() != 3) fail(node->source(), "'" + std::string(key) + "' must be three numbers");
+    return {number((*list)[0]), number((*list)[1]), number((*list)[2])};
   }
 
   void add_files(CaseRecipe& result, const toml::node& node) {

@@ -1,8 +1,11 @@
 // The recipes of cases.toml as they stand there.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +20,13 @@ struct CaseFile {
   std::string from;    ///< where fetch_data.sh gets it; empty for a file that only the data folder can have
 };
 
+/// How a file of raw samples is laid out, as text for import_volume.h.
+struct RawSamples {
+  std::array<std::int64_t, 3> dims{};
+  std::string type;
+  std::array<double, 3> spacing{1.0, 1.0, 1.0};  ///< mm
+};
+
 /// A case is either files, the first that is to be had wins, with a stand-in (a recipe that takes a number of
 /// triangles) for when none is; or a recipe; or another case with its holes closed.
 struct CaseRecipe {
@@ -27,6 +37,8 @@ struct CaseRecipe {
   std::string recipe;
   RecipeParameters parameters;
   std::string close_holes_of;
+  bool is_volume = false;         ///< samples instead of polygons; its stand-in is one of volume_cases.h
+  std::optional<RawSamples> raw;  ///< of a volume whose file does not say
   std::string sha256;  ///< of a generated mesh's arrays
 };
 

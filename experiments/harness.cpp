@@ -239,7 +239,8 @@ int run_experiment(const RunSettings& settings, const Tables& tables, RunContext
 
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
   Tables tables{all_extractors(), all_voxelizers(), {}, load_case, load_changed_case};
-  for (const CaseInfo& info : list_cases()) tables.cases.push_back(info.name);
+  for (const CaseInfo& info : list_cases())
+    if (info.kind != "volume") tables.cases.push_back(info.name);
   tables.measurements = {all_measurements().begin(), all_measurements().end()};
   return run_experiment(settings, tables, context, table);
 }

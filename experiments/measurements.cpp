@@ -52,14 +52,15 @@ Json row_json(const Json& head, const std::string& table, const std::string& lab
 
 std::vector<std::string> case_choices() {
   std::vector<std::string> names;
-  for (const CaseInfo& info : list_cases()) names.push_back(info.name);
+  for (const CaseInfo& info : list_cases())
+    if (info.kind != "volume") names.push_back(info.name);
   return names;
 }
 
 std::span<const Measurement> all_measurements() {
   static const std::vector<Measurement> table = {normal_codes_measurement(), lost_crossings_measurement(),
                                                  hermite_memory_measurement(), hermite_csg_measurement(),
-                                                 hermite_speed_measurement()};
+                                                 hermite_speed_measurement(), table_9_2_measurement(), volumes_measurement()};
   return table;
 }
 

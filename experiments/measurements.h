@@ -88,5 +88,7 @@ Measurement lost_crossings_measurement();
 Measurement hermite_memory_measurement();
 Measurement hermite_csg_measurement();
 Measurement hermite_speed_measurement();
+Measurement table_9_2_measurement();
+Measurement volumes_measurement();
 
 }  // namespace hermesh

@@ -38,17 +38,18 @@ PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   }
   mesh.triangles.reserve(triangles);
   mesh.quads.reserve(quads);
-  // OpenVDB winds its polygons clockwise seen from outside: they are read backwards, from the first corner
-  // on, which keeps the diagonal.
+  // OpenVDB winds its polygons clockwise seen from outside, whatever the transform: they are read backwards, from the
+  // first corner on, which keeps the diagonal, unless the transform mirrors.
+  const bool mirrors = grid.transform().baseMap()->determinant() < 0.0;
   for (std::size_t i = 0; i < mesher.polygonPoolListSize(); ++i) {
     const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[i];
     for (std::size_t j = 0; j < pool.numTriangles(); ++j) {
       const openvdb::Vec3I& t = pool.triangle(j);
-      mesh.triangles.push_back({t[0], t[2], t[1]});
+      mesh.triangles.push_back(mirrors ? Triangle{t[0], t[1], t[2]} : Triangle{t[0], t[2], t[1]});
     }
     for (std::size_t j = 0; j < pool.numQuads(); ++j) {
       const openvdb::Vec4I& q = pool.quad(j);
-      mesh.quads.push_back({q[0], q[3], q[2], q[1]});
+      mesh.quads.push_back(mirrors ? Quad{q[0], q[1], q[2], q[3]} : Quad{q[0], q[3], q[2], q[1]});
     }
   }
   return mesh;

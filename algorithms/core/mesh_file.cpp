@@ -247,6 +247,7 @@ MeshFile to_mesh_file(const PolygonMesh& mesh) {
   for (std::size_t i = 0; i < mesh.points.size(); ++i) file.points.push_back(mesh.world(i));
   file.triangles = mesh.triangles;
   file.quads = mesh.quads;
+  file.attributes = mesh.attributes;
   // Left out only where it says nothing: at 0, which a reader would choose by itself.
   if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
     file.origin = mesh.origin;

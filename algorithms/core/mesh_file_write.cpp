@@ -101,19 +101,75 @@ bool fits_single_precision(const MeshFile& mesh) {
   return true;
 }
 
-void write_ply(Output& out, const MeshFile& mesh) {
+/// An attribute of points as PLY's properties, by the names under which read_mesh_file() finds it again. Colours become
+/// bytes, which is what other programs read.
+struct PlyAttribute {
+  const MeshAttribute& attribute;
+  std::vector<std::string> properties;
+  bool bytes = false;
+};
+
+std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
+  const auto is = [&](const char* name, int least, int most) {
+    return attribute.name == name && attribute.components >= least && attribute.components <= most;
+  };
+  std::vector<std::string> names;
+  if (is("normal", 3, 3)) names = {"nx", "ny", "nz"};
+  if (is("colour", 3, 4)) names = {"red", "green", "blue", "alpha"};
+  if (is("uv", 2, 2)) names = {"u", "v"};
+  names.resize(static_cast<std::size_t>(attribute.components));
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!names[i].empty()) continue;
+    names[i] = attribute.name + (attribute.components == 1 ? "" : "_" + std::string(1, "xyzw"[i]));
+    std::ranges::replace_if(names[i], is_space, '_');
+  }
+  return names;
+}
+
+/// Of the attributes those of points; PLY as others read it has no place for the rest.
+std::vector<PlyAttribute> ply_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
+  std::vector<PlyAttribute> result;
+  for (const MeshAttribute& attribute : mesh.attributes) {
+    const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
+    if (attribute.domain != AttributeDomain::point ||
+        values != mesh.points.size() * static_cast<std::size_t>(attribute.components)) {
+      context.note(in_quotes(file) + ": the attribute " + attribute.name + " is not one of points and was left out");
+      continue;
+    }
+    const bool bytes = attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
+    result.push_back({attribute, ply_properties(attribute), bytes});
+  }
+  return result;
+}
+
+void write_ply_value(Output& out, const PlyAttribute& from, std::size_t i) {
+  if (from.attribute.values.index() == 1) return out.binary(std::get<1>(from.attribute.values)[i]);
+  const float value = std::get<0>(from.attribute.values)[i];
+  if (!from.bytes) return out.binary(value);
+  out.binary(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f))));
+}
+
+void write_ply(Output& out, const MeshFile& mesh, const std::vector<PlyAttribute>& attributes) {
   const bool single = fits_single_precision(mesh);
   const std::string type = single ? "float" : "double";
   out.text("ply\nformat binary_little_endian 1.0\n");
   if (mesh.origin) write_numbers(out, "comment origin", *mesh.origin);
   out.text("element vertex " + std::to_string(mesh.points.size()) + "\n");
   for (const char* axis : {" x\n", " y\n", " z\n"}) out.text("property " + type + axis);
+  for (const PlyAttribute& each : attributes)
+    for (const std::string& name : each.properties)
+      out.text(std::string("property ") + (each.bytes ? "uchar " : each.attribute.values.index() == 1 ? "int " : "float ") +
+               name + "\n");
   out.text("element face " + std::to_string(mesh.triangles.size() + mesh.quads.size()) + "\n");
   // Most programs know signed indices only.
   out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\nend_header\n"
                                             : "property list uchar uint vertex_indices\nend_header\n");
-  for (const Eigen::Vector3d& point : mesh.points)
-    for (const double x : point) single ? out.binary(static_cast<float>(x)) : out.binary(x);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    for (const double x : mesh.points[i]) single ? out.binary(static_cast<float>(x)) : out.binary(x);
+    for (const PlyAttribute& each : attributes)
+      for (std::size_t j = 0; j < each.properties.size(); ++j)
+        write_ply_value(out, each, i * each.properties.size() + j);
+  }
   const auto write_polygons = [&](const auto& polygons) {
     for (const auto& polygon : polygons) {
       out.binary(static_cast<std::uint8_t>(polygon.size()));
@@ -254,7 +310,7 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
   Output out(aside.path(), path, named->gzipped, context);
   switch (named->format) {
     case Format::ply:
-      write_ply(out, file);
+      write_ply(out, file, ply_attributes(file, path.string(), context));
       break;
     case Format::obj:
       write_obj(out, file);

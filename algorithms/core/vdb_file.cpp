@@ -21,8 +21,29 @@ openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const 
     return std::make_shared<openvdb::FloatGrid>(*doubles);
   if (auto integers = openvdb::gridPtrCast<openvdb::Int32Grid>(grid))
     return std::make_shared<openvdb::FloatGrid>(*integers);
+  if (auto integers = openvdb::gridPtrCast<openvdb::Int64Grid>(grid))
+    return std::make_shared<openvdb::FloatGrid>(*integers);
+  if (auto truths = openvdb::gridPtrCast<openvdb::BoolGrid>(grid)) return std::make_shared<openvdb::FloatGrid>(*truths);
   throw Error(what + " holds " + grid->valueType() +
-              " values; a scalar grid is needed (float, double or int32)");
+              " values; a scalar grid is needed (float, double, int32, int64 or bool)");
+}
+
+bool is_scalar(const openvdb::GridBase& grid) {
+  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>() ||
+         grid.isType<openvdb::Int32Grid>() || grid.isType<openvdb::Int64Grid>() || grid.isType<openvdb::BoolGrid>();
+}
+
+/// The grid to read where the user named none. @throws Error
+std::string chosen_grid(openvdb::io::File& file, const fs::path& path) {
+  if (file.hasGrid("sdf")) return "sdf";
+  std::vector<std::string> scalar;
+  int grids = 0;
+  for (auto it = file.beginName(); it != file.endName(); ++it, ++grids)
+    if (is_scalar(*file.readGridMetadata(*it))) scalar.push_back(*it);
+  if (grids == 0) throw Error(path.string() + " holds no grid");
+  if (scalar.size() == 1) return scalar[0];
+  if (grids == 1) return *file.beginName();  // its type is the reader's complaint
+  throw Error(path.string() + " holds several grids (" + grid_names(file) + "); choose one with --grid");
 }
 
 void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {
@@ -43,14 +64,7 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
     openvdb::io::File file(path.string());
     open_vdb(file, path);
     const std::string names = grid_names(file);
-    std::string name = grid_name;
-    if (name.empty() && file.hasGrid("sdf")) name = "sdf";
-    if (name.empty()) {
-      if (names.empty()) throw Error(path.string() + " holds no grid");
-      if (names.find(", ") != std::string::npos)
-        throw Error(path.string() + " holds several grids (" + names + "); choose one with --grid");
-      name = names;
-    }
+    const std::string name = grid_name.empty() ? chosen_grid(file, path) : grid_name;
     if (!file.hasGrid(name))
       throw Error(path.string() + " has no grid named '" + name + "'; it has " +
                   (names.empty() ? "none" : names));

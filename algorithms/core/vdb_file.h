@@ -13,7 +13,7 @@
 namespace hermesh {
 
 /// Reads one scalar grid. An empty name takes the grid `sdf`, or the only scalar grid there is; half
-/// precision and double grids are converted to float.
+/// precision, double, integer and bool grids are converted to float.
 /// @throws Error for a file that is missing, truncated or no .vdb, for a grid that is not there (the sentence
 /// lists those that are) or not scalar, and for a value that is not finite.
 LevelSet read_level_set(const std::filesystem::path& path, const std::string& grid_name, RunContext& context);

@@ -65,6 +65,49 @@ TEST_F(VdbFile, DoubleGridsBecomeFloat) {
       -0.125f);
 }
 
+TEST_F(VdbFile, HalfWholeNumbersAndTruthsBecomeFloat) {
+  initialize_openvdb();
+  const openvdb::Coord at(1, 2, 3);
+  const auto value_of = [&](const openvdb::GridBase::Ptr& grid) {
+    openvdb::io::File((folder_ / "g.vdb").string()).write({grid});
+    return read_level_set(folder_ / "g.vdb", "", context_).grid().grid->tree().getValue(at);
+  };
+  auto half = openvdb::FloatGrid::create(2.0f);
+  half->tree().setValue(at, -0.125f);
+  half->setSaveFloatAsHalf(true);
+  EXPECT_EQ(value_of(half), -0.125f);
+  auto whole = openvdb::Int32Grid::create(0);
+  whole->tree().setValue(at, -7);
+  EXPECT_EQ(value_of(whole), -7.0f);
+  auto wide = openvdb::Int64Grid::create(0);
+  wide->tree().setValue(at, 1000000);
+  EXPECT_EQ(value_of(wide), 1e6f);
+  auto truth = openvdb::BoolGrid::create(false);
+  truth->tree().setValue(at, true);
+  EXPECT_EQ(value_of(truth), 1.0f);
+  auto vectors = openvdb::Vec3SGrid::create();
+  vectors->tree().setValue(at, openvdb::Vec3s(1));
+  EXPECT_THROW(value_of(vectors), Error);
+  auto huge = openvdb::DoubleGrid::create(0.0);
+  huge->tree().setValue(at, 1e300);
+  EXPECT_THROW(value_of(huge), Error);
+}
+
+TEST_F(VdbFile, TheOnlyScalarGridNeedsNoName) {
+  initialize_openvdb();
+  auto density = openvdb::FloatGrid::create(0.0f);
+  density->tree().setValue(openvdb::Coord(0), 0.5f);
+  density->setName("density");
+  auto velocity = openvdb::Vec3SGrid::create();
+  velocity->setName("velocity");
+  openvdb::io::File((folder_ / "s.vdb").string()).write({density, velocity});
+  EXPECT_EQ(read_level_set(folder_ / "s.vdb", "", context_).grid().grid->getName(), "density");
+  auto heat = density->deepCopy();
+  heat->setName("heat");
+  openvdb::io::File((folder_ / "t.vdb").string()).write({density, velocity, heat});
+  EXPECT_NE(error_of(folder_ / "t.vdb").find("choose one with --grid"), std::string::npos);
+}
+
 TEST_F(VdbFile, ErrorsAreOneSentenceAboutTheFile) {
   EXPECT_NE(error_of(folder_ / "none.vdb").find("does not exist"), std::string::npos);
   EXPECT_NE(error_of(folder_).find("is a folder"), std::string::npos);

@@ -30,6 +30,41 @@ void blocks_below(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges, s
   }
 }
 
+/// Blocks of one x and y, which follow one another.
+struct Column {
+  std::array<std::int32_t, 2> lower;
+  std::size_t first;
+};
+
+/// Column by column, each block's three neighbours in an adjacent column lie behind those of the block before it: no search.
+void find_neighbours(std::vector<HermiteView::Block>& blocks, RunContext& context) {
+  std::vector<Column> columns;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const std::array<std::int32_t, 2> lower{blocks[i].lower[0], blocks[i].lower[1]};
+    if (columns.empty() || columns.back().lower != lower) columns.push_back({lower, i});
+  }
+  columns.push_back({{}, blocks.size()});
+  parallel_blocks(columns.size() - 1, context, [&](std::size_t c) {
+    for (int beside = 0; beside < 9; ++beside) {
+      const std::array<std::int32_t, 2> wanted{columns[c].lower[0] + 8 * (beside / 3 - 1),
+                                               columns[c].lower[1] + 8 * (beside % 3 - 1)};
+      const auto there = std::lower_bound(columns.begin(), columns.end() - 1, wanted,
+                                          [](const Column& column, const auto& lower) { return column.lower < lower; });
+      const bool found = there != columns.end() - 1 && there->lower == wanted;
+      std::size_t next = found ? there->first : 0;
+      const std::size_t end = found ? (there + 1)->first : 0;
+      for (std::size_t i = columns[c].first; i < columns[c + 1].first; ++i) {
+        const std::int32_t z = blocks[i].lower[2];
+        while (next < end && blocks[next].lower[2] < z - 8) ++next;
+        for (std::size_t slot = 0, at = next; slot < 3; ++slot) {
+          const bool hit = at < end && blocks[at].lower[2] == z + 8 * (static_cast<int>(slot) - 1);
+          blocks[i].neighbours[3 * static_cast<std::size_t>(beside) + slot] = hit ? static_cast<std::int32_t>(at++) : -1;
+        }
+      }
+    }
+  });
+}
+
 }  // namespace
 
 HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context)
@@ -67,13 +102,7 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
   }
   merged.insert(merged.end(), next, blocks_.end());
   blocks_ = std::move(merged);
-  parallel_blocks(blocks_.size(), context, [&](std::size_t i) {
-    for (int slot = 0; slot < 27; ++slot) {
-      const Lower& lower = blocks_[i].lower;
-      blocks_[i].neighbours[slot] = find(blocks_, {lower[0] + 8 * (slot / 9 - 1), lower[1] + 8 * (slot / 3 % 3 - 1),
-                                                  lower[2] + 8 * (slot % 3 - 1)});
-    }
-  });
+  find_neighbours(blocks_, context);
 }
 
 }  // namespace hermesh

@@ -1,15 +1,20 @@
 // hermesh extract, remesh: level set to mesh, and polygons to level set and back to a mesh in one.
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
 #include <optional>
+#include <sstream>
 
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/core/value_range.h"
 #include "algorithms/core/vdb_file.h"
+#include "algorithms/extraction/volume_attributes.h"
+#include "algorithms/extraction/volume_ends.h"
+#include "experiments/cli/adaptivity.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
+#include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
 #include "experiments/harness.h"
 
@@ -22,6 +27,9 @@ struct ExtractArguments {
   std::string grid;                  ///< empty: `sdf`, or the only scalar grid there is
   std::string source;                ///< empty: the polygons are not at hand
   std::vector<std::string> options;  ///< key=value
+  std::string ends = "closed";
+  std::string attributes;  ///< names of grids to sample, or "all"; empty: none
+  AdaptivityArguments adaptivity;
 };
 
 /// A variant that was looked up, with its options checked.
@@ -29,17 +37,6 @@ struct ChosenExtractor {
   Extractor extractor;
   Options options;
 };
-
-CLI::Validator finite_number() {
-  return CLI::Validator(
-      [](const std::string& given) {
-        double value = 0.0;
-        return CLI::detail::lexical_cast(given, value) && std::isfinite(value)
-                   ? std::string()
-                   : "must be a finite number, not '" + given + "'";
-      },
-      "");
-}
 
 void add_extract_options(CLI::App& command, ExtractArguments& arguments) {
   command.add_option("--extractor", arguments.extractor,
@@ -50,6 +47,7 @@ void add_extract_options(CLI::App& command, ExtractArguments& arguments) {
       ->check(finite_number());
   command.add_option("-o", arguments.options, "key=value, an option of the extractor; may be repeated")
       ->allow_extra_args(false);
+  add_adaptivity_options(command, arguments.adaptivity);
 }
 
 ChosenExtractor choose_extractor(const ExtractArguments& arguments) {
@@ -59,15 +57,44 @@ ChosenExtractor choose_extractor(const ExtractArguments& arguments) {
   });
 }
 
+std::vector<std::string> split_names(const std::string& list) {
+  std::vector<std::string> names;
+  std::istringstream stream(list);
+  for (std::string name; std::getline(stream, name, ',');) names.push_back(name);
+  return names;
+}
+
+/// Says where a surface runs into the end of the data.
+void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
+  if (!ends.any()) return;
+  if (!ends.in_a_box)
+    return session.context.note("the level set breaks off beside its surface (it was clipped by a mask, or has wrong "
+                                "signs) and was closed there");
+  session.context.note("the surface runs into the end of the data (" + ends.text() + ") and was " +
+                       (treatment == Ends::open ? "cut off at its last samples"
+                                                : "closed half a voxel beyond its last samples; see --ends"));
+}
+
 PolygonMesh extract(const LevelSet& level_set, const PolygonMesh* source, const ChosenExtractor& chosen,
-                    double isovalue, Session& session) {
+                    const ExtractArguments& arguments, Session& session) {
+  const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);
   const Stopwatch watch;
-  PolygonMesh mesh = chosen.extractor.extract({level_set, isovalue, source, chosen.options, session.context});
+  const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
+  EndedMesh ended = extract_with_ends(
+      chosen.extractor, {level_set, arguments.isovalue, source, chosen.options, session.context, field ? &*field : nullptr},
+      treatment);
+  PolygonMesh mesh = std::move(ended.mesh);
   session.context.check();
   // No reader takes a mesh file without polygons, ours included.
-  if (mesh.empty())
-    throw Error("there is no surface at the isovalue " + text(isovalue) +
-                ", nothing was written: the volume has no sample inside, or none outside");
+  if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
+    throw Error("there is no surface inside the mask, nothing was written");
+  if (mesh.empty()) {
+    const auto [lowest, highest] = value_range(level_set);
+    throw Error("there is no surface at the isovalue " + text(arguments.isovalue) +
+                ", nothing was written: the volume has no sample inside, or none outside; its values go from " +
+                text(lowest) + " to " + text(highest) + ", and " + text(level_set.background()) + " beyond");
+  }
+  note_ends(ended.ends, treatment, session);
   print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
                              std::to_string(mesh.triangles.size()) + " triangles, " +
                              std::to_string(mesh.quads.size()) + " quads, " + chosen.extractor.name + ", " +
@@ -86,8 +113,15 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
   std::optional<PolygonMesh> source;
   if (!arguments.source.empty()) source = read_polygons(arguments.source, session);
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  save(paths.out, extract(level_set, source ? &*source : nullptr, chosen, arguments.isovalue, session),
-       session);
+  PolygonMesh mesh = extract(level_set, source ? &*source : nullptr, chosen, arguments, session);
+  if (!arguments.attributes.empty()) {
+    std::string line = "attributes";
+    for (const std::string& name :
+         sample_attributes(mesh, paths.in, split_names(arguments.attributes), session.context))
+      line += " " + name;
+    print_summary(session, line);
+  }
+  save(paths.out, mesh, session);
   return kDone;
 }
 
@@ -98,7 +132,7 @@ int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const Ex
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  save(paths.out, extract(level_set, &mesh, chosen, extracting.isovalue, session), session);
+  save(paths.out, extract(level_set, &mesh, chosen, extracting, session), session);
   return kDone;
 }
 
@@ -119,6 +153,13 @@ void add_conversions(CLI::App& app, Session& session) {
                       "Name of the grid (default: sdf, or the only scalar grid there is)");
   command->add_option("--source", arguments->extracting.source,
                       "Mesh that the volume was made from, for extractors that want exact Hermite data");
+  command
+      ->add_option("--ends", arguments->extracting.ends,
+                   "Where the surface runs into the end of the data: closed (the default), a flat cap half a voxel beyond "
+                   "the last samples, or open, cut off at these")
+      ->check(CLI::IsMember({"closed", "open"}));
+  command->add_option("--attributes", arguments->extracting.attributes,
+                      "Grids of the volume, separated by commas, or all: sampled at the mesh's points, for .ply");
   command->callback([arguments, &session] {
     session.command = [arguments, &session] {
       return run_extract(arguments->paths, arguments->extracting, session);

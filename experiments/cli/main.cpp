@@ -64,6 +64,7 @@ int run_program(int argc, char** argv) {
   add_common_options(app, session);
   add_list(app, session);
   add_voxelize(app, session);
+  add_import(app, session);
   add_conversions(app, session);
   add_combine(app, session);
   add_validate(app, session);

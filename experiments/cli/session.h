@@ -43,6 +43,7 @@ struct Session {
 // Each adds its commands, which set session.command when they are parsed.
 void add_list(CLI::App& app, Session& session);
 void add_voxelize(CLI::App& app, Session& session);
+void add_import(CLI::App& app, Session& session);
 void add_conversions(CLI::App& app, Session& session);  ///< extract, remesh
 void add_combine(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);

@@ -6,8 +6,7 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
-#include "algorithms/hermite/representation.h"
-#include "algorithms/hermite/samplers.h"
+#include "algorithms/extraction/hermite_input.h"
 
 namespace hermesh {
 namespace {
@@ -215,29 +214,6 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
   return Contourer(grid, options).run(context);
 }
 
-namespace {
-
-FloatHermite sample(const ExtractionInput& input) {
-  const std::string& source = input.options.text("hermite");
-  const bool exact = source == "exact" || (source == "auto" && input.source);
-  if (exact && !input.source)
-    throw Error(
-        "dual-contouring was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
-        "-o hermite=level-set");
-  if (!exact) return sample_level_set(input.level_set, input.isovalue, input.context);
-  PolygonSampling sampling;
-  FloatHermite hermite =
-      sample_polygons(input.level_set, input.isovalue, *input.source, input.context, &sampling);
-  const std::size_t missed = sampling.nearest + sampling.fallback;
-  if (missed > 0)
-    input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
-                       " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
-                       " took the nearest one's plane, the others the level set's gradient");
-  return hermite;
-}
-
-}  // namespace
-
 DualContouringOptions read_dual_contouring_options(const Options& given) {
   DualContouringOptions options;
   if (given.is("placement", "average")) options.placement = DualContouringOptions::Placement::average;
@@ -248,59 +224,35 @@ DualContouringOptions read_dual_contouring_options(const Options& given) {
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
   const DualContouringOptions options = read_dual_contouring_options(input.options);
-  const Representation representation = parse_representation(input.options.text("representation"));
-  if (representation == Representation::directed && options.placement == DualContouringOptions::Placement::optimal)
-    throw Error("directed distances have no normals to place points by; use -o placement=average with them");
-  const Represented data = through(representation, parse_normal_code(input.options.text("normals")), sample(input),
-                                   input.context);
-  report_figures(data, input.level_set, input.context);
-  return dual_contouring(view_of(data.hermite, input.context), options, input.context);
+  const bool needs_normals = options.placement == DualContouringOptions::Placement::optimal;
+  const FloatHermite hermite = hermite_input(input, "dual-contouring", needs_normals);
+  return dual_contouring(view_of(hermite, input.context), options, input.context);
 }
-
-namespace {
-
-std::vector<std::string> normal_code_names() {
-  std::vector<std::string> names;
-  for (const NormalCodeId id : kNormalCodes) names.emplace_back(name(id));
-  return names;
-}
-
-}  // namespace
 
 std::vector<OptionSpec> dual_contouring_options() {
-  return {{"placement",
-           "optimal",
-           "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
-           "the mean of its crossings",
-           {"optimal", "average"}},
-          {"hermite",
-           "auto",
-           "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
-           "polygons are at hand",
-           {"auto", "exact", "level-set"}},
-          {"representation",
-           "sparse-float",
-           "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: 'dense-float' (52 "
-           "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
-           {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
-          {"normals",
-           "octahedral",
-           "code of 16 bits for normals in 'sparse' and 'fixed'",
-           normal_code_names()},
-          {"truncation",
-           "0.1",
-           "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
-           "features",
-           {},
-           0.0,
-           1.0},
-          {"reach",
-           "1",
-           "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
-           "the surface less",
-           {},
-           0.0,
-           1e6}};
+  std::vector<OptionSpec> options = {
+      {"placement",
+       "optimal",
+       "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
+       "the mean of its crossings",
+       {"optimal", "average"}},
+      {"truncation",
+       "0.1",
+       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+       "features",
+       {},
+       0.0,
+       1.0},
+      {"reach",
+       "1",
+       "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
+       "the surface less",
+       {},
+       0.0,
+       1e6}};
+  const std::vector<OptionSpec> of_hermite = hermite_options();
+  options.insert(options.begin() + 1, of_hermite.begin(), of_hermite.end());
+  return options;
 }
 
 }  // namespace hermesh

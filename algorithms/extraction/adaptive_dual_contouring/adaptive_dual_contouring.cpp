@@ -1,0 +1,222 @@
+#include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/adaptive_dual_contouring/block_regions.h"
+#include "algorithms/extraction/hermite_input.h"
+
+namespace hermesh {
+namespace {
+
+/// The numbers of the points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
+class CellsAround {
+ public:
+  CellsAround(const HermiteView& view, const LargeArray<std::uint32_t>& mask, std::size_t block, int axis)
+      : mask_(mask.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
+    for (int side = 0; side < 4; ++side) {
+      int d[3] = {0, 0, 0};
+      d[(axis + 1) % 3] = -(side & 1);
+      d[(axis + 2) % 3] = -(side >> 1);
+      const std::int64_t there = view.blocks()[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
+      // Coordinate −1 is 7 there. A block that is not there has no cell of a crossing edge, and is not asked for.
+      first_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
+    }
+  }
+
+  Quad operator()(int sample) const {
+    const bool low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0;
+    return {mask_[first_[low_u + 2 * low_v] + sample - u_ - v_], mask_[first_[2 * low_v] + sample - v_],
+            mask_[first_[0] + sample], mask_[first_[low_u] + sample - u_]};
+  }
+
+ private:
+  static constexpr int kStep[3] = {64, 8, 1};
+  const std::uint32_t* mask_;
+  const int u_, v_;
+  std::int64_t first_[4];
+};
+
+/// One run, stage by stage.
+class Contourer {
+ public:
+  Contourer(const FloatHermite& hermite, const AdaptiveOptions& options, const AdaptivityField* field,
+            RunContext& context)
+      : context_(context),
+        hermite_(hermite),
+        options_(options),
+        field_(field, hermite.placement),
+        view_(make_view(hermite, context)),
+        input_{hermite, view_, options_, field_},
+        blocks_(view_.blocks().size()) {}
+
+  PolygonMesh run() {
+    PolygonMesh mesh;
+    mesh.origin = hermite_.placement.origin;
+    merge();
+    number_points(mesh);
+    connect(mesh);
+    if (field_.leaves_out_outside()) drop_unused_points(mesh);
+    report();
+    return mesh;
+  }
+
+ private:
+  using View = decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>()));
+
+  static View make_view(const FloatHermite& hermite, RunContext& context) {
+    Stage stage(context, "blocks");
+    return view_of(hermite, context);
+  }
+
+  /// The mask grid holds numbers within each block afterwards, and `places_` the points, with room for one an active
+  /// cell.
+  void merge() {
+    Stage stage(context_, "merge cells");
+    first_place_.resize(blocks_);
+    LargeArray<BlockCells> cells(blocks_);
+    parallel_blocks(blocks_, context_, [&](std::size_t b) {
+      cells[b] = BlockCells(input_, static_cast<std::int32_t>(b));
+      first_place_[b] = static_cast<std::uint64_t>(count(cells[b].active));
+    });
+    places_.resize(exclusive_scan(first_place_, "points"));
+    mask_.resize(512 * blocks_);
+    results_.resize(blocks_);
+    parallel_blocks(blocks_, context_, [&](std::size_t b) {
+      results_[b] = merge_block(input_, static_cast<std::int32_t>(b), cells[b], mask_.data() + 512 * b,
+                                places_.data() + first_place_[b]);
+    });
+  }
+
+  void number_points(PolygonMesh& mesh) {
+    Stage stage(context_, "number points");
+    std::vector<std::uint64_t> first(blocks_);
+    for (std::size_t b = 0; b < blocks_; ++b) first[b] = results_[b].points;
+    mesh.points.resize(exclusive_scan(first, "points"));
+    const IndexToWorld& placement = hermite_.placement;
+    parallel_blocks(blocks_, context_, [&](std::size_t b) {
+      std::uint32_t* mask = mask_.data() + 512 * b;
+      for (int cell = 0; cell < 512; ++cell)
+        if (mask[cell] != kNoPoint) mask[cell] += static_cast<std::uint32_t>(first[b]);
+      Eigen::Vector3d lower;
+      for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
+      for (std::uint32_t i = 0; i < results_[b].points; ++i)
+        mesh.points[first[b] + i] = placement.local(lower + places_[first_place_[b] + i].cast<double>()).cast<float>();
+    });
+    places_ = {};
+  }
+
+  void connect(PolygonMesh& mesh) {
+    Stage stage(context_, "connect");
+    std::vector<std::uint64_t> quads(blocks_), triangles(blocks_);
+    parallel_blocks(blocks_, context_, [&](std::size_t b) {
+      for_each_polygon(b, [&](const Quad&, int corners) { ++(corners == 4 ? quads : triangles)[b]; });
+    });
+    mesh.quads.resize(exclusive_scan(quads, "quads"));
+    mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
+    parallel_blocks(blocks_, context_, [&](std::size_t b) {
+      Quad* quad = mesh.quads.data() + quads[b];
+      Triangle* triangle = mesh.triangles.data() + triangles[b];
+      for_each_polygon(b, [&](const Quad& polygon, int corners) {
+        if (corners == 4)
+          *quad++ = polygon;
+        else
+          *triangle++ = {polygon[0], polygon[1], polygon[2]};
+      });
+    });
+  }
+
+  /// Calls f(points, 3 or 4) for each polygon (§6.5).
+  template <class F>
+  void for_each_polygon(std::size_t b, F&& f) const {
+    const HermiteView::Block& block = view_.blocks()[b];
+    const bool mirrors = hermite_.placement.mirrors();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!any(block.crossing[axis])) continue;
+      const CellsAround around(view_, mask_, b, axis);
+      for_each_bit(block.crossing[axis], [&](int sample) {
+        Quad polygon = around(sample);
+        if (field_.leaves_out_outside() && std::find(polygon.begin(), polygon.end(), kNoPoint) != polygon.end()) return;
+        int corners = 0;
+        // Cells of one region follow one another: it is a cube.
+        for (int i = 0; i < 4; ++i)
+          if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
+        if (corners < 3) return;
+        if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
+        f(polygon, corners);
+      });
+    }
+  }
+
+  void report() const {
+    const auto sum = [&](auto&& of) {
+      return std::accumulate(results_.begin(), results_.end(), 0.0,
+                             [&](double total, const BlockResult& result) { return total + of(result); });
+    };
+    for (std::size_t level = 0; level < 3; ++level)
+      context_.figure("regions_" + std::to_string(level + 1),
+                      sum([&](const BlockResult& r) { return r.regions[level]; }));
+    float largest = 0.0f;
+    for (const BlockResult& result : results_) largest = std::max(largest, result.largest_plane_distance);
+    context_.figure("largest_plane_distance", largest);
+    context_.figure("escaped", sum([](const BlockResult& r) { return r.escaped; }));
+  }
+
+  RunContext& context_;
+  const FloatHermite& hermite_;
+  const AdaptiveOptions options_;
+  const FieldEvaluator field_;
+  const View view_;
+  const RegionInput input_;
+  const std::size_t blocks_;
+  std::vector<std::uint64_t> first_place_;  ///< by block
+  LargeArray<Eigen::Vector3f> places_;      ///< voxels from the block's first sample
+  LargeArray<std::uint32_t> mask_;          ///< by block and cell: the number of its point
+  std::vector<BlockResult> results_;
+};
+
+}  // namespace
+
+PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
+                                     const AdaptivityField* field, RunContext& context) {
+  return Contourer(hermite, options, field, context).run();
+}
+
+PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
+  AdaptiveOptions options;
+  if (input.options.is("placement", "average")) options.placement = AdaptiveOptions::Placement::average;
+  options.threshold = input.options.number("threshold");
+  options.truncation = input.options.number("truncation");
+  const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
+  const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
+  return adaptive_dual_contouring(hermite, options, input.field, input.context);
+}
+
+std::vector<OptionSpec> adaptive_dual_contouring_options() {
+  std::vector<OptionSpec> options = {
+      {"threshold",
+       "0.1",
+       "square voxels: cells are merged while the sum of the squared distances to their planes is less; larger merges "
+       "more, 0 nothing",
+       {},
+       0.0,
+       1e300},
+      {"placement",
+       "optimal",
+       "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the mean of "
+       "its crossings",
+       {"optimal", "average"}},
+      {"truncation",
+       "0.1",
+       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features",
+       {},
+       0.001,
+       1.0}};
+  const std::vector<OptionSpec> of_hermite = hermite_options();
+  options.insert(options.end(), of_hermite.begin(), of_hermite.end());
+  return options;
+}
+
+}  // namespace hermesh

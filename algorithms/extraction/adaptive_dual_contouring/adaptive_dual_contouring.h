@@ -1,0 +1,68 @@
+// Adaptive dual contouring as printed (Aldén 2011, chapter 6): cells merged into regions of 2³, 4³ and 8³ within each
+// block, in parallel and without an octree. Nothing is repaired.
+//
+// Faithful, by section:
+//   6.2    the QEF sums squared distances to the tangent planes of all crossings; its minimiser comes from a truncated
+//          singular value decomposition and is not held in its region (trap T7; the figure `escaped` counts).
+//   6.3    both topology tests, the first by a table. They gate merging alone: a cell with several sheets still has
+//          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5).
+//   6.4    steps 1 to 4: level by level, a region is tried only if all its active cells are mergeable, and its cells
+//          are no longer mergeable once it fails; every block by itself; a mask grid of 32-bit integers, which hold the
+//          number of the cell's point in the end. (While a block is at work its levels and flags are one bit a region:
+//          nobody else reads them.)
+//   6.5    for every crossing edge the four cells around it give a quad, a triangle where they have three points, and
+//          nothing where they have fewer. The sign at the edge's first sample orients it.
+//
+// Where the text leaves a gap:
+//   - A region's QEF is the sum of those of its cells, so a crossing counts once for each of its cells in the region:
+//     four times in the interior ("using the Hermite data of the corresponding cells"; Ju et al. add up the same way).
+//   - E is compared as "less than the threshold", at the place where the point would go. So threshold 0 merges nothing.
+//   - A region with no active cell in some child needs nothing of that child. One active cell may be a region.
+//   - A singular value is "minimal" below `truncation` times the largest.
+//   - Where a region fails, its cells keep the regions that they have, and no larger one around them is tried.
+//   - A quad begins with the cell one step down both other axes from the edge's first sample, and is split from there.
+//
+// The unit of the threshold (trap T6) is not in the text, and E grows with the number of cells. Here lengths are voxels
+// and normals have unit length, so E is in square voxels. The thesis's 0 to 2000 cannot be that: a region has some 300
+// planes, so that 2000 would let every one be two voxels off. Its reductions are met if 1000 of its units, within a
+// quarter, are one square voxel, with Hermite data quantised as there (experiments/table_9_2.toml).
+//
+// What bounds it: of the time without the Hermite data three quarters go into merging, about evenly into the sums of
+// the QEFs, their minimisers, and waiting for crossings and fresh pages; connecting takes a sixth.
+#pragma once
+
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/variant.h"
+#include "algorithms/extraction/adaptivity_field.h"
+#include "algorithms/hermite/sparse_hermite.h"
+
+namespace hermesh {
+
+struct AdaptiveOptions {
+  enum class Placement {
+    optimal,  ///< minimiser of the QEF
+    average   ///< mean of the crossings, each as often as it counts in the QEF
+  };
+  Placement placement = Placement::optimal;
+  /// Square voxels: a region is merged if its E is less. Larger merges more; 0 nothing.
+  double threshold = 0.1;
+  /// Singular values below this share of the largest are dropped; at least 0.001. Larger is smoother.
+  double truncation = 0.1;
+};
+
+/// Closed and oriented, in the sense that as many polygons pass along an edge in one direction as in the other, except
+/// where `field` leaves polygons out; not manifold. The same bytes at any number of threads.
+///
+/// Figures of the run: `regions_1`, `regions_2` and `regions_3` (of 2³, 4³, 8³ cells), `largest_plane_distance`
+/// (voxels, from the point of a merged region to a plane of it), and `escaped` (points outside their cell or region).
+/// @throws Error for a mesh of more than 2³² points or polygons, and as FieldEvaluator does.
+PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
+                                     const AdaptivityField* field, RunContext& context);
+
+/// The table's entry.
+PolygonMesh adaptive_dual_contouring(const ExtractionInput& input);
+std::vector<OptionSpec> adaptive_dual_contouring_options();
+
+}  // namespace hermesh

@@ -1,0 +1,47 @@
+// The regions of one block: which of its cells are merged, and where the points go (Aldén 2011, §6.4).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/extraction/adaptive_dual_contouring/qef_sum.h"
+#include "algorithms/extraction/adaptive_dual_contouring/region_topology.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+/// Hermite data as blocks, with what decides about regions.
+struct RegionInput {
+  const FloatHermite& hermite;
+  const HermiteView& view;  ///< of the same data
+  const AdaptiveOptions& options;
+  const FieldEvaluator& field;
+};
+
+/// Entry of the mask grid for a cell that gets no point.
+inline constexpr std::uint32_t kNoPoint = 0xffffffffu;
+
+/// What merging one block came to.
+struct BlockResult {
+  std::uint32_t points = 0;
+  std::array<std::uint32_t, 3> regions{};  ///< of 2³, 4³, 8³ cells
+  std::uint32_t escaped = 0;
+  float largest_plane_distance = 0.0f;  ///< voxels
+};
+
+/// The block's signs, and its cells whose corners differ in sign, less those that the field leaves out.
+struct BlockCells {
+  BlockCells() = default;
+  BlockCells(const RegionInput& input, std::int32_t block);
+
+  SignLattice lattice;
+  BlockMask active;
+};
+
+/// Merges, writes for each of the 512 cells the number of its point within the block to `mask` (or kNoPoint), and that
+/// many points, relative to the block's first sample, to `points`; there is room for one an active cell.
+BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint32_t* mask,
+                        Eigen::Vector3f* points);
+
+}  // namespace hermesh

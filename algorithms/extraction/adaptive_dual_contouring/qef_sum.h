@@ -1,0 +1,45 @@
+// Sums of quadratic error functions (Aldén 2011, §6.2), and the minimisers of many at a time.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+namespace hermesh {
+
+/// E(x) = Σ (nᵢ·(x − pᵢ))² as the sums of eq. 6.3, so that the function of a region is the sum of those of its cells.
+/// All summands must share one frame, with its origin nearby: a block's middle, in voxels. (No initialiser: a block has
+/// room for 512 and uses few. Pairs, because that is what the vector units of every machine add at once; Eigen's would
+/// go by way of the memory.)
+struct QefSum {
+  using Pair = double __attribute__((vector_size(16)));
+  /// AᵀA (xx, xy, xz, yy, yz, zz), Aᵀb (x, y, z), bᵀb, Σp (x, y, z), number of planes.
+  Pair pairs[7];
+
+  static QefSum of_plane(const float (&point)[3], const float (&normal)[3]) {
+    const double x = normal[0], y = normal[1], z = normal[2];
+    const double d = x * point[0] + y * point[1] + z * point[2];
+    const Pair xy{x, y};
+    return {{xy * x, xy * Pair{z, y}, Pair{y, z} * z, xy * d, Pair{z, d} * d, Pair{point[0], point[1]},
+             Pair{point[2], 1.0}}};
+  }
+  void clear() {
+    for (Pair& pair : pairs) pair = Pair{0.0, 0.0};
+  }
+  QefSum& operator+=(const QefSum& other) {
+    for (int i = 0; i < 7; ++i) pairs[i] += other.pairs[i];
+    return *this;
+  }
+
+  double value(int i) const { return pairs[i / 2][i % 2]; }
+  double planes() const { return value(13); }
+  /// Mean of the crossings: where minimisers start from, and the `average` placement.
+  Eigen::Vector3d mass_point() const { return Eigen::Vector3d(value(10), value(11), value(12)) * (1.0 / planes()); }
+  /// E(x), never negative.
+  double error(const Eigen::Vector3d& x) const;
+};
+
+/// For each the minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1): singular values
+/// of A below `truncation`, at least 0.001, times the largest are set to zero. It may lie anywhere.
+void minimisers(std::span<const QefSum* const> sums, double truncation, Eigen::Vector3d* out);
+
+}  // namespace hermesh

@@ -1,0 +1,60 @@
+#include "algorithms/extraction/hermite_input.h"
+
+#include <utility>
+
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
+  const std::string& source = input.options.text("hermite");
+  const bool exact = source == "exact" || (source == "auto" && input.source);
+  if (exact && !input.source)
+    throw Error(variant +
+                " was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
+                "-o hermite=level-set");
+  if (!exact) return sample_level_set(input.level_set, input.isovalue, input.context);
+  PolygonSampling sampling;
+  FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, *input.source, input.context, &sampling);
+  const std::size_t missed = sampling.nearest + sampling.fallback;
+  if (missed > 0)
+    input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
+                       " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
+                       " took the nearest one's plane, the others the level set's gradient");
+  return hermite;
+}
+
+std::vector<std::string> normal_code_names() {
+  std::vector<std::string> names;
+  for (const NormalCodeId id : kNormalCodes) names.emplace_back(name(id));
+  return names;
+}
+
+}  // namespace
+
+FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals) {
+  const Representation representation = parse_representation(input.options.text("representation"));
+  if (representation == Representation::directed && needs_normals)
+    throw Error("directed distances have no normals to place points by; use -o placement=average with them");
+  Represented data =
+      through(representation, parse_normal_code(input.options.text("normals")), sample(input, variant), input.context);
+  report_figures(data, input.level_set, input.context);
+  return std::move(data.hermite);
+}
+
+std::vector<OptionSpec> hermite_options() {
+  return {{"hermite",
+           "auto",
+           "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
+           "polygons are at hand",
+           {"auto", "exact", "level-set"}},
+          {"representation",
+           "sparse-float",
+           "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: 'dense-float' (52 "
+           "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
+           {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
+          {"normals", "octahedral", "code of 16 bits for normals in 'sparse' and 'fixed'", normal_code_names()}};
+}
+
+}  // namespace hermesh

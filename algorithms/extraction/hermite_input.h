@@ -1,0 +1,20 @@
+// What the extractors share that work on Hermite data: where it comes from and how it is kept, as options.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "algorithms/core/variant.h"
+#include "algorithms/hermite/representation.h"
+
+namespace hermesh {
+
+/// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
+std::vector<OptionSpec> hermite_options();
+
+/// Samples as those options say and passes the data through the representation; its figures go to the run's context,
+/// and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the sentences.
+/// @throws Error for exact data where there are no polygons, and where `needs_normals` but the representation has none.
+FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);
+
+}  // namespace hermesh

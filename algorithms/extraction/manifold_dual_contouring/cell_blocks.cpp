@@ -1,0 +1,158 @@
+#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+
+#include <algorithm>
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+
+CellBlocks::CellBlocks(const HermiteView& grid, RunContext& context) : grid_(grid), blocks_(grid.blocks().size()) {
+  Stage stage(context, "find cells");
+  const std::size_t n = blocks_.size();
+  std::vector<std::uint64_t> codes(n), points(n);
+  parallel_blocks(n, context, [&](std::size_t b) {
+    const HermiteView::Block& source = grid.blocks()[b];
+    blocks_[b].inside = source.inside;
+    if (source.leaf < 0 && sign_of_added(source)) blocks_[b].inside.fill(~std::uint64_t{0});
+  });
+  std::vector<std::vector<std::uint8_t>> found(n);
+  parallel_blocks(n, context, [&](std::size_t b) {
+    Block& block = blocks_[b];
+    const std::array<BlockMask, 8> signs = corner_signs(static_cast<std::int32_t>(b));
+    std::uint32_t before = 0;
+    for (int word = 0; word < 8; ++word) {
+      std::uint64_t all = ~std::uint64_t{0}, some = 0;
+      for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
+      block.active[word] = some & ~all;
+      block.rank[word] = before;
+      before += static_cast<std::uint32_t>(std::popcount(block.active[word]));
+    }
+    found[b].reserve(before);
+    std::uint16_t later = 0;
+    for_each_bit(block.active, [&](int cell) {
+      int code = 0;
+      for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
+      found[b].push_back(static_cast<std::uint8_t>(code));
+      const int sheets = kCellSheets[code].sheets;
+      if (sheets > 1) {
+        block.several.emplace_back(static_cast<std::uint16_t>(cell), later);
+        later = static_cast<std::uint16_t>(later + sheets - 1);
+      }
+    });
+    codes[b] = before;
+    points[b] = before + later;
+  });
+  codes_.resize(exclusive_scan(codes, "cells"));
+  points_ = exclusive_scan(points, "points");
+  for (std::size_t b = 0; b < n; ++b) {
+    blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
+    blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
+    std::copy(found[b].begin(), found[b].end(), codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
+  }
+}
+
+/// A block that owns no crossing edge has one sign, and so have the blocks that are not there, up to the nearest owner
+/// above: no edge on the way is crossed.
+bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
+  for (int d = 1; d < 8; ++d) {
+    const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
+    if (there >= 0 && grid_.blocks()[there].leaf >= 0) return (grid_.blocks()[there].inside[0] & 1) != 0;
+  }
+  return false;
+}
+
+/// Signs of every cell's corners, from its first corner's and the crossings on the way.
+std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
+  static constexpr BlockMask kNone{};
+  const HermiteView::Block& block = grid_.blocks()[b];
+  const auto crossed = [&](int axis, int dx, int dy, int dz) {
+    return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) -> const BlockMask& {
+      const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
+      return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
+    });
+  };
+  std::array<BlockMask, 8> signs;
+  signs[0] = blocks_[b].inside;
+  const auto step = [&](int from, int axis) {
+    const BlockMask edges = crossed(axis, from & 1, (from >> 1) & 1, from >> 2);
+    BlockMask& to = signs[from | 1 << axis];
+    for (int word = 0; word < 8; ++word) to[word] = signs[from][word] ^ edges[word];
+  };
+  step(0, 0), step(0, 1), step(0, 2), step(1, 1), step(1, 2), step(2, 2), step(3, 2);
+  return signs;
+}
+
+std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const {
+  const Block& block = blocks_[number];
+  if (sheet == 0)
+    return block.first_point + static_cast<std::uint32_t>(code_at(number, cell) - block.first_code);
+  const auto at = std::lower_bound(block.several.begin(), block.several.end(), cell,
+                                   [](const auto& entry, int wanted) { return entry.first < wanted; });
+  const std::uint32_t cells = block.rank[7] + static_cast<std::uint32_t>(std::popcount(block.active[7]));
+  return block.first_point + cells + at->second + static_cast<std::uint32_t>(sheet - 1);
+}
+
+Eigen::Vector3d CellBlocks::corner(std::int32_t block, int sample) const {
+  const auto& lower = grid_.blocks()[block].lower;
+  const auto& base = grid_.placement().base;
+  return {double(lower[0] - base[0] + (sample >> 6)), double(lower[1] - base[1] + ((sample >> 3) & 7)),
+          double(lower[2] - base[2] + (sample & 7))};
+}
+
+CellBlocks::Edge CellBlocks::edge_of_cell(std::int32_t block, int cell, int edge) const {
+  const std::array<int, 3> d = edge_offset(edge);
+  const Cell there = locate(block, (cell >> 6) + d[0], ((cell >> 3) & 7) + d[1], (cell & 7) + d[2]);
+  return {there.block, there.cell, edge_axis(edge)};
+}
+
+Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge) const {
+  Eigen::Vector3d point = corner(edge.block, edge.sample);
+  const double offset = grid_.crossing(edge.block, edge.sample, edge.axis).offset;
+  point[edge.axis] += std::clamp(offset, kMargin, 1.0 - kMargin);
+  return point;
+}
+
+CellBlocks::Around CellBlocks::around(const Edge& edge) const {
+  Around result;
+  result.axis = edge.axis;
+  for (int i = 0; i < 4; ++i) {
+    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
+    at[(edge.axis + 1) % 3] += kAround[i][0];
+    at[(edge.axis + 2) % 3] += kAround[i][1];
+    const Cell cell = locate(edge.block, at[0], at[1], at[2]);
+    result.cells[i] = cell;
+    result.sheets[i] = &sheets(cell.block, cell.cell);
+    result.points[i] = point(cell.block, cell.cell, result.sheets[i]->sheet_of[edge_in(edge.axis, i)]);
+  }
+  return result;
+}
+
+CellBlocks::Edge CellBlocks::other_end(const Around& around, int i) const {
+  const int other = around.sheets[i]->partner[face_after(around.axis, i)][edge_in(around.axis, i)];
+  return edge_of_cell(around.cells[i].block, around.cells[i].cell, other);
+}
+
+bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
+  const CellSheets& own = sheets(block, cell);
+  if (own.sheets > 1 || own.ambiguous_faces != 0) return true;
+  for (int face = 0; face < 6; ++face) {
+    int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
+    at[face >> 1] += face & 1 ? 1 : -1;
+    const Cell there = locate(block, at[0], at[1], at[2]);
+    if (there.block >= 0 && test(blocks_[there.block].active, there.cell) &&
+        sheets(there.block, there.cell).sheets > 1)
+      return true;
+  }
+  return false;
+}
+
+bool CellBlocks::comes_first(const Edge& a, const Edge& b) const {
+  const auto place = [&](const Edge& edge) {
+    const auto& lower = grid_.blocks()[edge.block].lower;
+    return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7), lower[2] + (edge.sample & 7),
+                      std::int32_t(edge.axis)};
+  };
+  return place(a) < place(b);
+}
+
+}  // namespace hermesh

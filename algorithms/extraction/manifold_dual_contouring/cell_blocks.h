@@ -1,0 +1,113 @@
+// The cells of Hermite data by block, with their sheets, points and edges by number.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+/// Set bits before `sample`.
+inline std::uint32_t rank_in(const BlockMask& mask, int sample) {
+  std::uint32_t before = 0;
+  for (int word = 0; word < sample >> 6; ++word) before += static_cast<std::uint32_t>(std::popcount(mask[word]));
+  return before +
+         static_cast<std::uint32_t>(std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+}
+
+class CellBlocks {
+ public:
+  /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
+  /// rounding to the file's precision moves none across.
+  static constexpr double kMargin = 1.0 / 1024.0;
+
+  struct Block {
+    BlockMask inside{};
+    BlockMask active{};  ///< cells with a crossing edge, by their first corner
+    std::uint32_t first_point = 0, first_code = 0;
+    std::array<std::uint32_t, 8> rank{};  ///< active cells before each word
+    /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
+    std::vector<std::pair<std::uint16_t, std::uint16_t>> several;
+  };
+  struct Edge {
+    std::int32_t block;
+    int sample, axis;
+  };
+  struct Cell {
+    std::int32_t block;
+    int cell;
+  };
+  /// The four cells around an edge, counter-clockwise seen against its axis: a quad's corners.
+  struct Around {
+    std::array<Cell, 4> cells;
+    std::array<std::uint32_t, 4> points;  ///< of the sheet that the edge belongs to
+    std::array<const CellSheets*, 4> sheets;
+    int axis;
+  };
+
+  CellBlocks(const HermiteView& grid, RunContext& context);
+
+  std::size_t size() const { return blocks_.size(); }
+  const Block& operator[](std::int32_t block) const { return blocks_[block]; }
+  const HermiteView& grid() const { return grid_; }
+  std::size_t point_count() const { return points_; }
+
+  const CellSheets& sheets(std::int32_t block, int cell) const { return kCellSheets[codes_[code_at(block, cell)]]; }
+  std::uint32_t point(std::int32_t block, int cell, int sheet) const;
+  /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
+  Eigen::Vector3d corner(std::int32_t block, int sample) const;
+  Cell locate(std::int32_t block, int x, int y, int z) const {
+    return {grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
+            sample_index(x & 7, y & 7, z & 7)};
+  }
+  Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
+  Eigen::Vector3d crossing_point(const Edge& edge) const;
+  Around around(const Edge& edge) const;
+
+  /// Whether the surface is held to the segments of the face between cells i and i+1 around an edge.
+  bool is_explicit(const Around& around, int i) const {
+    return around.sheets[i]->sheets > 1 || around.sheets[(i + 1) % 4]->sheets > 1 ||
+           ((around.sheets[i]->ambiguous_faces >> face_after(around.axis, i)) & 1);
+  }
+  /// Of the segment that starts at the edge in that face.
+  Edge other_end(const Around& around, int i) const;
+  /// Whether any of the cell's faces is explicit.
+  bool has_explicit_face(std::int32_t block, int cell) const;
+  /// An order of edges that does not depend on blocks, so that of a segment's two ends one speaks for both.
+  bool comes_first(const Edge& a, const Edge& b) const;
+
+  template <class F>
+  void for_each_crossing_edge(std::int32_t block, F&& f) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(grid_.blocks()[block].crossing[axis], [&](int sample) { f(Edge{block, sample, axis}); });
+  }
+
+ private:
+  /// Cells around an edge, as steps along the two other axes.
+  static constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
+  /// The face of cell i that leads to cell i+1.
+  static constexpr int face_after(int axis, int i) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    return i == 0 ? 2 * u + 1 : i == 1 ? 2 * v + 1 : i == 2 ? 2 * u : 2 * v;
+  }
+  static constexpr int edge_in(int axis, int i) { return 4 * axis - kAround[i][0] - 2 * kAround[i][1]; }
+
+  std::size_t code_at(std::int32_t block, int cell) const {
+    const Block& b = blocks_[block];
+    const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
+    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
+  }
+  bool sign_of_added(const HermiteView::Block& block) const;
+  std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
+
+  const HermiteView& grid_;
+  std::vector<Block> blocks_;
+  std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
+  std::size_t points_ = 0;
+};
+
+}  // namespace hermesh

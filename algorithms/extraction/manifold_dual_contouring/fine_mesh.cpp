@@ -1,0 +1,48 @@
+#include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
+
+#include <Eigen/Geometry>
+
+namespace hermesh {
+
+FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
+    : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
+  for (const Triangle& t : triangles_)
+    for (const std::uint32_t p : t) ++first_[p + 1];
+  for (std::size_t p = 0; p < points_.size(); ++p) first_[p + 1] += first_[p];
+  normals_.resize(triangles_.size());
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
+    normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
+  }
+  around_.resize(3 * triangles_.size());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+    for (const std::uint32_t p : triangles_[t]) around_[next[p]++] = t;
+}
+
+std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
+  constexpr int kMostSteps = 64;
+  std::uint32_t before = triangle;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Corners c = corners(triangle);
+    const Eigen::Vector3d n = normals_[triangle].cast<double>();
+    int side = -1;
+    double farthest = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d edge = c[(i + 1) % 3] - c[i];
+      const double beyond = edge.cross(n).dot(p - c[i]), squared = edge.squaredNorm();
+      if (beyond > 0 && beyond * beyond > farthest * squared) {
+        farthest = beyond * beyond / squared;
+        side = i;
+      }
+    }
+    if (side < 0) return triangle;
+    const std::uint32_t next = across(triangle, side);
+    if (next == before) return triangle;
+    before = triangle;
+    triangle = next;
+  }
+  return triangle;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,56 @@
+// The mesh that a decimation started from, with its triangles by point.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
+
+namespace hermesh {
+
+/// Closed and oriented, so that the corners that follow a point in its triangles are all its neighbours, once each.
+class FineMesh {
+ public:
+  FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles);
+
+  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  /// Unit length; zero of a degenerate triangle.
+  const Eigen::Vector3f& normal(std::uint32_t triangle) const { return normals_[triangle]; }
+  /// Numbers of the triangles with this corner.
+  std::span<const std::uint32_t> around(std::uint32_t point) const {
+    return std::span(around_).subspan(first_[point], first_[point + 1] - first_[point]);
+  }
+  /// The corner that follows `point` in a triangle around it.
+  std::uint32_t next(std::uint32_t triangle, std::uint32_t point) const {
+    const Triangle& t = triangles_[triangle];
+    return t[0] == point ? t[1] : t[1] == point ? t[2] : t[0];
+  }
+
+  /// The triangle beyond the side that starts at corner i.
+  std::uint32_t across(std::uint32_t triangle, int i) const {
+    const std::uint32_t a = triangles_[triangle][i], b = triangles_[triangle][(i + 1) % 3];
+    for (const std::uint32_t t : around(b))
+      if (next(t, b) == a) return t;
+    return triangle;
+  }
+  Corners corners(std::uint32_t triangle) const {
+    const Triangle& t = triangles_[triangle];
+    return {points_[t[0]], points_[t[1]], points_[t[2]]};
+  }
+  /// From triangle to triangle, across the side that the point lies farthest beyond, until it lies over one; stops at a
+  /// ridge that it lies outside of, and after some steps.
+  std::uint32_t walk(std::uint32_t triangle, const Eigen::Vector3d& p) const;
+
+ private:
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<Triangle> triangles_;
+  std::vector<Eigen::Vector3f> normals_;
+  std::vector<std::uint32_t> first_, around_;
+};
+
+}  // namespace hermesh

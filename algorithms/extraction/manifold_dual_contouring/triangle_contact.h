@@ -1,0 +1,17 @@
+// Whether two triangles meet anywhere but in the corners that they share: a test that may say "perhaps", never wrongly "no".
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+namespace hermesh {
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+/// True if it is certain that the triangles are apart, or meet only in their shared corners or their shared edge. The
+/// first `shared` (0, 1 or 2) corners of both are the same points; other corners that happen to coincide count as
+/// contact, and so does whatever is nearer than rounding can tell (about 1e-9 of the triangles' size). By separating
+/// planes (Gottschalk et al. 1996, with the planes through a shared corner or edge as closed ones).
+bool certainly_apart(const Corners& a, const Corners& b, int shared);
+
+}  // namespace hermesh

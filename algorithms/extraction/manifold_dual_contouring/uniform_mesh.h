@@ -1,0 +1,50 @@
+// The finest mesh of `manifold-dual-contouring`: closed, oriented, manifold and free of self-intersection by construction.
+//
+// **Why no two polygons meet** (index space; corners are lattice points). Give every cell a point strictly inside it, and
+// cut space into the tetrahedra of every lattice edge with the points of each two cells that share a face at that edge.
+// These fill space without overlap: a face is cut by the segment between its two cells' points into four triangles, and
+// the point of a cell sees the cell's boundary once. The same holds after points have moved as long as every tetrahedron
+// stays positively oriented (a piecewise linear map that is the identity far away and turns no tetrahedron over is a
+// homeomorphism), so a point may leave its cell for a sharp feature if its 24 tetrahedra allow it. The four tetrahedra of
+// a crossing edge are its *envelope*; two envelopes meet at most in the segments between points and in lattice corners.
+//
+//   plain edge     a quad of the four points; each of its two triangles lies in the envelope, which is checked
+//                  (Ju & Udeshi 2006, envelopes on an octree). One diagonal or the other nearly always does.
+//   fanned edge    else four triangles from the crossing itself, which is a point of the mesh then: each of them lies in
+//                  one tetrahedron.
+//   explicit face  where a cell has several sheets, or a face is ambiguous, the surface is held to the straight segments
+//                  between the crossings on the faces (cell_sheets.h). Each sheet is a cone over its loop of segments,
+//                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
+//                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
+//                  This is the last resort, and is counted.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
+#include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+struct UniformMesh {
+  std::vector<Eigen::Vector3d> points;  ///< index space relative to the placement's base; FilePoints::rounded()
+  std::vector<Quad> quads;              ///< abc and acd, counter-clockwise seen from outside, in index space
+  std::vector<Triangle> triangles;
+
+  std::uint64_t cells = 0;           ///< that the surface passes through
+  std::uint64_t several_sheets = 0;  ///< of these: coned over explicit segments
+  std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
+  std::uint64_t escaped = 0;         ///< points outside their cells
+};
+
+/// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and the tetrahedra allow.
+/// Holds for lattices up to 2^14 voxels from the base along an axis; beyond, single precision may round a point out of
+/// its cell. @throws Cancelled
+UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+                         RunContext& context);
+
+}  // namespace hermesh

@@ -1,0 +1,202 @@
+#include "algorithms/extraction/volume_ends.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "algorithms/core/leaf_table.h"
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+namespace {
+
+using openvdb::Coord;
+
+constexpr BlockMask kNone{};
+constexpr BlockMask kAll{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+
+/// From a sample inside to the one beyond the data.
+struct EndEdge {
+  Coord beyond;
+  float value;  ///< of the sample inside
+  int axis;
+  int side;  ///< 0: the sample beyond lies below, 1: above
+
+  bool operator<(const EndEdge& other) const {
+    return std::tie(beyond, axis, side) < std::tie(other.beyond, other.axis, other.side);
+  }
+};
+
+/// What makes an edge with a change of sign an end of the data.
+struct EndRule {
+  bool level_set = false;
+  openvdb::CoordBBox box;               ///< of the data, where it is no level set
+  std::array<float, 3> largest_rise{};  ///< of distances, from one sample to the next along each axis
+
+  bool operator()(const Coord& inside, float value, float beyond, int axis, int side) const {
+    if (level_set) return std::fabs(double(beyond) - double(value)) > largest_rise[axis];
+    return inside[axis] == (side ? box.max() : box.min())[axis];
+  }
+};
+
+/// Nothing where the volume has no ends.
+bool find_rule(const openvdb::FloatGrid& grid, double isovalue, EndRule& rule) {
+  rule.level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+  if (rule.level_set) {
+    // Distances that were stored in half precision, or advected, rise a little more than they should.
+    constexpr double kTolerance = 1.01;
+    const IndexToWorld placement = placement_of(grid);
+    for (int axis = 0; axis < 3; ++axis)
+      rule.largest_rise[axis] = static_cast<float>(kTolerance * placement.linear.col(axis).norm());
+    return double(grid.background()) >= isovalue;  // otherwise space beyond is inside
+  }
+  rule.box = grid.evalActiveVoxelBoundingBox();
+  if (rule.box.empty()) return false;
+  const bool is_fog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
+  return !is_fog || grid.activeVoxelCount() == rule.box.volume();
+}
+
+class EndFinder {
+ public:
+  EndFinder(const LeafTable& table, const EndRule& rule) : table_(table), rule_(rule) {}
+
+  /// In order of the samples beyond.
+  std::vector<EndEdge> find(const RunContext& context) const {
+    std::vector<std::vector<EndEdge>> found(table_.size());
+    parallel_blocks(table_.size(), context, [&](std::size_t i) {
+      for (int axis = 0; axis < 3; ++axis) search(i, axis, found[i]);
+    });
+    std::vector<EndEdge> all;
+    for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+ private:
+  BlockMask inside_of(std::size_t leaf, int dx, int dy, int dz) const {
+    const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
+    if (there >= 0) return table_.inside(static_cast<std::size_t>(there));
+    return there == kUniformInside ? kAll : kNone;
+  }
+  BlockMask active_of(std::size_t leaf, int dx, int dy, int dz) const {
+    const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
+    if (there >= 0) return table_.active(static_cast<std::size_t>(there));
+    return table_.tree().isValueOn(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)) ? kAll : kNone;
+  }
+
+  void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {
+    const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
+    const BlockMask own[2] = {table_.inside(leaf), inside_of(leaf, dx, dy, dz)};
+    const auto shifted = [&](const BlockMask& here, const BlockMask& next) {
+      return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) { return ax + ay + az == 0 ? here : next; });
+    };
+    const BlockMask next = shifted(own[0], own[1]);
+    BlockMask crossing;
+    for (int x = 0; x < 8; ++x) crossing[x] = own[0][x] ^ next[x];
+    if (!::hermesh::any(crossing)) return;
+    const BlockMask active = table_.active(leaf);
+    const BlockMask next_active = shifted(active, active_of(leaf, dx, dy, dz));
+    for (int x = 0; x < 8; ++x)  // of those the outer end must be inactive
+      crossing[x] &= (own[0][x] & ~next_active[x]) | (next[x] & ~active[x]);
+    for_each_bit(crossing, [&](int sample) { add(leaf, sample, axis, test(own[0], sample) ? 1 : 0, found); });
+  }
+
+  void add(std::size_t leaf, int sample, int axis, int side, std::vector<EndEdge>& found) const {
+    const Coord first = table_.lower(leaf).offsetBy(sample >> 6, (sample >> 3) & 7, sample & 7);
+    Coord second = first;
+    ++second[axis];
+    const Coord inside = side ? first : second, beyond = side ? second : first;
+    const float value = table_.tree().getValue(inside);
+    if (rule_(inside, value, table_.tree().getValue(beyond), axis, side)) found.push_back({beyond, value, axis, side});
+  }
+
+  const LeafTable& table_;
+  const EndRule& rule_;
+};
+
+DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& active) {
+  DataEnds ends;
+  for (const EndEdge& edge : edges) {
+    const int last = edge.beyond[edge.axis] - (edge.side ? 1 : -1);
+    bool& reached = ends.reached[edge.axis][edge.side];
+    ends.last[edge.axis][edge.side] = last;
+    reached = true;
+    if (last != (edge.side ? active.max() : active.min())[edge.axis]) ends.in_a_box = false;
+  }
+  return ends;
+}
+
+/// Outside, mirrored at the isovalue.
+float mirrored(float value, const InsideRule& rule) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  const double wanted = 2.0 * double(rule.isovalue) - double(value);
+  const float result = static_cast<float>(std::clamp(wanted, -kLargest, kLargest));
+  // Rounding may put it onto the isovalue, and the surface onto the sample.
+  if (rule.signed_value(result) > 0.0f) return result;
+  return std::nextafter(rule.isovalue, rule.scale * std::numeric_limits<float>::infinity());
+}
+
+openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid, const std::vector<EndEdge>& edges,
+                                              const InsideRule& rule) {
+  const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
+  if (copy->getGridClass() == openvdb::GRID_LEVEL_SET) copy->setGridClass(openvdb::GRID_UNKNOWN);
+  auto access = copy->getAccessor();
+  for (std::size_t i = 0; i < edges.size();) {
+    std::size_t end = i;
+    double sum = 0.0;
+    for (; end < edges.size() && edges[end].beyond == edges[i].beyond; ++end) sum += mirrored(edges[end].value, rule);
+    access.setValueOn(edges[i].beyond, static_cast<float>(sum / static_cast<double>(end - i)));
+    i = end;
+  }
+  return copy;
+}
+
+}  // namespace
+
+bool DataEnds::any() const {
+  return std::ranges::any_of(reached, [](const auto& axis) { return axis[0] || axis[1]; });
+}
+
+std::string DataEnds::text() const {
+  std::string result;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side)
+      if (reached[axis][side]) result += (result.empty() ? "" : ", ") + std::string(side ? "+" : "-") + "xyz"[axis];
+  return result;
+}
+
+ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& context) {
+  const Stage stage(context, "ends of the data");
+  const openvdb::FloatGrid& grid = *level_set.grid().grid;
+  const InsideRule inside = inside_rule(grid, isovalue);
+  EndRule rule;
+  if (!find_rule(grid, isovalue, rule)) return {level_set, {}};
+  std::vector<EndEdge> edges;
+  {
+    const LeafTable table(level_set, isovalue, context);
+    edges = EndFinder(table, rule).find(context);
+  }
+  if (edges.empty()) return {level_set, {}};
+  const openvdb::CoordBBox active = rule.level_set ? grid.evalActiveVoxelBoundingBox() : rule.box;
+  return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active)};
+}
+
+EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends) {
+  const ClosedVolume closed = close_ends(input.level_set, input.isovalue, input.context);
+  EndedMesh result{extractor.extract({.level_set = closed.volume,
+                                      .isovalue = input.isovalue,
+                                      .source = input.source,
+                                      .options = input.options,
+                                      .context = input.context,
+                                      .field = input.field}),
+                   closed.ends};
+  if (!closed.ends.any()) return result;
+  if (ends == Ends::open)
+    result.mesh = open_ends(result.mesh, closed.volume, closed.ends);
+  else
+    flatten_ends(result.mesh, closed.volume, closed.ends);
+  return result;
+}
+
+}  // namespace hermesh

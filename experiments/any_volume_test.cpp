@@ -1,0 +1,203 @@
+// Volumes of every kind through each of our extractors: closed, or empty, or refused in a sentence.
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetUtil.h>
+
+#include <cmath>
+#include <functional>
+#include <ostream>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/extraction/volume_ends.h"
+#include "algorithms/variants.h"
+#include "validation/mesh_report.h"
+
+namespace hermesh {
+
+/// How a test names its variant; GoogleTest would print the bytes of the structure.
+inline void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+
+class AnyVolume : public testing::TestWithParam<Extractor> {
+ protected:
+  PolygonMesh extract(const FloatGrid::Ptr& grid, double isovalue, Ends ends = Ends::closed) {
+    const Options options(GetParam().name, GetParam().options, {});
+    const LevelSet volume = make_level_set(grid);
+    return extract_with_ends(
+               GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends)
+        .mesh;
+  }
+  /// What it promises, and no boundary; returns how many triangles there are.
+  std::size_t expect_closed(const FloatGrid::Ptr& grid, double isovalue) {
+    SCOPED_TRACE("isovalue " + std::to_string(isovalue));
+    const PolygonMesh mesh = extract(grid, isovalue);
+    const MeshFile file = to_mesh_file(mesh);
+    if (file.triangle_count() == 0) return 0;
+    const auto report = validation::judge(file, {.self_intersections = false, .libraries = false}, context);
+    EXPECT_EQ(report.boundary_edges, 0);
+    EXPECT_EQ(report.inconsistent_edges, 0);
+    if (GetParam().promises.manifold) {
+      EXPECT_EQ(report.non_manifold_edges, 0);
+      EXPECT_EQ(report.non_manifold_vertices, 0);
+    }
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) EXPECT_TRUE(mesh.points[i].allFinite());
+    return file.triangle_count();
+  }
+  RunContext context;
+};
+
+FloatGrid::Ptr scan(const Coord& size, float background, const std::function<float(const Coord&)>& value) {
+  initialize_openvdb();
+  auto grid = FloatGrid::create(background);
+  for (const Coord& at : openvdb::CoordBBox(Coord(0), size.offsetBy(-1))) grid->tree().setValue(at, value(at));
+  return grid;
+}
+
+FloatGrid::Ptr integers(int values, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  return scan(Coord(24, 20, 17), -1.0f,
+              [&](const Coord&) { return float(int(random() % std::uint32_t(values))); });
+}
+
+/// Level set of a ball of ten voxels; the band may be as narrow as one likes.
+FloatGrid::Ptr sphere(float width) {
+  constexpr float kVoxel = 0.5f;
+  initialize_openvdb();
+  const float background = width * kVoxel;
+  auto grid = FloatGrid::create(background);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(kVoxel));
+  for (const Coord& at : openvdb::CoordBBox(Coord(-16), Coord(16))) {
+    const auto distance = static_cast<float>(at.asVec3d().length() * kVoxel - 5.13f);
+    if (std::fabs(distance) < background)
+      grid->tree().setValueOn(at, distance);
+    else if (distance < 0)
+      grid->tree().setValueOff(at, -background);
+  }
+  return grid;
+}
+
+TEST_P(AnyVolume, IntegersAtIntegerIsovalues) {
+  const FloatGrid::Ptr grid = integers(5, 1);
+  for (const double isovalue : {0.0, 1.0, 2.0, 3.0, 0.5}) EXPECT_GT(expect_closed(grid, isovalue), 0u) << isovalue;
+  // Nothing is greater than the greatest; below the least everything is inside, or the background's side turns.
+  EXPECT_EQ(expect_closed(grid, 4.0), 0u);
+  EXPECT_EQ(expect_closed(grid, 1e30), 0u);
+  EXPECT_EQ(expect_closed(grid, -1.0), 0u);
+  EXPECT_EQ(expect_closed(grid, -1e30), 0u);
+  EXPECT_GT(expect_closed(grid, -0.5), 0u);  // all of the box
+}
+
+TEST_P(AnyVolume, SmoothIntegersAtIntegerIsovalues) {
+  const FloatGrid::Ptr grid = scan(Coord(32), -2000.0f, [](const Coord& at) {
+    return std::floor(100.0f * std::sin(0.4f * at.x()) * std::cos(0.3f * at.y()) + 5.0f * at.z());
+  });
+  for (const double isovalue : {0.0, 50.0, 75.0, 100.0}) EXPECT_GT(expect_closed(grid, isovalue), 0u);
+}
+
+TEST_P(AnyVolume, BandsOfAVoxelAndLess) {
+  for (const float width : {0.5f, 0.6f, 0.9f, 1.0f, 1.2f, 2.0f}) {
+    const FloatGrid::Ptr grid = sphere(width);
+    SCOPED_TRACE(width);
+    EXPECT_GT(expect_closed(grid, 0.0), 0u);
+    const double background = grid->background();
+    for (const double share : {0.5, 0.9, -0.5, -0.9}) EXPECT_GT(expect_closed(grid, share * background), 0u) << share;
+  }
+}
+
+TEST_P(AnyVolume, IsovaluesAtAndBeyondTheBackground) {
+  const FloatGrid::Ptr grid = sphere(3.0f);
+  const double background = grid->background();
+  expect_closed(grid, background);
+  expect_closed(grid, -background);
+  for (const double isovalue : {1.01 * background, -1.01 * background, 1e10, -1e10})
+    EXPECT_EQ(expect_closed(grid, isovalue), 0u) << isovalue;
+  const FloatGrid::Ptr fog = sphere(3.0f);
+  openvdb::tools::sdfToFogVolume(*fog);
+  for (const double isovalue : {0.001, 0.5, 0.999}) EXPECT_GT(expect_closed(fog, isovalue), 0u) << isovalue;
+  for (const double isovalue : {0.0, 1.0, 2.0, -1.0}) expect_closed(fog, isovalue);
+}
+
+TEST_P(AnyVolume, SamplesExactlyAtTheIsovalue) {
+  // A plane of samples at 0, then a block whose faces lie on samples, as a level set and as a scan.
+  for (const auto grid_class : {openvdb::GRID_LEVEL_SET, openvdb::GRID_UNKNOWN}) {
+    const FloatGrid::Ptr grid = scan(Coord(20), 8.0f, [](const Coord& at) {
+      const Coord d = (at - Coord(10));
+      return float(std::max({std::abs(d.x()), std::abs(d.y()), std::abs(d.z())}) - 6);
+    });
+    grid->setGridClass(grid_class);
+    EXPECT_GT(expect_closed(grid, 0.0), 0u);
+    EXPECT_GT(expect_closed(grid, -1.0), 0u);
+    expect_closed(grid, 3.0);
+    expect_closed(grid, 4.0);
+  }
+}
+
+TEST_P(AnyVolume, TilesOfTheOtherSign) {
+  initialize_openvdb();
+  for (const auto grid_class : {openvdb::GRID_LEVEL_SET, openvdb::GRID_UNKNOWN, openvdb::GRID_FOG_VOLUME})
+    for (const bool active : {false, true}) {
+      auto grid = FloatGrid::create(1.0f);
+      grid->setGridClass(grid_class);
+      grid->tree().addTile(1, Coord(0, 0, 0), -1.0f, active);
+      grid->tree().addTile(1, Coord(8, 8, 0), -0.5f, true);
+      for (const Coord& at : openvdb::CoordBBox(Coord(8, 0, 0), Coord(11, 7, 7))) grid->tree().setValue(at, 0.5f);
+      for (const Coord& at : openvdb::CoordBBox(Coord(0, 0, 8), Coord(3, 3, 9))) grid->tree().setValue(at, -0.25f);
+      EXPECT_GT(expect_closed(grid, 0.0), 0u);
+    }
+}
+
+TEST_P(AnyVolume, BandWithVoxelsMissing) {
+  // A quarter of the active voxels lost: inactive, with the background's value of either sign.
+  std::mt19937 random(3);
+  for (const float sign : {1.0f, -1.0f}) {
+    const FloatGrid::Ptr grid = sphere(3.0f);
+    for (auto it = grid->beginValueOn(); it; ++it)
+      if (random() % 4 == 0) {
+        it.setValue(sign * grid->background());
+        it.setActiveState(false);
+      }
+    EXPECT_GT(expect_closed(grid, 0.0), 0u);
+  }
+}
+
+TEST_P(AnyVolume, WhatIsNotFiniteIsRefused) {
+  for (const float bad : {std::nanf(""), INFINITY, -INFINITY}) {
+    const FloatGrid::Ptr grid =
+        scan(Coord(9), -1.0f, [=](const Coord& at) { return at == Coord(4) ? bad : float(at.x()); });
+    EXPECT_THROW(extract(grid, 3.0), Error);
+  }
+  EXPECT_THROW(extract(integers(3, 2), NAN), Error);
+  EXPECT_THROW(extract(integers(3, 2), INFINITY), Error);
+}
+
+TEST_P(AnyVolume, NoiseThatFillsTheBoxIsClosedAndOpened) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  const FloatGrid::Ptr grid = scan(Coord(20, 21, 22), -1.0f, [&](const Coord&) { return value(random); });
+  EXPECT_GT(expect_closed(grid, 0.1), 0u);
+  const PolygonMesh open = extract(grid, 0.1, Ends::open);
+  const auto report =
+      validation::judge(to_mesh_file(open), {.self_intersections = false, .libraries = false}, context);
+  EXPECT_GT(report.boundary_edges, 100);
+  EXPECT_EQ(report.inconsistent_edges, 0);
+  for (std::size_t i = 0; i < open.points.size(); ++i) {
+    EXPECT_GE(open.world(i).minCoeff(), -1e-6);
+    EXPECT_LE(open.world(i).z(), 21.0 + 1e-6);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ours, AnyVolume,
+                         testing::ValuesIn(our_extractors().begin(), our_extractors().end()), [](const auto& param) {
+                           std::string name = param.param.name;
+                           for (char& c : name)
+                             if (c == '-') c = '_';
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace hermesh

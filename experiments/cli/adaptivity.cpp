@@ -1,0 +1,114 @@
+#include "experiments/cli/adaptivity.h"
+
+#include <CLI/CLI.hpp>
+#include <sstream>
+#include <vector>
+
+#include "algorithms/core/vdb_file.h"
+#include "algorithms/extraction/frustum.h"
+
+namespace hermesh::cli {
+namespace {
+
+constexpr const char* kFrustumForm =
+    "\"px,py,pz lx,ly,lz angle aspect near far\", and \"ux,uy,uz\" for up behind them unless it is 0,1,0";
+
+/// "1,2,3" to a vector.
+Eigen::Vector3d read_vector(const std::string& word) {
+  std::istringstream stream(word);
+  Eigen::Vector3d result;
+  char comma[2] = {',', ','};
+  stream >> result[0] >> comma[0] >> result[1] >> comma[1] >> result[2];
+  if (!stream || stream.peek() != EOF || comma[0] != ',' || comma[1] != ',')
+    throw Error("'" + word + "' is not three numbers with commas between them");
+  return result;
+}
+
+double read_number(const std::string& word) {
+  std::istringstream stream(word);
+  double result = 0.0;
+  if (!(stream >> result) || stream.peek() != EOF) throw Error("'" + word + "' is not a number");
+  return result;
+}
+
+Frustum read_frustum(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  if (words.size() != 6 && words.size() != 7) throw Error(std::string("it must be ") + kFrustumForm);
+  Frustum frustum;
+  frustum.position = read_vector(words[0]);
+  frustum.look_at = read_vector(words[1]);
+  frustum.field_of_view = read_number(words[2]);
+  frustum.aspect = read_number(words[3]);
+  frustum.near = read_number(words[4]);
+  frustum.far = read_number(words[5]);
+  if (words.size() == 7) frustum.up = read_vector(words[6]);
+  return frustum;
+}
+
+AdaptivityField::Outside read_outside(const std::string& name) {
+  if (name == "everywhere") return AdaptivityField::Outside::everywhere;
+  return name == "nothing" ? AdaptivityField::Outside::nothing : AdaptivityField::Outside::simplify;
+}
+
+/// Any other would make its usual mesh and leave the user in the belief that it did not.
+void check_adaptive(const Extractor& extractor) {
+  for (const OptionSpec& option : extractor.options)
+    if (option.name == "threshold" || option.name == "tolerance") return;
+  throw UsageError("the extractor " + extractor.name +
+                   " keeps no bound that a mask or a tolerance grid could change; use adaptive-dual-contouring or "
+                   "manifold-dual-contouring");
+}
+
+}  // namespace
+
+void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments) {
+  CLI::Option_group* group =
+      command.add_option_group("Where an adaptive extractor keeps its bound (see also --outside)");
+  CLI::Option* mask =
+      group->add_option("--mask", arguments.mask,
+                        "A .vdb that says where: in a level set where it is negative, in any other scalar "
+                        "grid where it differs from the background");
+  group
+      ->add_option(
+          "--frustum", arguments.frustum,
+          std::string("Instead of a mask what a camera sees: ") + kFrustumForm +
+              "; position, point looked at, vertical angle in degrees, width over height, planes in world units")
+      ->excludes(mask);
+  group
+      ->add_option("--frustum-resolution", arguments.frustum_resolution,
+                   "Voxels along the longest side of the frustum's mask (default: 84)")
+      ->check(CLI::Range(8, 4096));
+  group
+      ->add_option("--outside", arguments.outside,
+                   "Outside the mask 'simplify' (the default) merges as far as the topology allows, 'nothing' makes no "
+                   "polygons, so that the mesh is open, and 'everywhere' keeps the bound there, too")
+      ->check(CLI::IsMember({"everywhere", "simplify", "nothing"}));
+  group->add_option("--tolerance-grid", arguments.tolerance_grid,
+                    "A .vdb whose values, none of them negative, scale the extractor's bound; beyond its data the "
+                    "background does");
+}
+
+std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments, const Extractor& extractor,
+                                               Session& session) {
+  const bool has_mask = !arguments.mask.empty() || !arguments.frustum.empty();
+  if (!arguments.outside.empty() && !has_mask) throw UsageError("--outside needs --mask or --frustum");
+  if (!has_mask && arguments.tolerance_grid.empty()) return std::nullopt;
+  check_adaptive(extractor);
+  AdaptivityField field;
+  field.outside = !has_mask ? AdaptivityField::Outside::everywhere
+                            : read_outside(arguments.outside.empty() ? "simplify" : arguments.outside);
+  if (!arguments.mask.empty()) field.mask = read_level_set(arguments.mask, "", session.context);
+  if (!arguments.frustum.empty()) {
+    try {
+      field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution, session.context);
+    } catch (const Error& error) {
+      throw UsageError(std::string("--frustum: ") + error.what());
+    }
+  }
+  if (!arguments.tolerance_grid.empty()) field.scale = read_level_set(arguments.tolerance_grid, "", session.context);
+  return field;
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,111 @@
+// hermesh import: scalar volumes of other programs to .vdb.
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <memory>
+
+#include "algorithms/core/value_range.h"
+#include "algorithms/import/import_volume.h"
+#include "experiments/cli/format.h"
+#include "experiments/cli/output_path.h"
+#include "experiments/cli/signals.h"
+#include "experiments/cli/validators.h"
+#include "experiments/cli/voxelizing.h"
+
+namespace hermesh::cli {
+namespace {
+
+struct Arguments {
+  Paths paths;
+  std::optional<std::string> dims, type, spacing;
+  std::uint64_t offset = 0;
+  std::optional<std::int64_t> frame;
+  std::optional<double> replacement;
+};
+
+/// Three numbers with commas between them. @throws UsageError
+template <class T>
+std::array<T, 3> three_numbers(const std::string& option, const std::string& given) {
+  std::array<T, 3> numbers{};
+  const char* at = given.data();
+  const char* const end = at + given.size();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto [stop, status] = std::from_chars(at, end, numbers[i]);
+    const bool good = status == std::errc() && numbers[i] > 0 && (i < 2 ? stop != end && *stop == ',' : stop == end);
+    if (!good || !std::isfinite(double(numbers[i])))
+      throw UsageError(option + " must be three numbers above 0 with commas between them, such as 256,256,108, not '" +
+                       given + "'");
+    at = stop + 1;
+  }
+  return numbers;
+}
+
+RawLayout raw_layout(const Arguments& arguments, Session& session) {
+  if (!arguments.type) throw UsageError("--dims makes the input raw samples: say of which --type, such as int16le");
+  RawLayout layout;
+  layout.dims = three_numbers<std::int64_t>("--dims", *arguments.dims);
+  layout.format = as_usage([&] { return parse_sample_format(*arguments.type); });
+  layout.offset = arguments.offset;
+  if (arguments.spacing)
+    layout.spacing = three_numbers<double>("--spacing", *arguments.spacing);
+  else
+    session.context.note("no --spacing was given; 1,1,1 was taken");
+  if (arguments.frame) throw UsageError("--frame is about NIfTI files; for raw samples use --offset");
+  return layout;
+}
+
+void check_nifti(const Arguments& arguments) {
+  if (arguments.type || arguments.spacing || arguments.offset != 0)
+    throw UsageError("--type, --spacing and --offset are about raw samples: give their --dims, too");
+  if (!is_nifti_path(arguments.paths.in))
+    throw UsageError("cannot tell what '" + arguments.paths.in +
+                     "' is: its name ends neither in .nii, .hdr nor .img (.gz may follow); for raw samples give --dims, "
+                     "--type and --spacing");
+}
+
+int run_import(const Arguments& arguments, Session& session) {
+  ImportOptions options{.replacement = {}, .frame = arguments.frame};
+  if (arguments.replacement) options.replacement = static_cast<float>(*arguments.replacement);
+  std::optional<RawLayout> layout;
+  if (arguments.dims)
+    layout = raw_layout(arguments, session);
+  else
+    check_nifti(arguments);
+  check_volume_output(arguments.paths.out);
+  const Stopwatch watch;
+  const LevelSet volume = layout ? import_raw(arguments.paths.in, *layout, options, session.context)
+                                 : import_nifti(arguments.paths.in, options, session.context);
+  write_imported(arguments.paths.out, volume, session.context);
+  work_is_finished();
+  const std::array<int, 3> dims = volume.dimensions();
+  const auto [lowest, highest] = value_range(volume);
+  print_summary(session, "imported " + arguments.paths.in + ": " + std::to_string(dims[0]) + " x " +
+                             std::to_string(dims[1]) + " x " + std::to_string(dims[2]) + " samples, values " +
+                             text(lowest) + " to " + text(highest) + ", " + seconds_text(watch.seconds()));
+  return kDone;
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Session& session) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
+  add_paths(*command, arguments->paths, "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped",
+            "Volume: .vdb, the grid `volume` in millimetres");
+  command->add_option("--frame", arguments->frame, "Which of a NIfTI file's volumes, from 0 (default: the first)");
+  command->add_option("--dims", arguments->dims, "Raw: X,Y,Z, the numbers of samples; x is fastest in the file");
+  command->add_option("--type", arguments->type,
+                      "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le "
+                      "(the default) or be behind");
+  command->add_option("--spacing", arguments->spacing, "Raw: A,B,C, the distances of samples in mm (default: 1,1,1)");
+  command->add_option("--offset", arguments->offset, "Raw: bytes before the first sample (default: 0)");
+  command
+      ->add_option("--replace-nan", arguments->replacement,
+                   "Value in place of samples that are not finite (default: such a volume is refused)")
+      ->check(finite_number());
+  command->callback([arguments, &session] {
+    session.command = [arguments, &session] { return run_import(*arguments, session); };
+  });
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,265 @@
+// Surfaces that run into the end of the data: closed flat or left open, by each of our extractors and OpenVDB's.
+#include "algorithms/extraction/volume_ends.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetUtil.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <ostream>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/variants.h"
+#include "reference/variants.h"
+#include "validation/mesh_report.h"
+
+namespace hermesh {
+
+/// How a test names its variant; GoogleTest would print the bytes of the structure.
+inline void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
+
+namespace {
+
+using openvdb::Coord;
+using Field = std::function<float(int, int, int)>;
+
+openvdb::FloatGrid::Ptr dense(const Coord& lower, const Coord& upper, float background, const Field& value) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(background);
+  for (const Coord& at : openvdb::CoordBBox(lower, upper)) grid->tree().setValue(at, value(at.x(), at.y(), at.z()));
+  return grid;
+}
+
+/// Greater inside, as in a scan: a ball about (10, 9, z), radius 6.3.
+openvdb::FloatGrid::Ptr ball(double z) {
+  return dense(Coord(0, 0, 0), Coord(20, 19, 15), -100.0f, [=](int x, int y, int k) {
+    return static_cast<float>(100.0 * (6.3 - std::hypot(x - 10.0, y - 9.0, k - z)));
+  });
+}
+
+/// About the origin; OpenVDB's own makes none with a band of a voxel or less.
+openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width) {
+  initialize_openvdb();
+  const float background = width * voxel;
+  auto grid = openvdb::FloatGrid::create(background);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
+  for (const Coord& at : openvdb::CoordBBox(Coord(-26), Coord(26))) {
+    const auto distance = static_cast<float>(at.asVec3d().length() * voxel - radius);
+    if (std::fabs(distance) < background)
+      grid->tree().setValueOn(at, distance);
+    else if (distance < 0)
+      grid->tree().setValueOff(at, -background);
+  }
+  return grid;
+}
+
+/// As openvdb::tools::clip() leaves a grid: what is not kept is inactive background. (Those do not compile as C++20.)
+openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach, const std::function<bool(const Coord&)>& keep) {
+  const openvdb::FloatGrid::Ptr clipped = grid->deepCopy();
+  for (const Coord& at : openvdb::CoordBBox(Coord(-reach), Coord(reach)))
+    if (!keep(at)) clipped->tree().setValueOff(at, grid->background());
+  return clipped;
+}
+
+validation::MeshReport counts_of(const PolygonMesh& mesh) {
+  RunContext context;
+  return validation::judge(to_mesh_file(mesh), {.self_intersections = false, .libraries = false}, context);
+}
+
+/// Points on edges that have one polygon.
+std::vector<Eigen::Vector3d> boundary_points(const PolygonMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
+  const auto add = [&](const auto& polygon) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const std::uint32_t a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+      ++uses[{std::min(a, b), std::max(a, b)}];
+    }
+  };
+  for (const Triangle& triangle : mesh.triangles) add(triangle);
+  for (const Quad& quad : mesh.quads) add(quad);
+  std::vector<Eigen::Vector3d> points;
+  for (const auto& [edge, count] : uses)
+    if (count == 1) points.insert(points.end(), {mesh.world(edge.first), mesh.world(edge.second)});
+  return points;
+}
+
+std::vector<Extractor> table() {
+  const auto ours = our_extractors();
+  std::vector<Extractor> all(ours.begin(), ours.end());
+  all.push_back(find_variant(reference_extractors(), "openvdb"));
+  return all;
+}
+
+class VolumeEnds : public testing::TestWithParam<Extractor> {
+ protected:
+  EndedMesh extract(const LevelSet& volume, double isovalue, Ends ends) {
+    const Options options(GetParam().name, GetParam().options, {});
+    return extract_with_ends(
+        GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends);
+  }
+  RunContext context;
+};
+
+TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
+  // The lower half in x is full: a block of 10.5 x 18 x 16 voxels.
+  const LevelSet box = make_level_set(dense(Coord(0, 0, 0), Coord(20, 17, 15), -1.0f, [](int x, int, int) {
+    return x < 10 ? 100.0f : 0.0f;
+  }));
+  const EndedMesh ended = extract(box, 50.0, Ends::closed);
+  EXPECT_EQ(ended.ends.text(), "-x, -y, +y, -z, +z");
+  const validation::MeshReport report = counts_of(ended.mesh);
+  EXPECT_EQ(report.boundary_edges, 0);
+  EXPECT_EQ(report.inconsistent_edges, 0);
+  EXPECT_EQ(report.components, 1);
+  // Marching cubes and means of crossings cut the edges of the block off.
+  EXPECT_NEAR(report.volume, 10.0 * 18.0 * 16.0, 30.0);
+  for (std::size_t i = 0; i < ended.mesh.points.size(); ++i) {
+    const Eigen::Vector3d p = ended.mesh.world(i);
+    EXPECT_GE(p.minCoeff(), -0.5 - 1e-6);
+    EXPECT_LE(p.x(), 9.51);  // no end, but a surface of the data
+    EXPECT_LE(p.y(), 17.5 + 1e-6);
+    EXPECT_LE(p.z(), 15.5 + 1e-6);
+  }
+  EXPECT_NEAR(bounds(ended.mesh).lower.x(), -0.5, 1e-6);
+  EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, 1e-6);
+}
+
+TEST_P(VolumeEnds, CutBallHasAFlatCap) {
+  const LevelSet volume = make_level_set(ball(12.4));
+  for (const double isovalue : {0.0, 33.3, -70.0, 0.1}) {
+    const EndedMesh ended = extract(volume, isovalue, Ends::closed);
+    EXPECT_EQ(ended.ends.text(), "+z");
+    const validation::MeshReport report = counts_of(ended.mesh);
+    EXPECT_EQ(report.boundary_edges, 0);
+    EXPECT_EQ(report.components, 1);
+    EXPECT_EQ(report.euler_characteristic, 2);
+    std::size_t cap = 0;
+    for (std::size_t i = 0; i < ended.mesh.points.size(); ++i) {
+      const double z = ended.mesh.world(i).z();
+      if (z <= 15.0 + 2e-3) continue;
+      ++cap;
+      EXPECT_NEAR(z, 15.5, 1e-6);
+    }
+    EXPECT_GE(cap, 4u);  // some extractors merge what is flat
+  }
+}
+
+TEST_P(VolumeEnds, OpenBallHasOneLoopInThePlaneOfTheLastSamples) {
+  const EndedMesh ended = extract(make_level_set(ball(12.4)), 0.0, Ends::open);
+  const validation::MeshReport report = counts_of(ended.mesh);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_EQ(report.euler_characteristic, 1);  // a disc
+  EXPECT_EQ(report.non_manifold_edges, 0);
+  EXPECT_EQ(report.non_manifold_vertices, 0);
+  EXPECT_EQ(report.inconsistent_edges, 0);
+  EXPECT_EQ(report.isolated_points, 0);
+  const std::vector<Eigen::Vector3d> loop = boundary_points(ended.mesh);
+  EXPECT_EQ(loop.size(), 2 * std::size_t(report.boundary_edges));
+  EXPECT_GT(report.boundary_edges, 20);
+  const double radius = std::sqrt(6.3 * 6.3 - 2.6 * 2.6);
+  for (const Eigen::Vector3d& p : loop) {
+    EXPECT_NEAR(p.z(), 15.0, 1e-6);
+    EXPECT_NEAR(std::hypot(p.x() - 10.0, p.y() - 9.0), radius, 0.35);
+  }
+  for (std::size_t i = 0; i < ended.mesh.points.size(); ++i) EXPECT_LE(ended.mesh.world(i).z(), 15.0 + 1e-6);
+}
+
+TEST_P(VolumeEnds, TurnedMirroredAndFarAway) {
+  const openvdb::FloatGrid::Ptr grid = ball(12.4);
+  const openvdb::math::Mat4d matrix(0.0, 2.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 1000.0, -2000.0, 500.0,
+                                     1.0);  // of rows; mirrors
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+  const EndedMesh closed = extract(make_level_set(grid), 0.0, Ends::closed);
+  const validation::MeshReport report = counts_of(closed.mesh);
+  EXPECT_EQ(report.boundary_edges, 0);
+  EXPECT_GT(report.volume, 0.0);  // counter-clockwise seen from outside
+  EXPECT_NEAR(bounds(closed.mesh).upper.z(), 500 + 3 * 15.5, 1e-4);
+  for (const Eigen::Vector3d& p : boundary_points(extract(make_level_set(grid), 0.0, Ends::open).mesh))
+    EXPECT_NEAR(p.z(), 500 + 3 * 15.0, 1e-4);
+}
+
+TEST_P(VolumeEnds, ClippedLevelSet) {
+  const openvdb::FloatGrid::Ptr sphere = level_set_sphere(10.0f, 0.5f, 3.0f);
+  const openvdb::FloatGrid::Ptr clipped = clip(sphere, 26, [](const Coord& at) { return at.y() <= 6; });
+  const int last = clipped->evalActiveVoxelBoundingBox().max().y();
+  const EndedMesh closed = extract(make_level_set(clipped), 0.0, Ends::closed);
+  EXPECT_EQ(closed.ends.text(), "+y");
+  EXPECT_TRUE(closed.ends.in_a_box);
+  const validation::MeshReport report = counts_of(closed.mesh);
+  EXPECT_EQ(report.boundary_edges, 0);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_EQ(report.euler_characteristic, 2);
+  const double plane = 0.5 * (last + 0.5);
+  EXPECT_NEAR(bounds(closed.mesh).upper.y(), plane, 1e-6);
+  // A ball of radius 10 below the plane.
+  const double height = 10.0 + plane, exact = M_PI * height * height * (30.0 - height) / 3.0;
+  EXPECT_NEAR(report.volume, exact, 0.02 * exact);
+  const EndedMesh open = extract(make_level_set(clipped), 0.0, Ends::open);
+  EXPECT_EQ(counts_of(open.mesh).euler_characteristic, 1);
+  for (const Eigen::Vector3d& p : boundary_points(open.mesh)) EXPECT_NEAR(p.y(), 0.5 * last, 1e-6);
+}
+
+TEST_P(VolumeEnds, LevelSetClippedByAMaskIsClosedButCannotBeOpened) {
+  const openvdb::FloatGrid::Ptr sphere = level_set_sphere(10.0f, 0.5f, 3.0f);
+  const openvdb::FloatGrid::Ptr clipped =
+      clip(sphere, 26, [](const Coord& at) { return (at - Coord(16, 2, 4)).asVec3d().length() < 12.0; });
+  const EndedMesh closed = extract(make_level_set(clipped), 0.0, Ends::closed);
+  EXPECT_FALSE(closed.ends.in_a_box);
+  EXPECT_EQ(counts_of(closed.mesh).boundary_edges, 0);
+  EXPECT_THROW(extract(make_level_set(clipped), 0.0, Ends::open), Error);
+}
+
+TEST_P(VolumeEnds, SameBytesEachTime) {
+  const LevelSet volume = make_level_set(ball(12.4));
+  for (const Ends ends : {Ends::closed, Ends::open})
+    EXPECT_TRUE(extract(volume, 1.0, ends).mesh == extract(volume, 1.0, ends).mesh);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, VolumeEnds, testing::ValuesIn(table()), [](const auto& param) {
+  std::string name = param.param.name;
+  for (char& c : name)
+    if (c == '-') c = '_';
+  return name;
+});
+
+TEST(CloseEnds, LeavesVolumesWithoutEndsAlone) {
+  RunContext context;
+  const auto expect_untouched = [&](const LevelSet& volume, double isovalue) {
+    const ClosedVolume closed = close_ends(volume, isovalue, context);
+    EXPECT_FALSE(closed.ends.any());
+    EXPECT_EQ(closed.volume.grid().grid, volume.grid().grid);
+  };
+  for (const float width : {0.6f, 1.0f, 1.5f, 3.0f, 8.0f})
+    for (const double isovalue : {-0.2, 0.0, 0.2}) {
+      const openvdb::FloatGrid::Ptr sphere = level_set_sphere(5.0f, 0.5f, width);
+      expect_untouched(make_level_set(sphere), isovalue * width);
+    }
+  expect_untouched(make_level_set(ball(7.0)), 0.0);  // it does not reach the box
+  const openvdb::FloatGrid::Ptr fog = level_set_sphere(5.0f, 0.5f, 3.0f);
+  openvdb::tools::sdfToFogVolume(*fog);
+  expect_untouched(make_level_set(fog), 0.1);
+  expect_untouched(make_level_set(openvdb::FloatGrid::create(1.0f)), 0.0);
+}
+
+TEST(CloseEnds, NoSampleOfTheDataChanges) {
+  RunContext context;
+  const openvdb::FloatGrid::Ptr grid = ball(12.4);
+  const ClosedVolume closed = close_ends(make_level_set(grid), 0.0, context);
+  std::size_t changed = 0;
+  for (auto it = closed.volume.grid().grid->cbeginValueOn(); it; ++it) {
+    if (it.getCoord().z() <= 15) {
+      ASSERT_EQ(*it, grid->tree().getValue(it.getCoord()));
+    } else {
+      ++changed;
+      ASSERT_EQ(it.getCoord().z(), 16);
+      ASSERT_EQ(*it, -grid->tree().getValue(it.getCoord().offsetBy(0, 0, -1)));
+    }
+  }
+  EXPECT_GT(changed, 50u);
+}
+
+}  // namespace
+}  // namespace hermesh
