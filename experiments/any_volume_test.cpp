@@ -1,9 +1,12 @@
 // Volumes of every kind through each of our extractors: closed, or empty, or refused in a sentence.
 #include <gtest/gtest.h>
+
 #include <openvdb/tools/LevelSetUtil.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <ostream>
 #include <random>
 
@@ -25,7 +28,13 @@ using openvdb::FloatGrid;
 class AnyVolume : public testing::TestWithParam<Extractor> {
  protected:
   PolygonMesh extract(const FloatGrid::Ptr& grid, double isovalue, Ends ends = Ends::closed) {
-    const Options options(GetParam().name, GetParam().options, {});
+    // Which volumes are closed is decided before anything is merged, and noise takes a proving variant its time.
+    const auto& declared = GetParam().options;
+    const bool proves = std::any_of(declared.begin(), declared.end(),
+                                    [](const OptionSpec& option) { return option.name == "tolerance"; });
+    std::map<std::string, std::string> given;
+    if (proves) given["tolerance"] = "0";
+    const Options options(GetParam().name, declared, given);
     const LevelSet volume = make_level_set(grid);
     return extract_with_ends(
                GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends)

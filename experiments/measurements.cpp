@@ -60,7 +60,8 @@ std::vector<std::string> case_choices() {
 std::span<const Measurement> all_measurements() {
   static const std::vector<Measurement> table = {normal_codes_measurement(), lost_crossings_measurement(),
                                                  hermite_memory_measurement(), hermite_csg_measurement(),
-                                                 hermite_speed_measurement(), table_9_2_measurement(), volumes_measurement()};
+                                                 hermite_speed_measurement(), table_9_2_measurement(), volumes_measurement(),
+                                                 guarantee_measurement()};
   return table;
 }
 
@@ -78,7 +79,7 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
   double seconds = 0.0;
   const auto failure = attempt([&] {
     seconds = timed([&] {
-      measured = measurement.measure({parameters, experiment.seed, tables, out, context});
+      measured = measurement.measure({parameters, experiment.seed, tables, out, context, filter});
     });
   });
   if (failure) {

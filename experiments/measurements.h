@@ -36,6 +36,8 @@ struct MeasurementInput {
   const Tables& tables;       ///< to load cases with, and to find variants in
   std::filesystem::path out;  ///< folder of the run
   RunContext& context;
+  /// Rows whose "measurement/table/label" does not contain it are thrown away; to make them would be in vain.
+  std::string filter = {};
 };
 
 /// A line of one of its tables.
@@ -90,5 +92,6 @@ Measurement hermite_csg_measurement();
 Measurement hermite_speed_measurement();
 Measurement table_9_2_measurement();
 Measurement volumes_measurement();
+Measurement guarantee_measurement();
 
 }  // namespace hermesh

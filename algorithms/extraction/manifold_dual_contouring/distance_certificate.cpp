@@ -118,14 +118,6 @@ class Shortcut {
     return true;
   }
 
-  /// All of the fine mesh at the samples attached to it faces as it does, and there are some.
-  bool of_coarse(std::uint32_t t) const {
-    for (std::uint32_t s = mesh_.first_sample[t]; s != kNoSample; s = mesh_.next_sample[s])
-      for (const std::uint32_t f : fine_.around(s))
-        if (fine_.normal(f).dot(normals_[t]) < kFacing) return false;
-    return mesh_.first_sample[t] != kNoSample;
-  }
-
  private:
   static constexpr float kFacing = 0.5f;
   static bool has(const Triangle& t, std::uint32_t corner) { return t[0] == corner || t[1] == corner || t[2] == corner; }
@@ -163,7 +155,6 @@ DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const 
                              coarse_surface, within, [&](std::uint32_t) { return within; });
   });
   parallel_blocks(coarse_fails.size(), context, [&](std::size_t t) {
-    if (shortcut.of_coarse(static_cast<std::uint32_t>(t))) return;
     coarse_fails[t] = !is_near(piece_of(mesh.points, mesh.triangles[t]), {kNone, kNone, kNone}, fine_surface, widest,
                                [&](std::uint32_t f) { return least(fine.triangles()[f]); });
   });

@@ -23,8 +23,9 @@ struct DistanceCertificate {
 /// and 0.005 voxel.
 ///
 /// Not searched, because decimate() has seen to it edge by edge (decimation.h): fine triangles whose corners are attached
-/// to triangles that touch one another and face the same way within 60 degrees, and coarse triangles that all of the fine
-/// mesh below faces. There both meshes are heights over one plane.
+/// to triangles that touch one another and face the same way within 60 degrees. (The same was tried for coarse triangles
+/// and let a distance of 0.2576 pass for 0.25.)
+///
 /// `tolerance` by sample, voxels.
 DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance, RunContext& context);
 

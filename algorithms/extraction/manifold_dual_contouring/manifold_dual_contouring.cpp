@@ -1,9 +1,11 @@
 #include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/manifold_dual_contouring/decimation.h"
 #include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
@@ -45,20 +47,76 @@ std::vector<Triangle> all_triangles(UniformMesh& mesh) {
   return triangles;
 }
 
-/// Collapses, and again with less room wherever the distance cannot be proved. Nothing if that never ends, which has not
-/// been seen: the uniform mesh serves then.
-std::optional<DecimatedMesh> certified(const FineMesh& fine, double tolerance, const FilePoints& file,
+/// The field at single places of index space, relative to the placement's base.
+class FieldAtPoints {
+ public:
+  FieldAtPoints(const AdaptivityField* field, const IndexToWorld& placement)
+      : evaluator_(field, placement), base_(placement.base) {}
+
+  bool leaves_out(const Eigen::Vector3d& p) const {
+    return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
+  }
+  float tolerance(const Eigen::Vector3d& p, double tolerance) const {
+    const Cell cell = cell_at(p);
+    if (evaluator_.simplifies_outside() && !in_mask(cell))
+      return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
+    if (!evaluator_.has_scale()) return static_cast<float>(tolerance);
+    std::array<float, 512> scales;
+    evaluator_.scales(cell.lower, cell.mask, scales);
+    return static_cast<float>(tolerance * scales[cell.sample]);
+  }
+
+ private:
+  struct Cell {
+    std::array<std::int32_t, 3> lower;
+    BlockMask mask{};
+    std::size_t sample;
+  };
+  Cell cell_at(const Eigen::Vector3d& p) const {
+    Cell cell;
+    int at[3];
+    for (int a = 0; a < 3; ++a) {
+      const int index = static_cast<int>(std::floor(p[a])) + base_[a];
+      cell.lower[a] = index & ~7;
+      at[a] = index & 7;
+    }
+    cell.sample = static_cast<std::size_t>(sample_index(at[0], at[1], at[2]));
+    cell.mask[cell.sample >> 6] = std::uint64_t{1} << (cell.sample & 63);
+    return cell;
+  }
+  bool in_mask(const Cell& cell) const { return any(evaluator_.inside(cell.lower, cell.mask)); }
+
+  const FieldEvaluator evaluator_;
+  const std::array<std::int32_t, 3> base_;
+};
+
+/// Each once, ascending.
+void add_neighbours(const FineMesh& fine, std::vector<std::uint32_t>& samples) {
+  const std::size_t n = samples.size();
+  for (std::size_t i = 0; i < n; ++i)
+    for (const std::uint32_t t : fine.around(samples[i])) samples.push_back(fine.next(t, samples[i]));
+  std::sort(samples.begin(), samples.end());
+  samples.erase(std::unique(samples.begin(), samples.end()), samples.end());
+}
+
+/// Collapses, and again with less room wherever the distance cannot be proved. Nothing if that does not end soon, as on white
+/// noise: the uniform mesh serves then.
+std::optional<DecimatedMesh> certified(const FineMesh& fine, const std::vector<float>& asked, const FilePoints& file,
                                        RunContext& context) {
   constexpr int kAttempts = 6;
-  const std::vector<float> asked(fine.points().size(), static_cast<float>(tolerance));
   std::vector<float> allowed = asked;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     DecimatedMesh mesh = begin_decimation(fine, allowed, context);
     decimate(mesh, file, context);
     const DistanceCertificate certificate = certify_distance(mesh, asked, context);
-    context.figure("unproved", double(certificate.fine_triangles + certificate.coarse_triangles));
-    if (certificate.holds()) return mesh;
-    for (const std::uint32_t sample : certificate.samples) allowed[sample] *= attempt == 0 ? 0.3f : 0.0f;
+    if (certificate.holds()) {
+      context.figure("attempts", attempt + 1);
+      return mesh;
+    }
+    // First less room for those concerned; then none, and none for more and more of their neighbours.
+    std::vector<std::uint32_t> concerned = certificate.samples;
+    for (int ring = 0; ring < 2 * attempt; ++ring) add_neighbours(fine, concerned);
+    for (const std::uint32_t sample : concerned) allowed[sample] *= attempt == 0 ? 0.3f : 0.0f;
   }
   return std::nullopt;
 }
@@ -66,26 +124,37 @@ std::optional<DecimatedMesh> certified(const FineMesh& fine, double tolerance, c
 }  // namespace
 
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
-                                     RunContext& context) {
+                                     const AdaptivityField* field, RunContext& context) {
   const FilePoints file(grid.placement());
+  const FieldAtPoints at_points(field, grid.placement());
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
   report(uniform, context);
-  if (options.tolerance <= 0 || uniform.points.empty())
+  const bool whole = !field || field->outside != AdaptivityField::Outside::nothing;
+  if (uniform.points.empty() || (options.tolerance <= 0 && whole))
     return in_world(uniform.points, uniform.triangles, uniform.quads, file, context);
+
   const FineMesh fine(std::move(uniform.points), all_triangles(uniform));
-  const std::optional<DecimatedMesh> coarse = certified(fine, options.tolerance, file, context);
-  if (!coarse) return in_world(fine.points(), fine.triangles(), {}, file, context);
-  std::vector<std::uint32_t> number(fine.points().size(), kNoSample);
+  std::vector<float> asked(fine.points().size());
+  parallel_blocks(asked.size(), context, [&](std::size_t i) {
+    asked[i] = at_points.tolerance(fine.points()[i], options.tolerance);
+  });
+  const std::optional<DecimatedMesh> coarse =
+      options.tolerance > 0 ? certified(fine, asked, file, context) : std::nullopt;
+  const std::vector<Eigen::Vector3d>& places = coarse ? coarse->points : fine.points();
+  std::vector<std::uint32_t> number(places.size(), kNoSample);
   std::vector<Eigen::Vector3d> points;
-  std::vector<Triangle> triangles = coarse->triangles;
-  for (Triangle& t : triangles)
+  std::vector<Triangle> triangles;
+  for (Triangle t : coarse ? coarse->triangles : fine.triangles()) {
+    if (!whole && at_points.leaves_out((places[t[0]] + places[t[1]] + places[t[2]]) / 3.0)) continue;
     for (std::uint32_t& p : t) {
       if (number[p] == kNoSample) {
         number[p] = static_cast<std::uint32_t>(points.size());
-        points.push_back(coarse->points[p]);
+        points.push_back(places[p]);
       }
       p = number[p];
     }
+    triangles.push_back(t);
+  }
   return in_world(points, std::move(triangles), {}, file, context);
 }
 
@@ -93,9 +162,11 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   ManifoldDualContouringOptions options;
   options.uniform = read_dual_contouring_options(input.options);
   options.tolerance = input.options.number("tolerance");
+  if (const double world = input.options.number("tolerance_world"); world > 0)
+    options.tolerance = world / input.level_set.voxel_size();
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
-  return manifold_dual_contouring(view_of(hermite, input.context), options, input.context);
+  return manifold_dual_contouring(view_of(hermite, input.context), options, input.field, input.context);
 }
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
@@ -103,9 +174,14 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
   options.insert(options.begin(),
                  {.name = "tolerance",
                   .fallback = "0.1",
-                  .help = "two-sided distance to the uniform mesh that is never exceeded, in voxels; larger gives fewer "
-                          "polygons, 0 the uniform mesh itself",
+                  .help = "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
+                          "gives fewer polygons, 0 the uniform mesh itself",
                   .maximum = 1e6});
+  options.insert(options.begin() + 1,
+                 {.name = "tolerance_world",
+                  .fallback = "0",
+                  .help = "the same in world units, instead of tolerance where it is greater than 0",
+                  .maximum = 1e30});
   return options;
 }
 

@@ -1,0 +1,89 @@
+// The triangles that touch one cube of a round, with their connections (decimation.h).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "algorithms/extraction/manifold_dual_contouring/block_decimation.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_reach.h"
+
+namespace hermesh {
+
+/// Vertices and faces have numbers of their own here, in the order of those of the whole mesh.
+struct CubeMesh {
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  struct Vertex {
+    Eigen::Vector3d point;
+    std::uint32_t global;
+    std::uint32_t first_corner = kNone;
+    std::uint32_t version = 0;  ///< goes up when the vertex changes
+    bool here = false;          ///< in the cube, so that all its triangles are known
+    bool free = false;          ///< all its triangles belong to the cube, so that it may move
+    bool gone = false;
+  };
+  struct Face {
+    std::array<std::uint32_t, 3> corners;
+    std::uint32_t global;
+    Box3 box;  ///< empty when it is gone
+    bool own = false;
+    std::uint32_t seen = 0;  ///< number of the last question that it was looked at for
+    bool gone() const { return box.lower[0] > box.upper[0]; }
+  };
+
+  CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::span<const std::uint32_t> triangles);
+
+  template <class F>
+  void for_each_face(std::uint32_t v, F&& f) const {
+    for (std::uint32_t corner = vertices[v].first_corner; corner != kNone; corner = next_corner[corner])
+      if (!faces[corner / 3].gone()) f(corner / 3, static_cast<int>(corner % 3));
+  }
+  Corners corners_of(std::uint32_t f) const {
+    const auto& c = faces[f].corners;
+    return {vertices[c[0]].point, vertices[c[1]].point, vertices[c[2]].point};
+  }
+  /// By their numbers in the whole mesh; kNone if they are not among these.
+  std::uint32_t find_face(std::uint32_t triangle) const;
+  std::uint32_t find_vertex(std::uint32_t point) const;
+  /// `staying` takes over the corners of `going` that are left: dead ones would make the walk around it longer and longer.
+  void merge_corners(std::uint32_t going, std::uint32_t staying);
+  /// A new question, for Face::seen.
+  std::uint32_t ask() { return ++question; }
+
+  std::span<const std::uint32_t> triangles;  ///< numbers in the whole mesh, by face
+  std::vector<Vertex> vertices;
+  std::vector<Face> faces;
+  std::vector<std::uint32_t> next_corner;  ///< by corner, 3 × face + i: the next one at the same vertex
+  std::optional<TriangleGrid> grid;
+  std::uint32_t question = 0;
+};
+
+/// A proposal: the ends u and v of an edge become one point x, which keeps the number of v.
+struct Collapse {
+  struct NewFace {
+    std::uint32_t face;
+    int corner;  ///< of x
+    Corners at;  ///< x first, in the order of the face
+    std::array<std::uint32_t, 2> others;
+    Box3 box;
+    Eigen::Vector3d normal;  ///< not of unit length
+    TriangleReach reach;
+  };
+  struct Attached {
+    std::uint32_t sample;
+    std::uint32_t triangle;  ///< index among the new ones
+  };
+
+  std::uint32_t u, v;
+  Eigen::Vector3d x;
+  bool v_moves;                     ///< else x is where v is, and its faces stay unless u is in them
+  std::vector<std::uint32_t> old;   ///< faces that go or change, ascending
+  std::vector<NewFace> made;        ///< faces as they will be
+  std::vector<Attached> attached;   ///< samples of the old faces, and those of the ends that move
+};
+
+}  // namespace hermesh

@@ -1,0 +1,168 @@
+#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/extraction/adaptivity_field.h"
+#include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kRadius = 15.0;
+
+FloatHermite sphere() {
+  RunContext context;
+  const AnalyticSurface surface = {
+      .value = [](const Vector3d& p) { return p.norm() - kRadius; },
+      .gradient = [](const Vector3d& p) { return p; },
+  };
+  return sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
+}
+
+/// A cube of side 20, turned about two axes.
+struct TurnedCube {
+  Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.4, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY())).matrix();
+  static constexpr double kHalf = 10.0;
+
+  FloatHermite hermite() const {
+    RunContext context;
+    const Eigen::Matrix3d back = turn.transpose();
+    const AnalyticSurface surface = {
+        .value = [back](const Vector3d& p) { return (back * p).cwiseAbs().maxCoeff() - kHalf; },
+        .gradient =
+            [this, back](const Vector3d& p) {
+              const Vector3d q = back * p;
+              int axis;
+              q.cwiseAbs().maxCoeff(&axis);
+              return Vector3d(turn.col(axis) * (q[axis] < 0 ? -1.0 : 1.0));
+            },
+        .lipschitz = 1.0,
+    };
+    return sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
+  }
+};
+
+PolygonMesh contour(const FloatHermite& hermite, double tolerance, const AdaptivityField* field = nullptr) {
+  RunContext context;
+  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
+}
+
+double volume(const PolygonMesh& mesh) {
+  double sum = 0;
+  for (const Triangle& t : triangulated(mesh)) sum += mesh.world(t[0]).dot(mesh.world(t[1]).cross(mesh.world(t[2]))) / 6.0;
+  return sum;
+}
+
+TEST(ManifoldDualContouring, SphereStaysWithinTheTolerance) {
+  const FloatHermite hermite = sphere();
+  const PolygonMesh fine = contour(hermite, 0.0);
+  for (const double tolerance : {0.05, 0.25, 1.0}) {
+    const PolygonMesh mesh = contour(hermite, tolerance);
+    EXPECT_LT(mesh.triangle_count(), fine.triangle_count() / (tolerance < 0.1 ? 2 : 6)) << tolerance;
+    constexpr double kOfTheUniformMesh = 0.03;  // its points lie on tangent planes of the sphere
+    for (const Eigen::Vector3f& p : mesh.points) EXPECT_NEAR(p.norm(), kRadius, tolerance + kOfTheUniformMesh);
+    EXPECT_NEAR(volume(mesh), volume(fine), tolerance * 4 * M_PI * kRadius * kRadius);
+  }
+}
+
+TEST(ManifoldDualContouring, TurnedCubeNeedsFewTrianglesAndKeepsItsCorners) {
+  const TurnedCube cube;
+  const PolygonMesh mesh = contour(cube.hermite(), 0.1);
+  EXPECT_LT(mesh.triangle_count(), 100u);  // of 5,000; 12 would do
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d wanted =
+        cube.turn * Vector3d(corner & 1 ? 10 : -10, corner & 2 ? 10 : -10, corner & 4 ? 10 : -10);
+    double nearest = 1e9;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) nearest = std::min(nearest, (mesh.world(i) - wanted).norm());
+    EXPECT_LT(nearest, 0.12) << corner;
+  }
+  EXPECT_NEAR(volume(mesh), 8000.0, 0.1 * 2400.0);
+}
+
+TEST(ManifoldDualContouring, ScaleOfZeroKeepsEveryPoint) {
+  const FloatHermite hermite = sphere();
+  initialize_openvdb();
+  AdaptivityField field;
+  field.scale = make_level_set(openvdb::FloatGrid::create(0.0f));
+  EXPECT_EQ(contour(hermite, 1.0, &field).points.size(), contour(hermite, 0.0).points.size());
+}
+
+TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
+  const FloatHermite hermite = sphere();
+  initialize_openvdb();
+  AdaptivityField field;
+  field.mask = make_level_set(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      12.0f, openvdb::Vec3f(0, 0, float(kRadius)), 1.0f));
+  const std::size_t everywhere = contour(hermite, 0.05, &field).points.size();
+  field.outside = AdaptivityField::Outside::simplify;
+  EXPECT_LT(contour(hermite, 0.05, &field).points.size(), 3 * everywhere / 4);
+  field.outside = AdaptivityField::Outside::nothing;
+  for (const double tolerance : {0.0, 0.05}) {
+    const PolygonMesh part = contour(hermite, tolerance, &field);
+    ASSERT_FALSE(part.empty());
+    for (const Triangle& t : part.triangles) {
+      const Vector3d middle = (part.world(t[0]) + part.world(t[1]) + part.world(t[2])) / 3.0;
+      EXPECT_LT((middle - Vector3d(0, 0, kRadius)).norm(), 12.0 + std::sqrt(3.0));  // its cell's middle is inside
+    }
+  }
+}
+
+TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
+  RunContext context;
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  auto access = grid->getAccessor();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  for (int i = 0; i < 5 * 5 * 64; ++i) access.setValue({i / (5 * 64), i / 64 % 5, i % 64}, value(random));
+  const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
+  std::vector<PolygonMesh> meshes;
+  for (const std::size_t threads : {1, 2, 7}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    meshes.push_back(contour(hermite, 0.5));
+  }
+  EXPECT_FALSE(meshes[0].empty());
+  EXPECT_TRUE(meshes[0] == meshes[1]);
+  EXPECT_TRUE(meshes[0] == meshes[2]);
+}
+
+/// The certificate has to fail before it is trusted.
+TEST(DistanceCertificate, SeesAPointThatIsTooFarAway) {
+  RunContext context;
+  const FloatHermite hermite = sphere();
+  const auto view = view_of(hermite, context);
+  const FilePoints file(view.placement());
+  UniformMesh uniform = uniform_mesh(view, {}, file, context);
+  std::vector<Triangle> triangles = std::move(uniform.triangles);
+  for (const Quad& q : uniform.quads) {
+    triangles.push_back({q[0], q[1], q[2]});
+    triangles.push_back({q[0], q[2], q[3]});
+  }
+  const FineMesh fine(std::move(uniform.points), std::move(triangles));
+  const std::vector<float> tolerance(fine.points().size(), 0.2f);
+  DecimatedMesh mesh = begin_decimation(fine, tolerance, context);
+  EXPECT_TRUE(certify_distance(mesh, tolerance, context).holds());
+  const Vector3d outwards = mesh.points[100].normalized();
+  mesh.points[100] += 0.19 * outwards;
+  EXPECT_TRUE(certify_distance(mesh, tolerance, context).holds());
+  mesh.points[100] += 0.04 * outwards;
+  const DistanceCertificate certificate = certify_distance(mesh, tolerance, context);
+  EXPECT_FALSE(certificate.holds());
+  EXPECT_GT(certificate.coarse_triangles, 0u);
+  EXPECT_TRUE(std::binary_search(certificate.samples.begin(), certificate.samples.end(), 100u));
+}
+
+}  // namespace
+}  // namespace hermesh

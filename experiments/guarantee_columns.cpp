@@ -1,0 +1,43 @@
+#include "experiments/guarantee_columns.h"
+
+namespace hermesh {
+
+std::vector<MeasuredColumn> guarantee_mesh_columns() {
+  return {{"resolution", "res.", "voxels along the longest side"},
+          {"stand_in", "stand-in", "whether the case's file was not to be had"},
+          {"extractor", "extractor", "adaptive-dual-contouring with threshold 0.1, openvdb with adaptivity 0.1"},
+          {"tolerance", "tol. [vx]", "0 gives the uniform mesh"},
+          {"triangles", "triangles", "a quad counting as two"},
+          {"seconds", "time [s]", "one run, Hermite data included"},
+          {"boundary", "open", "boundary edges"},
+          {"non_manifold_edges", "nm e", "non-manifold edges"},
+          {"non_manifold_vertices", "nm v", "non-manifold vertices"},
+          {"inconsistent", "flipped", "inconsistently oriented edges"},
+          {"degenerate", "degen.", "degenerate polygons"},
+          {"self_intersections", "crossing", "self-intersecting pairs of triangles"},
+          {"components", "comp.", "connected components"},
+          {"euler", "V−E+F", "Euler characteristic"},
+          {"same_topology", "same", "components and Euler characteristic are those of the uniform mesh"},
+          {"from_upper", "from ≤ [vx]", "certified bound of the distance from the uniform mesh to this"},
+          {"to_upper", "to ≤ [vx]", "certified bound of the distance from this mesh to the uniform"},
+          {"lower", "≥ [vx]", "certified bound from below of the larger of both; beyond the tolerance a disproof"},
+          {"cells", "cells", "cells that the surface passes through"},
+          {"several_sheets", "sheets", "of these, with several sheets"},
+          {"fanned_edges", "fanned", "crossing edges that became four triangles or more"},
+          {"escaped", "escaped", "points outside their cells"},
+          {"attempts", "attempts", "how often it had to collapse anew to be proved"},
+          {"unproved", "unproved", "triangles whose distance the last attempt left unproved"}};
+}
+
+std::vector<MeasuredColumn> guarantee_summary_columns() {
+  return {{"tolerance", "tol. [vx]", "0 gives the uniform mesh"},
+          {"meshes", "meshes", "judged"},
+          {"triangles", "triangles", "of all"},
+          {"seconds", "time [s]", "of all"},
+          {"self_intersections", "crossing", "self-intersecting pairs of all"},
+          {"largest_share", "bound", "the largest certified distance over the tolerance"},
+          {"beyond", "disproved", "meshes whose bound from below lies beyond the tolerance, by however little"},
+          {"violations", "violations", "meshes that have a defect, another topology, or lie beyond the tolerance"}};
+}
+
+}  // namespace hermesh

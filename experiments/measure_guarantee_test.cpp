@@ -1,0 +1,54 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "experiments/experiment_file.h"
+#include "experiments/harness.h"
+#include "experiments/measurements.h"
+#include "experiments/run_cells.h"
+
+namespace hermesh {
+namespace {
+
+std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters, const std::string& filter = "") {
+  Tables tables;
+  tables.extractors = all_extractors();
+  tables.voxelizers = all_voxelizers();
+  tables.load = load_case;
+  tables.measurements = {guarantee_measurement()};
+  RunContext context;
+  Experiment experiment;
+  experiment.measurement = "guarantee";
+  experiment.seed = 5;
+  Tier tier;
+  tier.parameters = parameters;
+  return run_measurement(experiment, tier, tables, {}, filter, Json::object(), context);
+}
+
+TEST(GuaranteeMeasurement, FindsNoViolation) {
+  const std::vector<Json> rows = rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_size", "8"}});
+  // Two tolerances and the uniform mesh, and four others, of a model and four fields; their sums; and the total.
+  ASSERT_EQ(rows.size(), 7u * (1 + 4) + 7u * 2 + 1);
+  std::size_t certified = 0;
+  for (const Json& row : rows) {
+    EXPECT_FALSE(row.contains("failed")) << row.dump();
+    EXPECT_FALSE(row.contains("broken")) << row.dump();
+    certified += row["values"].contains("from_upper") && row["values"].contains("to_upper");
+  }
+  EXPECT_EQ(certified, 2u * (1 + 4)) << "every adaptive mesh has its bounds";
+  EXPECT_EQ(number_at(rows.back(), "/values/meshes"), 3 * (1 + 4));
+  EXPECT_EQ(rows.back()["values"]["violations"], 0);
+}
+
+TEST(GuaranteeMeasurement, SeesTheDefectsOfThoseThatPromiseLess) {
+  std::int64_t defects = 0;
+  for (const Json& row : rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_size", "8"}}, "noise/"))
+    if (text_at(row, "/values/extractor") == "dual-contouring")
+      defects += std::int64_t(number_at(row, "/values/non_manifold_edges")) +
+                 std::int64_t(number_at(row, "/values/self_intersections"));
+  EXPECT_GT(defects, 0);
+}
+
+}  // namespace
+}  // namespace hermesh
