@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
-#include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
 
 namespace hermesh {

@@ -27,8 +27,6 @@ class TriangleReach {
     // A degenerate triangle has no planes; then every comparison below is false and the exact distance decides.
   }
 
-  const Corners& corners() const { return corners_; }
-  const Eigen::Vector3d& normal() const { return normal_; }
   /// How far p lies beyond the three sides, along the plane: negative inside.
   Eigen::Vector3d beyond(const Eigen::Vector3d& p) const { return sides_ * p - offsets_; }
 
