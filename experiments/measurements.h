@@ -91,6 +91,7 @@ Measurement hermite_memory_measurement();
 Measurement hermite_csg_measurement();
 Measurement hermite_speed_measurement();
 Measurement table_9_2_measurement();
+Measurement tables_9_3_and_9_4_measurement();
 Measurement volumes_measurement();
 Measurement guarantee_measurement();
 

@@ -4,57 +4,44 @@
 #include <algorithm>
 #include <cmath>
 
+#include "experiments/recipe_random.h"
 #include "experiments/recipe_shapes.h"
 
 namespace hermesh::recipes {
 
 using Eigen::Vector3d;
 
-namespace {
-
-/// Gradient noise (Perlin, Improving Noise, SIGGRAPH 2002) with a hash in place of the permutation table.
-class GradientNoise {
- public:
-  explicit GradientNoise(std::uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u) {}
-
-  double operator()(const Vector3d& point) const {
-    const Vector3d cell = point.array().floor();
-    const Vector3d at = point - cell;
-    const Vector3d fade = at.array().cube() * (at.array() * (at.array() * 6.0 - 15.0) + 10.0);
-    double value = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
-      double weight = 1.0;
-      Vector3d offset;
-      for (int axis = 0; axis < 3; ++axis) {
-        const int bit = corner >> axis & 1;
-        weight *= bit ? fade[axis] : 1.0 - fade[axis];
-        offset[axis] = bit;
-      }
-      value += weight * gradient(cell + offset, at - offset);
+double GradientNoise::operator()(const Vector3d& point) const {
+  const Vector3d cell = point.array().floor();
+  const Vector3d at = point - cell;
+  const Vector3d fade = at.array().cube() * (at.array() * (at.array() * 6.0 - 15.0) + 10.0);
+  double value = 0.0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double weight = 1.0;
+    Vector3d offset;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int bit = corner >> axis & 1;
+      weight *= bit ? fade[axis] : 1.0 - fade[axis];
+      offset[axis] = bit;
     }
-    return value;
+    value += weight * gradient(cell + offset, at - offset);
   }
+  return value;
+}
 
- private:
-  /// The gradients are the twelve vectors from a cube's centre to the middles of its edges, four of them
-  /// twice.
-  double gradient(const Vector3d& lattice_point, const Vector3d& offset) const {
-    std::uint64_t h = seed_;
-    h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.x())) * 0x8da6b343u;
-    h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.y())) * 0xd8163841u;
-    h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.z())) * 0xcb1ab31fu;
-    h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;  // finaliser of splitmix64
-    h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
-    h >>= 60;
-    const double u = h < 8 ? offset.x() : offset.y();
-    const double v = h < 4 ? offset.y() : h == 12 || h == 14 ? offset.x() : offset.z();
-    return (h & 1 ? -u : u) + (h & 2 ? -v : v);
-  }
-
-  std::uint64_t seed_;
-};
-
-}  // namespace
+/// The gradients are the twelve vectors from a cube's centre to the middles of its edges, four of them twice.
+double GradientNoise::gradient(const Vector3d& lattice_point, const Vector3d& offset) const {
+  std::uint64_t h = seed_;
+  h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.x())) * 0x8da6b343u;
+  h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.y())) * 0xd8163841u;
+  h ^= static_cast<std::uint64_t>(static_cast<std::int64_t>(lattice_point.z())) * 0xcb1ab31fu;
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9u;  // finaliser of splitmix64
+  h = (h ^ (h >> 27)) * 0x94d049bb133111ebu;
+  h >>= 60;
+  const double u = h < 8 ? offset.x() : offset.y();
+  const double v = h < 4 ? offset.y() : h == 12 || h == 14 ? offset.x() : offset.z();
+  return (h & 1 ? -u : u) + (h & 2 ? -v : v);
+}
 
 /// Moving points along their rays from the centre cannot make a star-shaped mesh intersect itself.
 PolygonMesh noise_sphere(const RecipeParameters& parameters, RunContext& context) {

@@ -46,5 +46,6 @@ PolygonMesh cad_part(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh sphere_cluster(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh holed_sphere(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh sheets(const RecipeParameters& parameters, RunContext& context);
+PolygonMesh splash(const RecipeParameters& parameters, RunContext& context);
 
 }  // namespace hermesh::recipes

@@ -2,32 +2,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "experiments/recipe_random.h"
 #include "experiments/recipe_shapes.h"
 
 namespace hermesh::recipes {
 
 using Eigen::Vector3d;
-
-namespace {
-
-/// splitmix64: the same numbers on every machine.
-class Random {
- public:
-  explicit Random(double seed) : state_(static_cast<std::uint64_t>(seed)) {}
-  std::uint64_t bits() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  /// From 0 to below 1.
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-
- private:
-  std::uint64_t state_;
-};
-
-}  // namespace
 
 PolygonMesh sphere_cluster(const RecipeParameters& parameters, RunContext&) {
   const PolygonMesh sphere = octahedral_sphere(static_cast<std::uint32_t>(parameters.at("cuts")));

@@ -20,10 +20,13 @@ constexpr double kShortestStep = 0.03;
 bool CollapseDistance::attach_samples() {
   collapse_.attached.clear();
   for (Collapse::NewFace& made : collapse_.made) made.reach = TriangleReach(made.at);
-  for (const std::uint32_t w : {collapse_.u, collapse_.v}) {
-    const std::uint32_t sample = cube_.vertices[w].global;
-    if ((w == collapse_.u || collapse_.v_moves) && mesh_.unmoved[sample] && !attach(sample)) return false;
-  }
+  const auto attach_own = [&](std::uint32_t vertex) {
+    const std::uint32_t sample = cube_.vertices[vertex].global;
+    return !mesh_.unmoved[sample] || attach(sample);
+  };
+  if (collapse_.v_moves && !attach_own(collapse_.v)) return false;
+  for (const std::uint32_t vertex : collapse_.going)
+    if (!attach_own(vertex)) return false;
   for (const std::uint32_t f : collapse_.old)
     for (std::uint32_t s = mesh_.first_sample[cube_.faces[f].global]; s != kNoSample; s = mesh_.next_sample[s])
       if (!attach(s)) return false;
@@ -61,16 +64,14 @@ bool CollapseDistance::edge_is_near(const Collapse::Attached& entry, std::uint32
   const Collapse::NewFace& mine = collapse_.made[entry.triangle];
   const Part part{mesh_.fine->points()[entry.sample], mesh_.fine->points()[neighbour],
                   std::min(mesh_.tolerance[entry.sample], mesh_.tolerance[neighbour])};
+  // What another cube has written here is the number of no entry for this sample.
+  const std::uint32_t at = std::atomic_ref(mesh_.proposed[neighbour]).load(std::memory_order_relaxed);
+  if (at < collapse_.attached.size() && collapse_.attached[at].sample == neighbour) {
+    const std::uint32_t other = collapse_.attached[at].triangle;
+    return other == entry.triangle || part_is_near(part, mine.reach, collapse_.made[other].reach, 0);
+  }
   const std::uint32_t there = std::atomic_ref(mesh_.attached_to[neighbour]).load(std::memory_order_relaxed);
   const std::uint32_t f = there == kNoTriangle ? CubeMesh::kNone : cube_.find_face(there);
-  if (there == kNoTriangle || (f != CubeMesh::kNone && cube_.faces[f].seen == question_)) {
-    // Ours to read: it was attached to a triangle that goes, or it is a point of the mesh.
-    const std::uint32_t at = std::atomic_ref(mesh_.proposed[neighbour]).load(std::memory_order_relaxed);
-    if (at < collapse_.attached.size() && collapse_.attached[at].sample == neighbour) {
-      const std::uint32_t other = collapse_.attached[at].triangle;
-      return other == entry.triangle || part_is_near(part, mine.reach, collapse_.made[other].reach, 0);
-    }
-  }
   if (there == kNoTriangle) return edge_to_point_is_near(part, mine, neighbour);
   return f != CubeMesh::kNone && part_is_near(part, mine.reach, TriangleReach(cube_.corners_of(f)), 0);
 }
@@ -144,7 +145,9 @@ bool CollapseDistance::point_is_near() {
   if (collapse_.attached.empty()) return false;  // no place to start from; rare, for ends that move leave samples behind
   const FineMesh& fine = *mesh_.fine;
   below_ = fine.walk(fine.around(collapse_.attached.front().sample).front(), collapse_.x);
-  return near_fine_around(collapse_.x, 0.0);
+  const bool near = near_fine_around(collapse_.x, 0.0);
+  below_x_ = below_;
+  return near;
 }
 
 /// Whether p, or a ball about it, is near the fine triangle `below_` or one that touches it.
@@ -175,9 +178,48 @@ bool CollapseDistance::new_edges_are_near() {
   const std::uint32_t below_x = below_;
   for (const Collapse::NewFace& made : collapse_.made) {
     below_ = below_x;
-    if (!segment_is_near(collapse_.x, cube_.vertices[made.others[0]].point)) return false;
+    const Vector3d& to = cube_.vertices[made.others[0]].point;
+    if (!is_near_below(to, made.normal) && !segment_is_near(collapse_.x, to)) return false;
   }
   return true;
+}
+
+/// A quick answer for the edge from the new point, which may be no where a longer look says yes: the fine edges right below
+/// or above it, one after another, seen along a new triangle's normal.
+bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal) const {
+  constexpr int kMostSteps = 256;
+  const FineMesh& fine = *mesh_.fine;
+  const Vector3d along = to - collapse_.x, across = normal.cross(along);
+  const double squared = along.squaredNorm(), height = 1.0 / normal.norm();
+  std::uint32_t t = below_;
+  int entry = -1;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Triangle& c = fine.triangles()[t];
+    std::array<Vector3d, 3> at;
+    std::array<double, 3> side;
+    for (int i = 0; i < 3; ++i) {
+      at[i] = fine.points()[c[i]] - collapse_.x;
+      side[i] = across.dot(at[i]);
+    }
+    // Counter-clockwise seen from outside, so the way leaves by the side that leads from its right to its left.
+    int exit = -1;
+    for (int i = 0; i < 3; ++i)
+      if (i != entry && side[i] < 0 && side[(i + 1) % 3] >= 0) exit = i;
+    if (exit < 0) return false;
+    const int j = (exit + 1) % 3;
+    const double share = side[exit] / (side[exit] - side[j]);
+    const Vector3d q = at[exit] + share * (at[j] - at[exit]);
+    const double way = q.dot(along) / squared;
+    if (way >= 1.0) return true;
+    const double within = std::min(mesh_.tolerance[c[exit]], mesh_.tolerance[c[j]]);
+    if (std::abs(normal.dot(q - way * along)) * height > within) return false;
+    const std::uint32_t next = fine.across(t, exit), corner = c[j];
+    if (next == FineMesh::kNone) return false;
+    const Triangle& n = fine.triangles()[next];
+    entry = n[0] == corner ? 0 : n[1] == corner ? 1 : 2;
+    t = next;
+  }
+  return false;
 }
 
 /// In steps, each near one fine triangle as a whole, that are found by a walk over the fine mesh beside the segment.

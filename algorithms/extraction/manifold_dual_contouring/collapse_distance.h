@@ -15,6 +15,7 @@ class CollapseDistance {
   bool attach_samples();
   /// After attach_samples(): whether the new point is near the fine mesh.
   bool point_is_near();
+  std::uint32_t below() const { return below_x_; }
   /// After that: whether the fine edges at the samples are near the new mesh, and the new edges near the fine one.
   bool edges_are_near();
 
@@ -32,12 +33,14 @@ class CollapseDistance {
   bool near_fine_around(const Eigen::Vector3d& p, double radius);
   bool near_fine(std::uint32_t t, const Eigen::Vector3d& p, double radius) const;
   bool new_edges_are_near();
+  bool is_near_below(const Eigen::Vector3d& to, const Eigen::Vector3d& normal) const;
   bool segment_is_near(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
   DecimatedMesh& mesh_;
   CubeMesh& cube_;
   Collapse& collapse_;
   std::uint32_t question_ = 0;
+  std::uint32_t below_x_ = 0;
   std::uint32_t below_ = 0;  ///< a fine triangle near the place looked at
 };
 

@@ -1,53 +1,54 @@
 #include "algorithms/extraction/manifold_dual_contouring/cube_mesh.h"
 
-#include <algorithm>
-
 namespace hermesh {
 
-CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::span<const std::uint32_t> numbers)
-    : triangles(numbers) {
-  std::vector<std::uint32_t> ids;
-  ids.reserve(3 * triangles.size());
-  for (const std::uint32_t t : triangles) ids.insert(ids.end(), mesh.triangles[t].begin(), mesh.triangles[t].end());
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  vertices.resize(ids.size());
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    Vertex& vertex = vertices[i];
-    vertex.global = ids[i];
-    vertex.point = mesh.points[ids[i]];
-    vertex.here = vertex.free = cube.holds(vertex.point);
-  }
+CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::span<const std::uint32_t> triangles,
+                   CubeNumbers& thread_numbers)
+    : numbers(thread_numbers) {
+  numbers.vertex.resize(mesh.points.size(), kNone);
+  numbers.face.resize(mesh.triangles.size(), kNone);
+  vertices.reserve(triangles.size() / 2 + 64);
   faces.resize(triangles.size());
   next_corner.resize(3 * triangles.size());
-  double widths = 0;
   for (std::uint32_t f = 0; f < faces.size(); ++f) {
     Face& face = faces[f];
     face.global = triangles[f];
+    numbers.face[face.global] = f;
     face.own = true;
     for (int i = 0; i < 3; ++i) {
-      const std::uint32_t v = face.corners[i] = find_vertex(mesh.triangles[face.global][i]);
+      const std::uint32_t point = mesh.triangles[face.global][i];
+      std::uint32_t v = find_vertex(point);
+      if (v == kNone) {
+        v = numbers.vertex[point] = static_cast<std::uint32_t>(vertices.size());
+        const bool here = cube.holds(mesh.points[point]);
+        vertices.push_back({.point = mesh.points[point], .global = point, .here = here, .free = here && !mesh.pinned[point]});
+      }
+      face.corners[i] = v;
       face.box.add(vertices[v].point);
       face.own = face.own && vertices[v].here;
       next_corner[3 * f + i] = vertices[v].first_corner;
       vertices[v].first_corner = 3 * f + static_cast<std::uint32_t>(i);
     }
-    for (const std::uint32_t v : face.corners) vertices[v].free = vertices[v].free && face.own;
-    widths += (face.box.upper - face.box.lower).maxCoeff();
+    if (!face.own)
+      for (const std::uint32_t v : face.corners) vertices[v].free = false;
   }
-  grid.emplace(std::max(1e-3, 1.5 * widths / double(faces.size())), faces.size());
-  for (std::uint32_t f = 0; f < faces.size(); ++f) grid->add(f, faces[f].box);
+  left = faces.size();
+  file_faces();
 }
 
-std::uint32_t CubeMesh::find_face(std::uint32_t triangle) const {
-  const auto at = std::lower_bound(triangles.begin(), triangles.end(), triangle);
-  return at != triangles.end() && *at == triangle ? static_cast<std::uint32_t>(at - triangles.begin()) : kNone;
+void CubeMesh::file_faces() {
+  double widths = 0;
+  for (const Face& face : faces)
+    if (!face.gone()) widths += (face.box.upper - face.box.lower).maxCoeff();
+  left_when_filed = left;
+  grid.emplace(std::max(1e-3, 1.5 * widths / double(std::max<std::size_t>(1, left))), left);
+  for (std::uint32_t f = 0; f < faces.size(); ++f)
+    if (!faces[f].gone()) grid->add(f, faces[f].box);
 }
 
-std::uint32_t CubeMesh::find_vertex(std::uint32_t point) const {
-  const auto at = std::lower_bound(vertices.begin(), vertices.end(), point,
-                                   [](const Vertex& vertex, std::uint32_t id) { return vertex.global < id; });
-  return at != vertices.end() && at->global == point ? static_cast<std::uint32_t>(at - vertices.begin()) : kNone;
+void CubeMesh::count_out() {
+  constexpr std::size_t kFewer = 3;
+  if (--left * kFewer < left_when_filed) file_faces();
 }
 
 void CubeMesh::merge_corners(std::uint32_t going, std::uint32_t staying) {

@@ -1,13 +1,17 @@
 #include "algorithms/extraction/manifold_dual_contouring/decimation.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_sort.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/manifold_dual_contouring/block_decimation.h"
+#include "algorithms/extraction/manifold_dual_contouring/cube_decimation.h"
+#include "algorithms/extraction/manifold_dual_contouring/cube_mesh.h"
+#include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
 
 namespace hermesh {
@@ -31,25 +35,67 @@ struct Entry {
 
 class Round {
  public:
-  Round(DecimatedMesh& mesh, const Box3& box, double side)
-      : mesh_(mesh), side_(side), start_(box.lower - Vector3d::Constant(kDisplacement * side)) {}
-
-  void run(const FilePoints& file, RunContext& context) {
+  Round(DecimatedMesh& mesh, const Box3& box, double side, RunContext& context)
+      : mesh_(mesh), side_(side), start_(box.lower - Vector3d::Constant(kDisplacement * side)) {
     file_triangles(context);
-    std::vector<std::size_t> first;
-    for (std::size_t i = 0; i < entries_.size(); ++i)
-      if (i == 0 || entries_[i].cube != entries_[i - 1].cube) first.push_back(i);
-    first.push_back(entries_.size());
-    std::vector<std::uint32_t> triangles(entries_.size());
-    for (std::size_t i = 0; i < entries_.size(); ++i) triangles[i] = entries_[i].triangle;
-    tbb::parallel_for(std::size_t{0}, first.size() - 1, [&](std::size_t c) {
+    triangles_.resize(entries_.size());
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      triangles_[i] = entries_[i].triangle;
+      if (i == 0 || entries_[i].cube != entries_[i - 1].cube) first_.push_back(i);
+    }
+    first_.push_back(entries_.size());
+  }
+
+  std::size_t cube_count() const { return first_.size() - 1; }
+
+  void run(std::span<const std::uint32_t> cubes, const FilePoints& file, RunContext& context) {
+    tbb::parallel_for(std::size_t{0}, cubes.size(), [&](std::size_t c) {
       context.check();
-      const DecimationCube cube{lower_of(entries_[first[c]].cube), side_, kLongestEdge * side_};
-      decimate_cube(mesh_, file, cube, std::span(triangles).subspan(first[c], first[c + 1] - first[c]), context);
+      decimate_cube(mesh_, file, cube_of(cubes[c]), triangles_of(cubes[c]), numbers_.local(), context);
     });
   }
 
+  /// The cube that holds a place, cube_count() if there is none.
+  std::uint32_t cube_at(const Vector3d& p) const {
+    std::uint64_t key = 0;
+    for (int a = 0; a < 3; ++a) key = key << 21 | static_cast<std::uint64_t>(std::max(0.0, (p[a] - start_[a]) / side_));
+    const auto at = std::partition_point(first_.begin(), first_.end() - 1, [&](std::size_t i) { return entries_[i].cube < key; });
+    const bool found = at != first_.end() - 1 && entries_[*at].cube == key;
+    return static_cast<std::uint32_t>(found ? at - first_.begin() : first_.size() - 1);
+  }
+
+  /// Makes what a cube has changed as it was.
+  void restore(std::uint32_t number, const DecimatedMesh& before) {
+    const DecimationCube cube = cube_of(number);
+    const auto restore_sample = [&](std::uint32_t s) {
+      mesh_.attached_to[s] = before.attached_to[s];
+      mesh_.next_sample[s] = before.next_sample[s];
+    };
+    for (const std::uint32_t t : triangles_of(number)) {
+      const Triangle& corners = before.triangles[t];
+      bool own = true;
+      for (const std::uint32_t p : corners) own = own && cube.holds(before.points[p]);
+      if (!own) continue;
+      mesh_.triangles[t] = corners;
+      mesh_.first_sample[t] = before.first_sample[t];
+      for (std::uint32_t s = before.first_sample[t]; s != kNoSample; s = before.next_sample[s]) restore_sample(s);
+      for (const std::uint32_t p : corners) {
+        if (before.unmoved[p]) restore_sample(p);
+        mesh_.points[p] = before.points[p];
+        mesh_.quadrics[p] = before.quadrics[p];
+        mesh_.unmoved[p] = before.unmoved[p];
+        mesh_.below[p] = before.below[p];
+      }
+    }
+  }
+
  private:
+  std::span<const std::uint32_t> triangles_of(std::uint32_t cube) const {
+    return std::span(triangles_).subspan(first_[cube], first_[cube + 1] - first_[cube]);
+  }
+  DecimationCube cube_of(std::uint32_t cube) const {
+    return {lower_of(entries_[first_[cube]].cube), side_, kLongestEdge * side_, side_ == kFirstSide};
+  }
   void file_triangles(RunContext& context) {
     const std::size_t n = mesh_.triangles.size();
     std::vector<std::uint64_t> counts(n);
@@ -85,8 +131,43 @@ class Round {
   DecimatedMesh& mesh_;
   const double side_;
   const Vector3d start_;
-  std::vector<Entry> entries_;
+  std::vector<Entry> entries_;             ///< by cube
+  std::vector<std::uint32_t> triangles_;   ///< of the entries
+  std::vector<std::size_t> first_;         ///< by cube: its first entry, and the end
+  tbb::enumerable_thread_specific<CubeNumbers> numbers_;
 };
+
+/// Cubes that have a part in what could not be proved.
+std::vector<std::uint32_t> cubes_of(const DistanceCertificate& certificate, const Round& round, const DecimatedMesh& mesh) {
+  std::vector<std::uint32_t> cubes;
+  for (const std::uint32_t s : certificate.samples) {
+    cubes.push_back(round.cube_at(mesh.fine->points()[s]));
+    const std::uint32_t t = mesh.attached_to[s];
+    if (t == kNoTriangle) continue;
+    for (const std::uint32_t p : mesh.triangles[t]) cubes.push_back(round.cube_at(mesh.points[p]));
+  }
+  std::sort(cubes.begin(), cubes.end());
+  cubes.erase(std::unique(cubes.begin(), cubes.end()), cubes.end());
+  std::erase(cubes, round.cube_count());
+  return cubes;
+}
+
+/// Where the distance cannot be proved a cube is done again with less room for those concerned, and at last left as it was.
+void run_certified(DecimatedMesh& mesh, Round& round, std::span<const float> tolerance, const FilePoints& file,
+                   RunContext& context) {
+  constexpr int kAttempts = 3;
+  const DecimatedMesh before = mesh;
+  std::vector<std::uint32_t> cubes(round.cube_count());
+  std::iota(cubes.begin(), cubes.end(), 0u);
+  for (int attempt = 1; attempt <= 2 * kAttempts && !cubes.empty(); ++attempt) {
+    if (attempt <= kAttempts) round.run(cubes, file, context);
+    const DistanceCertificate certificate = certify_distance(mesh, tolerance, &before, context);
+    if (certificate.holds()) return;
+    for (const std::uint32_t sample : certificate.samples) mesh.tolerance[sample] *= attempt == 1 ? 0.3f : 0.0f;
+    cubes = cubes_of(certificate, round, mesh);
+    for (const std::uint32_t cube : cubes) round.restore(cube, before);
+  }
+}
 
 void forget_the_dead(DecimatedMesh& mesh) {
   std::size_t kept = 0;
@@ -94,17 +175,20 @@ void forget_the_dead(DecimatedMesh& mesh) {
     if (!mesh.alive(t)) continue;
     mesh.triangles[kept] = mesh.triangles[t];
     mesh.first_sample[kept] = mesh.first_sample[t];
+    mesh.fine_triangle[kept] = mesh.fine_triangle[t];
     for (std::uint32_t s = mesh.first_sample[kept]; s != kNoSample; s = mesh.next_sample[s])
       mesh.attached_to[s] = static_cast<std::uint32_t>(kept);
     ++kept;
   }
   mesh.triangles.resize(kept);
   mesh.first_sample.resize(kept);
+  mesh.fine_triangle.resize(kept);
 }
 
 }  // namespace
 
-DecimatedMesh begin_decimation(const FineMesh& fine, std::vector<float> tolerance, RunContext& context) {
+DecimatedMesh begin_decimation(const FineMesh& fine, std::vector<float> tolerance, std::vector<std::uint8_t> pinned,
+                               RunContext& context) {
   Stage stage(context, "quadrics");
   const std::vector<Vector3d>& points = fine.points();
   DecimatedMesh mesh;
@@ -112,7 +196,13 @@ DecimatedMesh begin_decimation(const FineMesh& fine, std::vector<float> toleranc
   mesh.points = points;
   mesh.triangles = fine.triangles();
   mesh.quadrics.resize(points.size());
+  mesh.fine_triangle.resize(mesh.triangles.size());
+  std::iota(mesh.fine_triangle.begin(), mesh.fine_triangle.end(), 0u);
+  mesh.pinned = std::move(pinned);
+  mesh.pinned.resize(points.size(), 0);
   mesh.unmoved.assign(points.size(), 1);
+  mesh.below.resize(points.size());
+  for (std::uint32_t p = 0; p < points.size(); ++p) mesh.below[p] = fine.around(p).empty() ? 0 : fine.around(p).front();
   mesh.stirred.assign(points.size(), 1);
   mesh.stirred_next.assign(points.size(), 0);
   mesh.first_sample.assign(mesh.triangles.size(), kNoSample);
@@ -129,13 +219,14 @@ DecimatedMesh begin_decimation(const FineMesh& fine, std::vector<float> toleranc
   return mesh;
 }
 
-void decimate(DecimatedMesh& mesh, const FilePoints& file, RunContext& context) {
+void decimate(DecimatedMesh& mesh, std::span<const float> tolerance, const FilePoints& file, RunContext& context) {
   Stage stage(context, "decimate");
   Box3 box;
   for (const Vector3d& p : mesh.points) box.add(p);
   const double largest = mesh.points.empty() ? 0.0 : (box.upper - box.lower).norm();
   for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
-    Round(mesh, box, side).run(file, context);
+    Round round(mesh, box, side, context);
+    run_certified(mesh, round, tolerance, file, context);
     forget_the_dead(mesh);
     mesh.stirred.swap(mesh.stirred_next);
     std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);

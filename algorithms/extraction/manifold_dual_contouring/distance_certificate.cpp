@@ -1,9 +1,13 @@
 #include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_overlay.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_reach.h"
 #include "algorithms/voxelization/triangle_tree.h"
 
@@ -18,156 +22,178 @@ using Eigen::Vector3d;
 /// of the search.
 constexpr double kSlack = 0.005;
 
-using Piece = std::array<Vector3d, 3>;
-/// By corner: a triangle of the other mesh that is likely to be near, or kNone.
-using Hints = std::array<std::uint32_t, 3>;
-constexpr std::uint32_t kNone = TriangleTree::kNone;
-
-/// A mesh in index space that answers what is near.
-class Surface {
+/// One of the two meshes, as the other's triangles are laid over it.
+class Target {
  public:
-  Surface(const std::vector<Vector3d>& points, const std::vector<Triangle>& triangles)
-      : points_(to_float(points)), triangles_(triangles), tree_(points_, triangles_, 1.0) {}
+  explicit Target(const FineMesh& mesh)
+      : mesh_(mesh), overlays_([&mesh] { return TriangleOverlay(mesh.triangles().size()); }) {}
 
-  NearestTriangle nearest(const Vector3d& p, double within) const { return tree_.nearest(p, within * within); }
-  bool near(const Piece& piece, std::uint32_t triangle, double within) const {
-    const TriangleReach reach(corners(triangle));
-    return reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within);
+  const FineMesh& mesh() const { return mesh_; }
+  TriangleOverlay& overlay() { return overlays_.local(); }
+
+  /// For nearest(); apart, because it is seldom asked for.
+  void plant_tree() {
+    points_.resize(mesh_.points().size());
+    for (std::size_t i = 0; i < points_.size(); ++i) points_[i] = mesh_.points()[i].cast<float>();
+    for (std::uint32_t t = 0; t < mesh_.triangles().size(); ++t)
+      if (mesh_.triangles()[t][0] != FineMesh::kNone) {
+        numbers_.push_back(t);
+        triangles_.push_back(mesh_.triangles()[t]);
+      }
+    tree_.emplace(points_, triangles_, 1.0);
   }
-  Corners corners(std::uint32_t t) const { return {tree_.corner(t, 0), tree_.corner(t, 1), tree_.corner(t, 2)}; }
+  NearestTriangle nearest(const Vector3d& p, double within) const {
+    NearestTriangle found = tree_->nearest(p, within * within);
+    if (found.triangle != TriangleTree::kNone) found.triangle = numbers_[found.triangle];
+    return found;
+  }
 
  private:
-  static std::vector<Eigen::Vector3f> to_float(const std::vector<Vector3d>& points) {
-    std::vector<Eigen::Vector3f> result(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) result[i] = points[i].cast<float>();
-    return result;
-  }
+  const FineMesh& mesh_;
+  tbb::enumerable_thread_specific<TriangleOverlay> overlays_;
   std::vector<Eigen::Vector3f> points_;
-  const std::vector<Triangle>& triangles_;
-  TriangleTree tree_;
+  std::vector<std::uint32_t> numbers_;  ///< of the triangles in the tree
+  std::vector<Triangle> triangles_;
+  std::optional<TriangleTree> tree_;
 };
 
-/// Where to cut the edge from a to b, as a share of it: where it leaves the prism over the triangle near a, so that what
-/// remains on that side is near one triangle; in the middle if there is no such place.
-double cut(const Vector3d& a, const Vector3d& b, std::uint32_t hint, const Surface& other) {
-  double share = 0.5;
-  if (hint == kNone) return share;
-  const TriangleReach reach(other.corners(hint));
-  const Vector3d at_a = reach.beyond(a), at_b = reach.beyond(b);
-  double exit = 1.0;
-  for (int i = 0; i < 3; ++i)
-    if (at_b[i] > 0) exit = std::min(exit, at_a[i] / (at_a[i] - at_b[i]));
-  return exit > 0.1 && exit < 0.9 ? exit : share;
+bool reaches(const FineMesh& mesh, std::uint32_t triangle, const Corners& piece, double within) {
+  const TriangleReach reach(mesh.corners(triangle));
+  return reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within);
 }
 
-/// Whether a piece is near another surface as a whole; `bound(triangle)` says how near it has to be to that one.
+/// Whether a piece is near the target as a whole: right above or below it, near one triangle of it, or small enough for
+/// its middle to tell; else each half of it by itself. `bound(triangle)` says how near it has to be to that one, `widest`
+/// is the most that it says.
 template <class Bound>
-bool is_near(const Piece& piece, const Hints& hints, const Surface& other, double widest, const Bound& bound) {
-  for (int i = 0; i < 3; ++i) {
-    const bool again = (i > 0 && hints[i] == hints[0]) || (i > 1 && hints[i] == hints[1]);
-    if (hints[i] != kNone && !again && other.near(piece, hints[i], bound(hints[i]))) return true;
-  }
+bool is_near(const Corners& piece, Target& target, double widest, const Bound& bound) {
   const Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0;
-  const NearestTriangle found = other.nearest(middle, widest);
-  if (found.triangle == kNone) return false;
+  const NearestTriangle found = target.nearest(middle, widest);
+  if (found.triangle == kNoTriangle) return false;
   const double distance = std::sqrt(found.squared), within = bound(found.triangle);
   if (distance > within) return false;
   double radius = 0;
   for (const Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
-  if (distance + radius <= within + kSlack || other.near(piece, found.triangle, within)) return true;
-
-  int longest = 0;
-  double length = -1;
-  for (int i = 0; i < 3; ++i) {
-    const double squared = (piece[(i + 1) % 3] - piece[i]).squaredNorm();
-    if (squared > length) length = squared, longest = i;
-  }
-  const int i = longest, j = (longest + 1) % 3, k = (longest + 2) % 3;
-  constexpr double kLong = 2.0;  // voxels: longer edges pass over many triangles, and are halved
-  const double share = length > kLong * kLong ? 0.5 : cut(piece[i], piece[j], hints[i], other);
-  const Vector3d at = piece[i] + share * (piece[j] - piece[i]);
-  return is_near({piece[i], at, piece[k]}, {hints[i], found.triangle, hints[k]}, other, widest, bound) &&
-         is_near({at, piece[j], piece[k]}, {found.triangle, hints[j], hints[k]}, other, widest, bound);
-}
-
-Piece piece_of(const std::vector<Vector3d>& points, const Triangle& t) {
-  return {points[t[0]], points[t[1]], points[t[2]]};
-}
-
-/// What need not be searched because of what decimate() saw to.
-class Shortcut {
- public:
-  explicit Shortcut(const DecimatedMesh& mesh) : mesh_(mesh), fine_(*mesh.fine), normals_(mesh.triangles.size()) {
-    for (std::size_t t = 0; t < normals_.size(); ++t) {
-      const Piece p = piece_of(mesh.points, mesh.triangles[t]);
-      normals_[t] = (p[1] - p[0]).cross(p[2] - p[0]).stableNormalized().cast<float>();
-    }
-  }
-
-  /// Its corners are attached to triangles with a corner in common that face as it does.
-  bool of_fine(const Triangle& corners, std::uint32_t t) const {
-    std::uint32_t first = kNone;
-    for (const std::uint32_t c : corners)
-      if (const std::uint32_t a = mesh_.attached_to[c]; a != kNone) {
-        if (fine_.normal(t).dot(normals_[a]) < kFacing || (first != kNone && !touch(mesh_.triangles[first], a))) return false;
-        first = a;
-      }
-    if (first == kNone) return false;
-    for (const std::uint32_t c : corners)
-      if (mesh_.attached_to[c] == kNone && !has(mesh_.triangles[first], c)) return false;
+  if (distance + radius <= within + kSlack || reaches(target.mesh(), found.triangle, piece, within) ||
+      target.overlay().is_near(piece, target.mesh(), found.triangle, bound))
     return true;
-  }
 
- private:
-  static constexpr float kFacing = 0.5f;
-  static bool has(const Triangle& t, std::uint32_t corner) { return t[0] == corner || t[1] == corner || t[2] == corner; }
-  bool touch(const Triangle& a, std::uint32_t b) const {
-    for (const std::uint32_t corner : mesh_.triangles[b])
-      if (has(a, corner)) return true;
-    return false;
-  }
+  int i = 0;
+  for (int side = 1; side < 3; ++side)
+    if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm()) i = side;
+  const int j = (i + 1) % 3, k = (i + 2) % 3;
+  const Vector3d half = 0.5 * (piece[i] + piece[j]);
+  return is_near({piece[i], half, piece[k]}, target, widest, bound) &&
+         is_near({half, piece[j], piece[k]}, target, widest, bound);
+}
 
-  const DecimatedMesh& mesh_;
-  const FineMesh& fine_;
-  std::vector<Eigen::Vector3f> normals_;
+/// What a certificate has to look at.
+struct Scope {
+  std::vector<std::uint8_t> fine, coarse;
 };
+
+Scope everything(const DecimatedMesh& mesh) {
+  Scope scope{std::vector<std::uint8_t>(mesh.fine->triangles().size(), 1), {}};
+  scope.coarse.resize(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) scope.coarse[t] = mesh.alive(t);
+  return scope;
+}
+
+/// Coarse triangles that have changed, and fine ones with a sample that lay or lies on one of these, with their neighbours.
+Scope changes(const DecimatedMesh& mesh, const DecimatedMesh& before) {
+  Scope scope;
+  scope.coarse.resize(mesh.triangles.size());
+  std::vector<std::uint8_t> samples(mesh.fine->points().size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle &now = mesh.triangles[t], &then = before.triangles[t];
+    if (!mesh.alive(t)) continue;
+    bool same = now == then;
+    for (const std::uint32_t p : now) same = same && mesh.points[p] == before.points[p];
+    scope.coarse[t] = !same;
+    if (same) continue;
+    for (const std::uint32_t p : now) samples[p] = 1;
+    for (std::uint32_t s = mesh.first_sample[t]; s != kNoSample; s = mesh.next_sample[s]) samples[s] = 1;
+  }
+  scope.fine.resize(mesh.fine->triangles().size());
+  for (const bool last : {false, true}) {
+    for (std::size_t t = 0; t < scope.fine.size(); ++t)
+      for (const std::uint32_t s : mesh.fine->triangles()[t]) scope.fine[t] |= samples[s];
+    if (last) break;
+    for (std::size_t t = 0; t < scope.fine.size(); ++t)
+      if (scope.fine[t])
+        for (const std::uint32_t s : mesh.fine->triangles()[t]) samples[s] = 1;
+  }
+  return scope;
+}
+
+/// Numbers of the triangles that `start(t, covers)` finds no place for, where covers(face) tries one, and that are not
+/// near the target piece by piece either; `open` says which triangles are asked about.
+template <class Bound, class Start>
+std::vector<std::uint32_t> far_ones(const FineMesh& mesh, std::vector<std::uint8_t> open, Target& target, double widest,
+                                    RunContext& context, const Bound& bound, const Start& start) {
+  parallel_blocks(open.size(), context, [&](std::size_t t) {
+    if (!open[t]) return;
+    const auto number = static_cast<std::uint32_t>(t);
+    const Corners piece = mesh.corners(number);
+    const auto within = [&](std::uint32_t face) { return bound(number, face); };
+    open[t] = !start(number, [&](std::uint32_t face) { return target.overlay().is_near(piece, target.mesh(), face, within); });
+  });
+  std::vector<std::uint32_t> left;
+  for (std::uint32_t t = 0; t < open.size(); ++t)
+    if (open[t]) left.push_back(t);
+  if (left.empty()) return left;
+  target.plant_tree();
+  parallel_blocks(left.size(), context, [&](std::size_t i) {
+    const std::uint32_t t = left[i];
+    open[t] = !is_near(mesh.corners(t), target, widest, [&](std::uint32_t face) { return bound(t, face); });
+  });
+  std::erase_if(left, [&](std::uint32_t t) { return !open[t]; });
+  return left;
+}
 
 }  // namespace
 
-DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance, RunContext& context) {
-  Stage stage(context, "certify");
+DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance,
+                                     const DecimatedMesh* before, RunContext& context) {
+  const Scope scope = before ? changes(mesh, *before) : everything(mesh);
   const FineMesh& fine = *mesh.fine;
-  const Surface coarse_surface(mesh.points, mesh.triangles), fine_surface(fine.points(), fine.triangles());
-  const Shortcut shortcut(mesh);
-  const auto least = [&](const Triangle& t) {
-    return double(std::min({tolerance[t[0]], tolerance[t[1]], tolerance[t[2]]}));
+  const FineMesh coarse(mesh.points, mesh.triangles);
+  Target to_fine(fine), to_coarse(coarse);
+  const auto least = [&](std::uint32_t t) {
+    const Triangle& corners = fine.triangles()[t];
+    return double(std::min({tolerance[corners[0]], tolerance[corners[1]], tolerance[corners[2]]}));
   };
   double widest = 0;
   for (const float t : tolerance) widest = std::max(widest, double(t));
 
-  std::vector<std::uint8_t> fine_fails(fine.triangles().size()), coarse_fails(mesh.triangles.size());
-  parallel_blocks(fine_fails.size(), context, [&](std::size_t t) {
-    const Triangle& corners = fine.triangles()[t];
-    if (shortcut.of_fine(corners, static_cast<std::uint32_t>(t))) return;
-    const double within = least(corners);
-    fine_fails[t] = !is_near(piece_of(fine.points(), corners),
-                             {mesh.attached_to[corners[0]], mesh.attached_to[corners[1]], mesh.attached_to[corners[2]]},
-                             coarse_surface, within, [&](std::uint32_t) { return within; });
-  });
-  parallel_blocks(coarse_fails.size(), context, [&](std::size_t t) {
-    coarse_fails[t] = !is_near(piece_of(mesh.points, mesh.triangles[t]), {kNone, kNone, kNone}, fine_surface, widest,
-                               [&](std::uint32_t f) { return least(fine.triangles()[f]); });
-  });
+  const std::vector<std::uint32_t> far_from_coarse = far_ones(
+      fine, scope.fine, to_coarse, widest, context, [&](std::uint32_t t, std::uint32_t) { return least(t); },
+      [&](std::uint32_t t, auto&& covers) {
+        std::uint32_t last = kNoTriangle;
+        for (const std::uint32_t sample : fine.triangles()[t]) {
+          const std::uint32_t attached = mesh.attached_to[sample];
+          const std::uint32_t face = attached != kNoTriangle ? attached : coarse.around(sample).front();
+          if (face != last && covers(face)) return true;
+          last = face;
+        }
+        return false;
+      });
+  const std::vector<std::uint32_t> far_from_fine = far_ones(
+      coarse, scope.coarse, to_fine, widest, context, [&](std::uint32_t, std::uint32_t f) { return least(f); },
+      [&](std::uint32_t t, auto&& covers) {
+        const Corners at = coarse.corners(t);
+        const Vector3d middle = (at[0] + at[1] + at[2]) / 3.0;
+        const std::uint32_t sample = mesh.first_sample[t];
+        if (sample != kNoSample && covers(fine.walk(fine.around(sample).front(), middle))) return true;
+        return covers(fine.walk(mesh.below[coarse.triangles()[t][0]], middle));
+      });
 
   DistanceCertificate result;
-  for (std::size_t t = 0; t < fine_fails.size(); ++t) {
-    if (!fine_fails[t]) continue;
-    ++result.fine_triangles;
+  result.fine_triangles = far_from_coarse.size();
+  result.coarse_triangles = far_from_fine.size();
+  for (const std::uint32_t t : far_from_coarse)
     for (const std::uint32_t p : fine.triangles()[t]) result.samples.push_back(p);
-  }
-  for (std::size_t t = 0; t < coarse_fails.size(); ++t) {
-    if (!coarse_fails[t]) continue;
-    ++result.coarse_triangles;
+  for (const std::uint32_t t : far_from_fine) {
     for (const std::uint32_t p : mesh.triangles[t]) result.samples.push_back(p);
     for (std::uint32_t s = mesh.first_sample[t]; s != kNoSample; s = mesh.next_sample[s]) result.samples.push_back(s);
   }

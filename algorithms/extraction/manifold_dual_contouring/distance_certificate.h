@@ -16,17 +16,17 @@ struct DistanceCertificate {
   bool holds() const { return fine_triangles + coarse_triangles == 0; }
 };
 
-/// **What it proves.** A piece of a triangle whose corners are within d of one triangle of the other mesh is so as a whole,
-/// for the distance to a convex set is convex. Every triangle of either mesh is cut into pieces until that holds of each,
-/// or until it is so small that its middle's distance and its radius add up to no more than d + 0.005, where d is the least
-/// tolerance of the samples of the fine triangle concerned. So both one-sided Hausdorff distances are at most the tolerance
-/// and 0.005 voxel.
+/// **What it proves.** Most triangles of either mesh are covered by the other one right above or below, no farther away than
+/// d (triangle_overlay.h), where d is the least tolerance of the samples of the fine triangle concerned. The others, at
+/// creases and rims, are cut into pieces until each is covered so, or until its corners are within d of one triangle (the
+/// distance to a convex set is convex), or until it is so small that its middle's distance and its radius add up to no more
+/// than d + 0.005. So both one-sided Hausdorff distances are at most the tolerance and 0.005 voxel. Nothing that decimate()
+/// has looked at is trusted.
 ///
-/// Not searched, because decimate() has seen to it edge by edge (decimation.h): fine triangles whose corners are attached
-/// to triangles that touch one another and face the same way within 60 degrees. (The same was tried for coarse triangles
-/// and let a distance of 0.2576 pass for 0.25.)
+/// If `before` is given, only what differs from that is looked at, and the fine triangles round about.
 ///
 /// `tolerance` by sample, voxels.
-DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance, RunContext& context);
+DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance,
+                                     const DecimatedMesh* before, RunContext& context);
 
 }  // namespace hermesh

@@ -7,17 +7,20 @@ namespace hermesh {
 FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
   for (const Triangle& t : triangles_)
-    for (const std::uint32_t p : t) ++first_[p + 1];
+    if (t[0] != kNone)
+      for (const std::uint32_t p : t) ++first_[p + 1];
   for (std::size_t p = 0; p < points_.size(); ++p) first_[p + 1] += first_[p];
   normals_.resize(triangles_.size());
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    if (triangles_[t][0] == kNone) continue;
     const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
     normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
   }
   around_.resize(3 * triangles_.size());
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
   for (std::uint32_t t = 0; t < triangles_.size(); ++t)
-    for (const std::uint32_t p : triangles_[t]) around_[next[p]++] = t;
+    if (triangles_[t][0] != kNone)
+      for (const std::uint32_t p : triangles_[t]) around_[next[p]++] = t;
 }
 
 std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
@@ -38,7 +41,7 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
     }
     if (side < 0) return triangle;
     const std::uint32_t next = across(triangle, side);
-    if (next == before) return triangle;
+    if (next == before || next == kNone) return triangle;
     before = triangle;
     triangle = next;
   }

@@ -11,9 +11,11 @@
 
 namespace hermesh {
 
-/// Closed and oriented, so that the corners that follow a point in its triangles are all its neighbours, once each.
+/// Triangles whose first corner is kNone are not there. Closed and oriented, or a complex of patches that meet in rims; only
+/// at these may a neighbour not be the corner that follows a point in one of its triangles.
 class FineMesh {
  public:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
   FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles);
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
@@ -30,12 +32,13 @@ class FineMesh {
     return t[0] == point ? t[1] : t[1] == point ? t[2] : t[0];
   }
 
-  /// The triangle beyond the side that starts at corner i.
+  /// The triangle beyond the side that starts at corner i; kNone if none faces the same way there, as may be at the rims of
+  /// a complex of patches.
   std::uint32_t across(std::uint32_t triangle, int i) const {
     const std::uint32_t a = triangles_[triangle][i], b = triangles_[triangle][(i + 1) % 3];
     for (const std::uint32_t t : around(b))
       if (next(t, b) == a) return t;
-    return triangle;
+    return kNone;
   }
   Corners corners(std::uint32_t triangle) const {
     const Triangle& t = triangles_[triangle];

@@ -7,8 +7,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/hermite_input.h"
-#include "algorithms/extraction/manifold_dual_contouring/decimation.h"
-#include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
+#include "algorithms/extraction/manifold_dual_contouring/certified_decimation.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {
@@ -90,40 +89,6 @@ class FieldAtPoints {
   const std::array<std::int32_t, 3> base_;
 };
 
-/// Each once, ascending.
-void add_neighbours(const FineMesh& fine, std::vector<std::uint32_t>& samples) {
-  const std::size_t n = samples.size();
-  for (std::size_t i = 0; i < n; ++i)
-    for (const std::uint32_t t : fine.around(samples[i])) samples.push_back(fine.next(t, samples[i]));
-  std::sort(samples.begin(), samples.end());
-  samples.erase(std::unique(samples.begin(), samples.end()), samples.end());
-}
-
-/// Collapses, and again with less room wherever the distance cannot be proved. Nothing if that does not end soon, as on white
-/// noise: the uniform mesh serves then.
-std::optional<DecimatedMesh> certified(const FineMesh& fine, const std::vector<float>& asked, const FilePoints& file,
-                                       RunContext& context) {
-  constexpr int kAttempts = 6;
-  std::vector<float> allowed = asked;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    DecimatedMesh mesh = begin_decimation(fine, allowed, context);
-    decimate(mesh, file, context);
-    const DistanceCertificate certificate = certify_distance(mesh, asked, context);
-    if (certificate.holds()) {
-      context.figure("attempts", attempt + 1);
-      return mesh;
-    }
-    // First less room for those concerned; then none, and none for more and more of their neighbours.
-    std::vector<std::uint32_t> concerned = certificate.samples;
-    for (int ring = 0; ring < 2 * attempt; ++ring) add_neighbours(fine, concerned);
-    for (const std::uint32_t sample : concerned) allowed[sample] *= attempt == 0 ? 0.3f : 0.0f;
-  }
-  context.figure("attempts", kAttempts);
-  context.note("The tolerance could not be proved in " + std::to_string(kAttempts) +
-               " attempts, as happens on noise, so this is the uniform mesh, in which nothing is merged");
-  return std::nullopt;
-}
-
 }  // namespace
 
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
@@ -142,7 +107,7 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
     asked[i] = at_points.tolerance(fine.points()[i], options.tolerance);
   });
   const std::optional<DecimatedMesh> coarse =
-      options.tolerance > 0 ? certified(fine, asked, file, context) : std::nullopt;
+      options.tolerance > 0 ? decimate_certified(fine, asked, {}, file, context) : std::nullopt;
   const std::vector<Eigen::Vector3d>& places = coarse ? coarse->points : fine.points();
   std::vector<std::uint32_t> number(places.size(), kNoSample);
   std::vector<Eigen::Vector3d> points;

@@ -152,13 +152,13 @@ TEST(DistanceCertificate, SeesAPointThatIsTooFarAway) {
   }
   const FineMesh fine(std::move(uniform.points), std::move(triangles));
   const std::vector<float> tolerance(fine.points().size(), 0.2f);
-  DecimatedMesh mesh = begin_decimation(fine, tolerance, context);
-  EXPECT_TRUE(certify_distance(mesh, tolerance, context).holds());
+  DecimatedMesh mesh = begin_decimation(fine, tolerance, {}, context);
+  EXPECT_TRUE(certify_distance(mesh, tolerance, nullptr, context).holds());
   const Vector3d outwards = mesh.points[100].normalized();
   mesh.points[100] += 0.19 * outwards;
-  EXPECT_TRUE(certify_distance(mesh, tolerance, context).holds());
+  EXPECT_TRUE(certify_distance(mesh, tolerance, nullptr, context).holds());
   mesh.points[100] += 0.04 * outwards;
-  const DistanceCertificate certificate = certify_distance(mesh, tolerance, context);
+  const DistanceCertificate certificate = certify_distance(mesh, tolerance, nullptr, context);
   EXPECT_FALSE(certificate.holds());
   EXPECT_GT(certificate.coarse_triangles, 0u);
   EXPECT_TRUE(std::binary_search(certificate.samples.begin(), certificate.samples.end(), 100u));

@@ -20,6 +20,9 @@ struct PlaneQuadric {
   }
 };
 
+/// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to decide on a plane.
+inline constexpr double kPull = 1e-6;
+
 /// The same in double precision about any anchor, for one decision.
 struct WideQuadric {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();

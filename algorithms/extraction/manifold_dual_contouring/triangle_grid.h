@@ -27,29 +27,40 @@ class TriangleGrid {
  public:
   /// Of cells about as wide as the triangles.
   TriangleGrid(double cell_width, std::size_t triangles)
-      : scale_(1.0 / cell_width), lists_(std::bit_ceil(std::max<std::size_t>(64, 2 * triangles))) {}
+      : scale_(1.0 / cell_width), first_(std::bit_ceil(std::max<std::size_t>(64, 2 * triangles)), kNone) {
+    entries_.reserve(4 * triangles);
+  }
 
   void add(std::uint32_t triangle, const Box3& box) {
-    for_each_cell(box, [&](std::vector<std::uint32_t>& list) { list.push_back(triangle); });
+    for_each_cell(box, [&](std::uint32_t& first) {
+      entries_.push_back({triangle, first});
+      first = static_cast<std::uint32_t>(entries_.size() - 1);
+    });
   }
 
   /// Calls visit(triangle) for those whose cells the box touches, some of them more than once, and others besides;
   /// `gone(triangle)` drops one for ever.
   template <class Gone, class Visit>
   void visit(const Box3& box, Gone&& gone, Visit&& visit) {
-    for_each_cell(box, [&](std::vector<std::uint32_t>& list) {
-      for (std::size_t i = 0; i < list.size();) {
-        if (gone(list[i])) {
-          list[i] = list.back();
-          list.pop_back();
+    for_each_cell(box, [&](std::uint32_t& first) {
+      for (std::uint32_t* link = &first; *link != kNone;) {
+        Entry& entry = entries_[*link];
+        if (gone(entry.triangle)) {
+          *link = entry.next;
         } else {
-          visit(list[i++]);
+          visit(entry.triangle);
+          link = &entry.next;
         }
       }
     });
   }
 
  private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  struct Entry {
+    std::uint32_t triangle, next;
+  };
+
   template <class F>
   void for_each_cell(const Box3& box, F&& f) {
     std::int64_t first[3], last[3];
@@ -59,7 +70,7 @@ class TriangleGrid {
     }
     for (std::int64_t x = first[0]; x <= last[0]; ++x)
       for (std::int64_t y = first[1]; y <= last[1]; ++y)
-        for (std::int64_t z = first[2]; z <= last[2]; ++z) f(lists_[slot(x, y, z)]);
+        for (std::int64_t z = first[2]; z <= last[2]; ++z) f(first_[slot(x, y, z)]);
   }
   /// Two cells may share a list.
   std::size_t slot(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -67,11 +78,12 @@ class TriangleGrid {
     h ^= static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu + (h >> 29);
     h ^= static_cast<std::uint64_t>(z) * 0x165667b19e3779f9u + (h >> 32);
     h *= 0x9e3779b97f4a7c15u;
-    return static_cast<std::size_t>(h >> 20) & (lists_.size() - 1);
+    return static_cast<std::size_t>(h >> 20) & (first_.size() - 1);
   }
 
   double scale_;
-  std::vector<std::vector<std::uint32_t>> lists_;
+  std::vector<std::uint32_t> first_;  ///< by cell: head of its list among the entries
+  std::vector<Entry> entries_;
 };
 
 }  // namespace hermesh

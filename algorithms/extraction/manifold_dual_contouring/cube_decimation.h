@@ -1,4 +1,4 @@
-// Collapses of edges within one cube of a round (decimation.h).
+// Decimation within one cube of a round (decimation.h).
 #pragma once
 
 #include <span>
@@ -7,10 +7,13 @@
 
 namespace hermesh {
 
+struct CubeNumbers;  // cube_mesh.h
+
 struct DecimationCube {
   Eigen::Vector3d lower;
   double side;
   double longest_edge;  ///< that a collapse may make, so that cubes of a round coarsen alike
+  bool merges_blocks;   ///< before edges are collapsed
   bool holds(const Eigen::Vector3d& p) const {
     return (p.array() >= lower.array()).all() && (p.array() < lower.array() + side).all();
   }
@@ -19,6 +22,6 @@ struct DecimationCube {
 /// `triangles` are those whose boxes touch the cube, ascending. Changes the triangles with all corners in the cube, the
 /// points in it and the samples attached to them, and reads no others that anybody changes meanwhile.
 void decimate_cube(DecimatedMesh& mesh, const FilePoints& file, const DecimationCube& cube,
-                   std::span<const std::uint32_t> triangles, const RunContext& context);
+                   std::span<const std::uint32_t> triangles, CubeNumbers& numbers, const RunContext& context);
 
 }  // namespace hermesh
