@@ -15,6 +15,7 @@ namespace {
 /// Half of 716 : 928 : 2671, the longest side being 1.
 const Vector3d kHalf(0.134032, 0.173718, 0.5);
 constexpr double kWater = -0.11;  ///< height of the pool's surface
+constexpr double kGap = 0.001;    ///< between droplets
 constexpr double kGravity = 0.9;  ///< lengths per squared unit of time
 
 /// A crown: a ring of thin sheet that leans outwards.
@@ -193,12 +194,19 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   }
   constexpr double kTop = 0.004;
   add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop, detail);  // so that the box is as high as it should be
+  std::vector<std::pair<Vector3d, double>> droplets;
   for (int made = 1; made < parameters.at("droplets");) {
     context.check();
     const double radius = droplet_radius(random);
-    const Vector3d centre = flight_from(source(), random).at(random.uniform(0.0, 0.6));
-    if (!is_inside(centre, radius)) continue;
+    const Vector3d centre = flight_from(source(), random).at(random.uniform(0.08, 0.7));
+    // Droplets that touch have long become one; few of those that are left would be in the air.
+    const auto touches = [&](const auto& other) {
+      const double apart = radius + other.second + kGap;
+      return (centre - other.first).squaredNorm() < apart * apart;
+    };
+    if (!is_inside(centre, radius) || std::any_of(droplets.begin(), droplets.end(), touches)) continue;
     add_droplet(mesh, centre, radius, detail);
+    droplets.emplace_back(centre, radius);
     ++made;
   }
   const auto length = static_cast<float>(parameters.at("length"));

@@ -16,7 +16,7 @@ constexpr double kFacing = 0.05;
 }  // namespace
 
 ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
-  std::array<Place, 6> before;
+  std::array<Place, 24> before;
   std::copy(triangle.begin(), triangle.end(), corners.begin());
   size = 3;
   for (int side = 0; side < 3 && size > 0; ++side) {
@@ -56,7 +56,7 @@ TriangleOverlay::Cover TriangleOverlay::look_at(const OverTriangle& over, const 
   const ClippedTriangle part(places);
   if (part.size < 3) return Cover::none;
   for (int i = 0; i < part.size; ++i)
-    if (std::abs(part.corners[i][3]) > within) return Cover::far;
+    if (!(std::abs(part.corners[i][3]) <= within)) return Cover::far;
   return faces_alike() ? Cover::near : Cover::far;
 }
 

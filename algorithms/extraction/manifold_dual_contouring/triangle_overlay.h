@@ -29,7 +29,7 @@ class OverTriangle {
     origin_ = corners[0];
     offsets_.setZero();
     offsets_[1] = axes_.row(1).dot(corners[1] - origin_);
-    degenerate_ = !(size > 0);
+    degenerate_ = !axes_.allFinite();
   }
   bool degenerate() const { return degenerate_; }
   const Eigen::Vector3d& normal() const { return normal_; }
@@ -42,9 +42,9 @@ class OverTriangle {
   bool degenerate_;
 };
 
-/// Part of a polygon over a triangle, by its corners; at most six.
+/// Part of a polygon over a triangle, by its corners: six at most, or more where rounding makes it not quite convex.
 struct ClippedTriangle {
-  std::array<OverTriangle::Place, 6> corners;
+  std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles them
   int size = 0;
   explicit ClippedTriangle(const std::array<OverTriangle::Place, 3>& triangle);
 };
