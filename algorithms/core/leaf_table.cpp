@@ -47,6 +47,13 @@ std::uint64_t signs_of_64(const float* values, const InsideRule& rule, bool& not
   return bits;
 }
 
+/// As std::popcount(), which is a call of a function where the processor's instruction may not be used.
+constexpr int bits_in(std::uint64_t word) {
+  word -= (word >> 1) & 0x5555555555555555u;
+  word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
+  return static_cast<int>((((word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u) >> 56);
+}
+
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
 }  // namespace
@@ -186,7 +193,7 @@ Coord LeafTable::lower(std::size_t leaf) const { return leaves_[leaf]->origin();
 
 std::int32_t LeafTable::find(const Node& node, std::uint32_t slot) const {
   const std::uint64_t bit = std::uint64_t{1} << (slot & 63), word = node.child[slot >> 6];
-  if (word & bit) return static_cast<std::int32_t>(node.rank[slot >> 6]) + std::popcount(word & (bit - 1));
+  if (word & bit) return static_cast<std::int32_t>(node.rank[slot >> 6]) + bits_in(word & (bit - 1));
   return uniform((node.tile_inside[slot >> 6] & bit) != 0);
 }
 
@@ -199,6 +206,22 @@ std::int32_t LeafTable::neighbour(std::size_t leaf, int dx, int dy, int dz) cons
   if (((x | y | z) & ~15) == 0) return find(node, slot);
   const std::int32_t there = node.neighbours[neighbour_slot(x >> 4, y >> 4, z >> 4)];
   return there >= 0 ? find(nodes_[there], slot) : there;
+}
+
+std::array<std::int32_t, 8> LeafTable::neighbours(std::size_t leaf, int side) const {
+  const Place place = places_[leaf];
+  const Node& node = nodes_[place.node];
+  const int x = static_cast<int>(place.slot >> 8), y = static_cast<int>((place.slot >> 4) & 15),
+            z = static_cast<int>(place.slot & 15), border = side > 0 ? 15 : 0;
+  std::array<std::int32_t, 8> result;
+  result[0] = static_cast<std::int32_t>(leaf);
+  if (x == border || y == border || z == border) {
+    for (int i = 1; i < 8; ++i) result[i] = neighbour(leaf, side * (i & 1), side * (i >> 1 & 1), side * (i >> 2));
+  } else {
+    for (int i = 1; i < 8; ++i)
+      result[i] = find(node, place.slot + static_cast<std::uint32_t>(side * (256 * (i & 1) + 16 * (i >> 1 & 1) + (i >> 2))));
+  }
+  return result;
 }
 
 /// True if two tiles of different sign touch, both within the node or one in it and one beyond. Rows of 16 along z are

@@ -48,6 +48,9 @@ class LeafTable {
 
   /// A leaf's number, or kUniformOutside or kUniformInside where there is none; each offset −1, 0 or 1.
   std::int32_t neighbour(std::size_t leaf, int dx, int dy, int dz) const;
+  /// The leaf itself and its seven neighbours one step up (`side` 1) or down (−1) along each axis or not: at
+  /// |dx| + 2|dy| + 4|dz|. As neighbour(), but the eight cost little more than one.
+  std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const;
 
  private:
   using Leaf = openvdb::FloatTree::LeafNodeType;

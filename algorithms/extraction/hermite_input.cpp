@@ -7,9 +7,13 @@
 namespace hermesh {
 namespace {
 
-FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
+bool wants_polygons(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
-  const bool exact = source == "exact" || (source == "auto" && input.source);
+  return source == "exact" || (source == "auto" && input.source);
+}
+
+FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
+  const bool exact = wants_polygons(input);
   if (exact && !input.source)
     throw Error(variant +
                 " was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
@@ -41,6 +45,11 @@ FloatHermite hermite_input(const ExtractionInput& input, const std::string& vari
       through(representation, parse_normal_code(input.options.text("normals")), sample(input, variant), input.context);
   report_figures(data, input.level_set, input.context);
   return std::move(data.hermite);
+}
+
+bool from_level_set_alone(const ExtractionInput& input) {
+  return !wants_polygons(input) &&
+         parse_representation(input.options.text("representation")) == Representation::sparse_float;
 }
 
 std::vector<OptionSpec> hermite_options() {

@@ -17,4 +17,8 @@ std::vector<OptionSpec> hermite_options();
 /// @throws Error for exact data where there are no polygons, and where `needs_normals` but the representation has none.
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);
 
+/// True where those options ask for the level set's own crossings as they are computed, so that an extractor may take
+/// them from the samples without keeping them.
+bool from_level_set_alone(const ExtractionInput& input);
+
 }  // namespace hermesh

@@ -11,6 +11,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
+#include "algorithms/hermite/incomplete_stencil.h"
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
@@ -173,74 +174,8 @@ SignLeaf sign_leaf(const LeafTable& table, std::size_t leaf) {
 }
 
 /// What sampling needs to know of the whole volume.
-struct Volume {
-  const LeafTable& table;
-  bool masked;         ///< samples that are not active are no data
-  float data_below;    ///< samples of no less than this magnitude are no data
+struct Volume : SampledVolume {
   edge_kernels::Sample* sample;
-};
-
-/// One edge whose stencil has samples that are no data: differences to one side, or none.
-class IncompleteStencil {
- public:
-  IncompleteStencil(const Volume& volume, std::size_t leaf)
-      : volume_(volume), table_(volume.table), leaf_(leaf) {}
-
-  EdgeCrossing sample(int x, int y, int z, int axis) const {
-    const std::array<int, 3> from{x, y, z};
-    std::array<int, 3> to = from;
-    ++to[axis];
-    const InsideRule& rule = table_.rule();
-    const double a = rule.signed_value(at(from).value), b = rule.signed_value(at(to).value);
-    const double offset = a / (a - b);
-    Eigen::Vector3d normal = (1.0 - offset) * gradient(from) + offset * gradient(to);
-    const double rise = b - a;
-    if (!(normal[axis] * rise > 0)) normal[axis] = rise;
-    normal.normalize();
-    return {static_cast<float>(offset),
-            {static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])}};
-  }
-
- private:
-  struct Sample {
-    float value;
-    bool is_data;
-  };
-  Sample at(const std::array<int, 3>& p) const {
-    const std::int32_t there = table_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
-    const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
-    if (there < 0) {
-      const openvdb::Coord place = table_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
-      return {table_.tree().getValue(place), table_.tree().isValueOn(place)};
-    }
-    const float value = table_.values(static_cast<std::size_t>(there))[sample];
-    const bool active = !volume_.masked || test(table_.active(static_cast<std::size_t>(there)), sample);
-    return {value, active && std::fabs(value) < volume_.data_below};
-  }
-
-  /// Derivative along each axis; 0 along an axis without data.
-  Eigen::Vector3d gradient(const std::array<int, 3>& p) const {
-    Eigen::Vector3d result = Eigen::Vector3d::Zero();
-    const Sample here = at(p);
-    for (int axis = 0; axis < 3; ++axis) {
-      std::array<int, 3> low = p, high = p;
-      --low[axis], ++high[axis];
-      const Sample below = at(low), above = at(high);
-      double difference = 0.0;
-      if (below.is_data && above.is_data)
-        difference = 0.5 * (double(above.value) - below.value);
-      else if (above.is_data && here.is_data)
-        difference = double(above.value) - here.value;
-      else if (below.is_data && here.is_data)
-        difference = double(here.value) - below.value;
-      result[axis] = table_.rule().scale * difference;
-    }
-    return result;
-  }
-
-  const Volume& volume_;
-  const LeafTable& table_;
-  const std::size_t leaf_;
 };
 
 /// Writes the crossings of one leaf, each as `make` turns it from an EdgeCrossing.
@@ -302,11 +237,7 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue, RunCo
     Stage stage(context, "read signs");
     return LeafTable(level_set, isovalue, context);
   }();
-  const openvdb::FloatGrid& grid = *level_set.grid().grid;
-  const bool is_level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
-  const Volume volume{table, !is_level_set,
-                      is_level_set ? std::fabs(grid.background()) : std::numeric_limits<float>::max(),
-                      edge_kernels::chosen()};
+  const Volume volume{sampled_volume(table, level_set), edge_kernels::chosen()};
   Stage stage(context, "Hermite data from the level set");
   result.outermost_inside = table.rule()(table.tree().background());
 

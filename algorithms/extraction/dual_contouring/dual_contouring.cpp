@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/hermite_input.h"
 
@@ -132,20 +133,11 @@ class Contourer {
       const Eigen::Vector3d corner = lower + Eigen::Vector3d(cell[0], cell[1], cell[2]);
       const Qef qef = gather(b, cell, corner);
       const std::uint32_t point = outputs_[b].point_in(sample);
-      positions_[point] = place(qef, corner);
+      positions_[point] = options_.placement == DualContouringOptions::Placement::average
+                              ? qef.mass_point()
+                              : place_optimally(qef, corner, options_);
       mesh.points[point] = placement.local(positions_[point]).cast<float>();
     });
-  }
-
-  Eigen::Vector3d place(const Qef& qef, const Eigen::Vector3d& corner) const {
-    if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
-    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
-    const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
-    const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
-    if (options_.reach <= 0 || qef.error(held) <= kWorthLeaving * kWorthLeaving * qef.planes()) return held;
-    const Eigen::Vector3d free = qef.minimiser(options_.truncation);
-    const Eigen::Vector3d from_centre = free - corner - Eigen::Vector3d::Constant(0.5);
-    return from_centre.cwiseAbs().maxCoeff() <= 0.5 + options_.reach ? free : held;
   }
 
   void connect(std::int32_t b, PolygonMesh& mesh) const {
@@ -209,6 +201,16 @@ class Contourer {
 
 }  // namespace
 
+Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options) {
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
+  const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
+  const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options.truncation);
+  if (options.reach <= 0 || qef.error(held) <= kWorthLeaving * kWorthLeaving * qef.planes()) return held;
+  const Eigen::Vector3d free = qef.minimiser(options.truncation);
+  const Eigen::Vector3d from_centre = free - corner - Eigen::Vector3d::Constant(0.5);
+  return from_centre.cwiseAbs().maxCoeff() <= 0.5 + options.reach ? free : held;
+}
+
 PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
                             RunContext& context) {
   return Contourer(grid, options).run(context);
@@ -224,6 +226,8 @@ DualContouringOptions read_dual_contouring_options(const Options& given) {
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
   const DualContouringOptions options = read_dual_contouring_options(input.options);
+  if (from_level_set_alone(input) && can_contour_level_set(options))
+    return contour_level_set(input.level_set, input.isovalue, options, input.context);
   const bool needs_normals = options.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "dual-contouring", needs_normals);
   return dual_contouring(view_of(hermite, input.context), options, input.context);

@@ -27,6 +27,11 @@ struct DualContouringOptions {
 PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
                             RunContext& context);
 
+class Qef;  // qef.h
+
+/// Optimal placement of the cell with its first corner there; in voxels.
+Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options);
+
 /// From options checked against dual_contouring_options().
 DualContouringOptions read_dual_contouring_options(const Options& options);
 

@@ -1,0 +1,118 @@
+// The work on one 8³ leaf of dual contouring from a level set, compiled for several levels of vector code; all give
+// the same bytes. Light and free of the standard library's functions, because what two levels share the linker may take
+// from either.
+//
+// Coordinates are those of the leaf: sample (x,y,z) from 0 to 7, cell (x,y,z) between samples x and x+1 and so on. Bits
+// are in the order of BlockMask, word x, bit 8y+z. A cell of the leaf has its corners in the leaf and in seven upper
+// neighbours; the cells around an edge that starts in the leaf lie in it and in seven lower neighbours.
+#pragma once
+
+#include <cstdint>
+
+namespace hermesh::leaf_kernels {
+
+/// Floats in the longest vectors.
+inline constexpr int kLargestVector = 16;
+
+/// Which cells of a leaf have a point, and which point. 96 bytes.
+struct LeafCells {
+  std::uint64_t active[8];    ///< cells with a crossing edge
+  std::uint16_t before[8];    ///< active cells before each word
+  std::uint32_t first_point;  ///< number of the first cell's point
+  std::uint32_t first_quad;   ///< number of the quad of the first crossing edge: by axis, in that by sample
+  std::uint16_t points, quads;
+};
+
+/// Signs of the leaf and its upper neighbours, at dx + 2dy + 4dz: 8 words each. Crossing edges need those of one step
+/// along one axis alone.
+struct UpperSigns {
+  const std::uint64_t* inside[8];
+};
+
+/// Lower neighbours that hold a cell with one of the leaf's crossing edges, as bits of 1 << (dx + 2dy + 4dz) with the
+/// offsets turned positive: bit 1 is the neighbour below along x.
+using LowerNeeds = unsigned;
+
+/// The active cells and the numbers of points and quads; first_point and first_quad are left alone.
+using Count = LowerNeeds(const UpperSigns& signs, LeafCells& cells);
+
+/// A crossing as a tangent plane, in voxels from the cell's centre.
+struct Plane {
+  float point[3], normal[3];
+};
+
+/// The plain code for the rare cases that the vector code does not do.
+class PlainCode {
+ public:
+  /// Of an edge that starts in the leaf or a step beyond and whose stencil has samples that are no data: offset, and the
+  /// normal along the axis and the two after it.
+  virtual void crossing(int x, int y, int z, int axis, float* record) const = 0;
+  /// The cell's point, from its centre.
+  virtual void place(const Plane* planes, int count, float* place) const = 0;
+
+ protected:
+  ~PlainCode() = default;
+};
+
+/// What a leaf's cells are placed from.
+struct PlaceInput {
+  UpperSigns signs;
+  const LeafCells* cells;
+  /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each. Average placement reads the upper ones alone.
+  const float* values[27];
+  float isovalue, scale;
+  double corner[3];     ///< where the leaf's first sample is in the mesh's coordinates
+  double linear[3][3];  ///< voxels to mesh, by row
+  /// For optimal placement alone. Samples of no less than data_below in magnitude are no data; where `active` is not null,
+  /// neither are those without a bit there. Where there is no leaf all samples must be infinite.
+  const std::uint64_t* active[27];
+  float data_below;
+  float truncation, reach;  ///< as in DualContouringOptions; the truncation is no less than kLeastTruncation
+  const PlainCode* plain;
+};
+/// Below it single precision cannot tell which singular values are to be dropped.
+inline constexpr float kLeastTruncation = 0.03f;
+
+/// A point within its cell: 16 bytes, so that it is copied in one piece.
+struct Place {
+  float x, y, z;  ///< voxels from the cell's first corner
+  std::uint32_t point;
+};
+
+/// Where they go.
+struct PlaceOutput {
+  Place* places;   ///< of the leaf's cells
+  float* points;   ///< the same in the mesh's coordinates, three numbers a point
+  float* offsets;  ///< of the leaf's crossing edges, from their first sample, in voxels
+};
+
+/// The mean of each cell's crossings.
+using PlaceAverage = void(const PlaceInput& input, const PlaceOutput& output);
+/// The minimiser of each cell's quadratic error function, as dual_contouring() places it.
+using PlaceOptimal = void(const PlaceInput& input, const PlaceOutput& output);
+
+/// What a leaf's quads are made from.
+struct ConnectInput {
+  UpperSigns signs;
+  /// Cells of the leaf and its lower neighbours, at dx + 2dy + 4dz with the offsets turned positive; null where there is
+  /// no leaf or none of its cells is needed.
+  const LeafCells* cells[8];
+  const Place* places;   ///< of all points
+  const float* offsets;  ///< of the leaf's crossing edges; kLargestVector more can be read
+  bool mirrors;          ///< turns the quads about
+};
+
+/// One quad for each crossing edge that starts in the leaf, four point numbers each, by axis, in that by sample.
+using Connect = void(const ConnectInput& input, std::uint32_t* quads);
+
+struct Kernels {
+  Count* count;
+  PlaceAverage* place_average;
+  PlaceOptimal* place_optimal;
+  Connect* connect;
+};
+
+/// For the level of vector code that is chosen, see simd_level.h.
+const Kernels& chosen();
+
+}  // namespace hermesh::leaf_kernels

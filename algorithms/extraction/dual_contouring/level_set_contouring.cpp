@@ -1,0 +1,286 @@
+#include "algorithms/extraction/dual_contouring/level_set_contouring.h"
+
+#include <sys/mman.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/leaf_table.h"
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
+#include "algorithms/extraction/dual_contouring/qef.h"
+#include "algorithms/hermite/incomplete_stencil.h"
+
+namespace hermesh {
+namespace {
+
+using leaf_kernels::LeafCells;
+using leaf_kernels::UpperSigns;
+using openvdb::Coord;
+
+constexpr std::uint64_t kLastY = std::uint64_t{0xff} << 56, kLastZ = 0x8080808080808080u;
+constexpr BlockMask kAllOutside{};
+constexpr BlockMask kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+
+/// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more than filling it.
+template <class T>
+void reserve_huge(std::vector<T>& array, std::size_t n) {
+  constexpr std::size_t kPage = std::size_t{2} << 20;
+  array.reserve(n);
+#if defined(MADV_HUGEPAGE)
+  const auto first = (reinterpret_cast<std::uintptr_t>(array.data()) + kPage - 1) / kPage * kPage;
+  const auto end = reinterpret_cast<std::uintptr_t>(array.data() + n) / kPage * kPage;
+  if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);  // a wish
+#endif
+}
+
+constexpr std::array<float, 512> make_no_data() {
+  std::array<float, 512> values{};
+  for (float& value : values) value = std::numeric_limits<float>::infinity();
+  return values;
+}
+constexpr std::array<float, 512> kNoData = make_no_data();
+
+/// What the vector code leaves over, in the way of the Hermite data's sampler and of the general contouring.
+class Plain final : public leaf_kernels::PlainCode {
+ public:
+  Plain(const SampledVolume& volume, std::size_t leaf, const DualContouringOptions& options)
+      : volume_(volume), leaf_(leaf), options_(options) {}
+
+  void crossing(int x, int y, int z, int axis, float* record) const override {
+    const EdgeCrossing crossing = IncompleteStencil(volume_, leaf_).sample(x, y, z, axis);
+    record[0] = crossing.offset;
+    for (int k = 0; k < 3; ++k) record[1 + k] = crossing.normal[(axis + k) % 3];
+  }
+  void place(const leaf_kernels::Plane* planes, int count, float* place) const override {
+    Qef qef(Eigen::Vector3d::Zero());
+    for (int i = 0; i < count; ++i)
+      qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(), Eigen::Vector3f(planes[i].normal).cast<double>());
+    const Eigen::Vector3d found = place_optimally(qef, Eigen::Vector3d::Constant(-0.5), options_);
+    for (int k = 0; k < 3; ++k) place[k] = static_cast<float>(found[k]);
+  }
+
+ private:
+  const SampledVolume& volume_;
+  const std::size_t leaf_;
+  const DualContouringOptions& options_;
+};
+
+/// Count, scan, fill. What bounds each pass, by profiles of one thread on the bunny at 800 voxels with
+/// AVX-512: reading the signs, memory bandwidth; counting, the leaves' neighbours, that is latency;
+/// average placement, a third of the time waiting for the samples' cache lines in spite of the prefetches, then the
+/// gathers of corners; optimal placement, arithmetic (planes and eigenvalues) more than twice as long as all that; the
+/// quads, instructions: lists of bits, copies of places, shuffles. First touches of the results' pages come to 5 %.
+class LevelSetContourer {
+ public:
+  LevelSetContourer(const SampledVolume& volume, const IndexToWorld& placement, const DualContouringOptions& options,
+                    RunContext& context)
+      : volume_(volume), table_(volume.table), placement_(placement), options_(options), context_(context),
+        cells_(table_.size()), upper_(table_.size()) {}
+
+  /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree lacks
+  /// although they hold active cells.
+  std::vector<Coord> count() {
+    const Stage stage(context_, "count");
+    std::vector<std::uint64_t> points(table_.size()), quads(table_.size());
+    std::vector<Coord> missing;
+    std::mutex lock;
+    parallel_blocks(table_.size(), context_, [&](std::size_t leaf) {
+      upper_[leaf] = table_.neighbours(leaf, 1);
+      const leaf_kernels::LowerNeeds needs = kernels_.count(upper_signs(upper_[leaf]), cells_[leaf]);
+      points[leaf] = cells_[leaf].points;
+      quads[leaf] = cells_[leaf].quads;
+      for (int slot = 1; slot < 7; ++slot) {
+        const int dx = slot & 1, dy = slot >> 1 & 1, dz = slot >> 2;
+        if (!(needs >> slot & 1) || table_.neighbour(leaf, -dx, -dy, -dz) >= 0) continue;
+        const std::scoped_lock hold(lock);
+        missing.push_back(table_.lower(leaf).offsetBy(-8 * dx, -8 * dy, -8 * dz));
+      }
+    });
+    points_ = exclusive_scan(points, "points");
+    quads_ = exclusive_scan(quads, "quads");
+    for (std::size_t leaf = 0; leaf < table_.size(); ++leaf) {
+      if (cells_[leaf].points == 0 && cells_[leaf].quads == 0) continue;
+      cells_[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
+      cells_[leaf].first_quad = static_cast<std::uint32_t>(quads[leaf]);
+      live_.push_back(static_cast<std::uint32_t>(leaf));
+    }
+    return missing;
+  }
+
+  PolygonMesh extract() {
+    PolygonMesh mesh;
+    mesh.origin = placement_.origin;
+    reserve_huge(mesh.points, points_);
+    reserve_huge(mesh.quads, quads_);
+    mesh.points.resize(points_);
+    LargeArray<leaf_kernels::Place> places(points_);
+    LargeArray<float> offsets(quads_ + leaf_kernels::kLargestVector);
+    {
+      const Stage stage(context_, "place points");
+      // A vector's new elements are written by one thread, which the others do not wait for.
+      tbb::parallel_invoke([&] { mesh.quads.resize(quads_); },
+                           [&] {
+                             parallel_blocks(live_.size(), context_, [&](std::size_t i) {
+                               if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
+                               place(live_[i], {places.data(), mesh.points.data()->data(), offsets.data()});
+                             });
+                           });
+    }
+    const Stage stage(context_, "connect");
+    const bool mirrors = placement_.mirrors();
+    parallel_blocks(live_.size(), context_, [&](std::size_t i) {
+      const LeafCells& cells = cells_[live_[i]];
+      if (cells.quads == 0) return;
+      leaf_kernels::ConnectInput input{upper_signs(upper_[live_[i]]), {}, places.data(), offsets.data() + cells.first_quad,
+                                       mirrors};
+      const Neighbours lower = table_.neighbours(live_[i], -1);
+      for (int slot = 0; slot < 8; ++slot)
+        input.cells[slot] = lower[slot] >= 0 ? &cells_[static_cast<std::size_t>(lower[slot])] : nullptr;
+      kernels_.connect(input, mesh.quads[cells.first_quad].data());
+    });
+    return mesh;
+  }
+
+ private:
+  using Neighbours = std::array<std::int32_t, 8>;  ///< as LeafTable::neighbours()
+
+  UpperSigns upper_signs(const Neighbours& upper) const {
+    UpperSigns signs;
+    for (int slot = 0; slot < 8; ++slot)
+      signs.inside[slot] = upper[slot] >= 0                ? table_.inside(static_cast<std::size_t>(upper[slot])).data()
+                           : upper[slot] == kUniformInside ? kAllInside.data()
+                                                           : kAllOutside.data();
+    return signs;
+  }
+
+  /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more than the
+  /// arithmetic. Those of the leaf below along z came just before.
+  void prefetch_samples(std::size_t leaf) const {
+    const auto lines = [&](std::int32_t there, int first, int stride, int count) {
+      if (there < 0) return;
+      const float* values = table_.values(static_cast<std::size_t>(there)) + first;
+      for (int i = 0; i < count; ++i) __builtin_prefetch(values + stride * i);
+    };
+    constexpr int kLine = 16;  // samples
+    const bool stencils = options_.placement == DualContouringOptions::Placement::optimal;
+    lines(static_cast<std::int32_t>(leaf), 0, kLine, 32);
+    lines(upper_[leaf][1], 0, kLine, stencils ? 8 : 4);  // the first layers along x
+    lines(upper_[leaf][2], 0, 64, 8);                    // the first rows along y
+    lines(upper_[leaf][4], 0, kLine, 32);
+    if (!stencils) return;
+    lines(table_.neighbour(leaf, -1, 0, 0), 7 * 64, kLine, 4);
+    lines(table_.neighbour(leaf, 0, -1, 0), 7 * 8, 64, 8);
+  }
+
+  /// Samples around the leaf for average placement, which reads those of the upper neighbours that its last cells touch.
+  void find_corner_samples(std::size_t leaf, leaf_kernels::PlaceInput& input) const {
+    static thread_local std::array<std::array<float, 512>, 8> tiles;
+    std::uint64_t any = 0;
+    for (const std::uint64_t word : input.cells->active) any |= word;
+    const unsigned touched = (input.cells->active[7] ? 1 : 0) | (any & kLastY ? 2 : 0) | (any & kLastZ ? 4 : 0);
+    for (unsigned slot = 0; slot < 8; ++slot) {
+      if (slot & ~touched) continue;
+      const int dx = slot & 1, dy = slot >> 1 & 1, dz = static_cast<int>(slot >> 2);
+      const std::int32_t there = upper_[leaf][slot];
+      if (there < 0) tiles[slot].fill(table_.tree().getValue(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)));
+      input.values[neighbour_slot(dx, dy, dz)] =
+          there >= 0 ? table_.values(static_cast<std::size_t>(there)) : tiles[slot].data();
+    }
+  }
+
+  /// The same for the stencils of optimal placement, which read samples of all neighbours.
+  void find_stencil_samples(std::size_t leaf, leaf_kernels::PlaceInput& input, std::array<BlockMask, 27>& active) const {
+    for (int slot = 0; slot < 27; ++slot) {
+      const std::int32_t there = table_.neighbour(leaf, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1);
+      input.values[slot] = there >= 0 ? table_.values(static_cast<std::size_t>(there)) : kNoData.data();
+      if (!volume_.masked) continue;
+      active[slot] = there >= 0 ? table_.active(static_cast<std::size_t>(there)) : kAllOutside;
+      input.active[slot] = active[slot].data();
+    }
+  }
+
+  void place(std::size_t leaf, leaf_kernels::PlaceOutput output) {
+    const LeafCells& cells = cells_[leaf];
+    const bool optimal = options_.placement == DualContouringOptions::Placement::optimal;
+    const Plain plain(volume_, leaf, options_);
+    leaf_kernels::PlaceInput input{};
+    input.signs = upper_signs(upper_[leaf]);
+    input.cells = &cells;
+    std::array<BlockMask, 27> active;
+    if (optimal)
+      find_stencil_samples(leaf, input, active);
+    else
+      find_corner_samples(leaf, input);
+    input.data_below = volume_.data_below;
+    input.truncation = static_cast<float>(options_.truncation);
+    input.reach = static_cast<float>(options_.reach);
+    input.plain = &plain;
+    input.isovalue = table_.rule().isovalue;
+    input.scale = table_.rule().scale;
+    const Coord lower = table_.lower(leaf);
+    const Eigen::Vector3d corner = placement_.local(Eigen::Vector3d(
+        lower.x() - placement_.base[0], lower.y() - placement_.base[1], lower.z() - placement_.base[2]));
+    for (int row = 0; row < 3; ++row) {
+      input.corner[row] = corner[row];
+      for (int column = 0; column < 3; ++column) input.linear[row][column] = placement_.linear(row, column);
+    }
+    output.places += cells.first_point;
+    output.points += 3 * std::size_t{cells.first_point};
+    output.offsets += cells.first_quad;
+    (optimal ? kernels_.place_optimal : kernels_.place_average)(input, output);
+  }
+
+  const SampledVolume& volume_;
+  const LeafTable& table_;
+  const IndexToWorld& placement_;
+  const DualContouringOptions& options_;
+  RunContext& context_;
+  const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
+  LargeArray<LeafCells> cells_;      ///< by leaf
+  LargeArray<Neighbours> upper_;     ///< by leaf: saved, for each pass over the leaves needs them
+  std::vector<std::uint32_t> live_;  ///< leaves with points or quads
+  std::uint64_t points_ = 0, quads_ = 0;
+};
+
+/// A copy of the grid with leaves there; their samples have the values that they had as tiles.
+LevelSet with_leaves(const LevelSet& level_set, const std::vector<Coord>& lowers) {
+  const openvdb::FloatGrid::Ptr copy = level_set.grid().grid->deepCopy();
+  for (const Coord& lower : lowers) copy->tree().touchLeaf(lower);
+  return make_level_set(copy);
+}
+
+}  // namespace
+
+bool can_contour_level_set(const DualContouringOptions& options) {
+  return options.placement == DualContouringOptions::Placement::average ||
+         options.truncation >= leaf_kernels::kLeastTruncation;
+}
+
+PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const DualContouringOptions& options,
+                              RunContext& context) {
+  const IndexToWorld placement = placement_of(*level_set.grid().grid);
+  LevelSet volume = level_set;
+  while (true) {
+    const LeafTable table = [&] {
+      const Stage stage(context, "read signs");
+      return LeafTable(volume, isovalue, context);
+    }();
+    const SampledVolume sampled = sampled_volume(table, volume);
+    LevelSetContourer contourer(sampled, placement, options, context);
+    const std::vector<Coord> missing = contourer.count();
+    if (missing.empty()) return contourer.extract();
+    // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf brings no
+    // crossing edge of its own, so one round is enough; the loop does not rely on it.
+    volume = with_leaves(volume, missing);
+  }
+}
+
+}  // namespace hermesh

@@ -1,0 +1,96 @@
+// Crossings of edges whose stencils reach beyond the data, one at a time: what vector code leaves over.
+// Heavy (OpenVDB): include it from .cpp files.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "algorithms/core/leaf_table.h"
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/hermite/crossing.h"
+
+namespace hermesh {
+
+/// A volume's samples, and which of them are data.
+struct SampledVolume {
+  const LeafTable& table;
+  bool masked;       ///< samples that are not active are no data
+  float data_below;  ///< samples of no less than this magnitude are no data
+};
+
+/// Of a level set all but the band has the background's magnitude, and nothing else is asked; of any other volume the
+/// active samples are data.
+inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
+  const openvdb::FloatGrid& grid = *level_set.grid().grid;
+  const bool is_level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
+  return {table, !is_level_set,
+          is_level_set ? std::fabs(grid.background()) : std::numeric_limits<float>::max()};
+}
+
+/// One edge whose stencil has samples that are no data: differences to one side, or none.
+class IncompleteStencil {
+ public:
+  IncompleteStencil(const SampledVolume& volume, std::size_t leaf)
+      : volume_(volume), table_(volume.table), leaf_(leaf) {}
+
+  EdgeCrossing sample(int x, int y, int z, int axis) const {
+    const std::array<int, 3> from{x, y, z};
+    std::array<int, 3> to = from;
+    ++to[axis];
+    const InsideRule& rule = table_.rule();
+    const double a = rule.signed_value(at(from).value), b = rule.signed_value(at(to).value);
+    const double offset = a / (a - b);
+    Eigen::Vector3d normal = (1.0 - offset) * gradient(from) + offset * gradient(to);
+    const double rise = b - a;
+    if (!(normal[axis] * rise > 0)) normal[axis] = rise;
+    normal.normalize();
+    return {static_cast<float>(offset),
+            {static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])}};
+  }
+
+ private:
+  struct Sample {
+    float value;
+    bool is_data;
+  };
+  Sample at(const std::array<int, 3>& p) const {
+    const std::int32_t there = table_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
+    const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
+    if (there < 0) {
+      const openvdb::Coord place = table_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
+      return {table_.tree().getValue(place), table_.tree().isValueOn(place)};
+    }
+    const float value = table_.values(static_cast<std::size_t>(there))[sample];
+    const bool active = !volume_.masked || test(table_.active(static_cast<std::size_t>(there)), sample);
+    return {value, active && std::fabs(value) < volume_.data_below};
+  }
+
+  /// Derivative along each axis; 0 along an axis without data.
+  Eigen::Vector3d gradient(const std::array<int, 3>& p) const {
+    Eigen::Vector3d result = Eigen::Vector3d::Zero();
+    const Sample here = at(p);
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<int, 3> low = p, high = p;
+      --low[axis], ++high[axis];
+      const Sample below = at(low), above = at(high);
+      double difference = 0.0;
+      if (below.is_data && above.is_data)
+        difference = 0.5 * (double(above.value) - below.value);
+      else if (above.is_data && here.is_data)
+        difference = double(above.value) - here.value;
+      else if (below.is_data && here.is_data)
+        difference = double(here.value) - below.value;
+      result[axis] = table_.rule().scale * difference;
+    }
+    return result;
+  }
+
+  const SampledVolume& volume_;
+  const LeafTable& table_;
+  const std::size_t leaf_;
+};
+
+}  // namespace hermesh
