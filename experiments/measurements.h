@@ -94,5 +94,6 @@ Measurement table_9_2_measurement();
 Measurement tables_9_3_and_9_4_measurement();
 Measurement volumes_measurement();
 Measurement guarantee_measurement();
+Measurement fracture_measurement();
 
 }  // namespace hermesh

@@ -93,6 +93,36 @@ void AtomicFile::rename() {
   committed_ = true;
 }
 
+AtomicFolder::AtomicFolder(fs::path target) : target_(std::move(target)) {
+  if (!target_.has_filename()) target_ = target_.parent_path();  // "out/" is the folder "out"
+  std::error_code error;
+  const fs::file_status status = fs::status(target_, error);
+  if (!target_.has_filename() || (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target_, error))))
+    throw Error("cannot write to '" + target_.string() + "': it is there already and no empty folder; name a new one");
+  temporary_ = temporary_name(target_);
+  const std::lock_guard lock(unfinished().mutex);
+  unfinished().paths.insert(temporary_.string());
+  if (fs::create_directory(temporary_, error)) return;
+  unfinished().paths.erase(temporary_.string());
+  throw Error("cannot write to '" + target_.string() + "': " + error.message());
+}
+
+AtomicFolder::~AtomicFolder() {
+  if (committed_) return;
+  std::error_code ignored;
+  const std::lock_guard lock(unfinished().mutex);
+  fs::remove_all(temporary_, ignored);
+  unfinished().paths.erase(temporary_.string());
+}
+
+void AtomicFolder::commit() {
+  const std::lock_guard lock(unfinished().mutex);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0)  // over an empty folder, if there is one
+    throw Error("cannot write to '" + target_.string() + "': " + std::strerror(errno));
+  unfinished().paths.erase(temporary_.string());
+  committed_ = true;
+}
+
 void commit_together(AtomicFile& first, AtomicFile& second) {
   // Held all the time, so that a signal's end of the process comes before or after both.
   const std::lock_guard lock(unfinished().mutex);
@@ -119,7 +149,10 @@ void remove_unfinished_files() noexcept {
   try {
     const std::unique_lock lock(unfinished().mutex, std::chrono::seconds(1));
     if (!lock.owns_lock()) return;
-    for (const std::string& path : unfinished().paths) ::unlink(path.c_str());
+    for (const std::string& path : unfinished().paths) {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
   } catch (...) {
   }
 }

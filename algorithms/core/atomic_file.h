@@ -26,11 +26,29 @@ class AtomicFile {
   bool committed_ = false;
 };
 
+/// The same for a folder of files: write into path(), then commit().
+class AtomicFolder {
+ public:
+  /// @throws Error if the parent folder does not exist or cannot be written, or if `target` is there and is no empty folder.
+  explicit AtomicFolder(std::filesystem::path target);
+  ~AtomicFolder();
+  AtomicFolder(const AtomicFolder&) = delete;
+  AtomicFolder& operator=(const AtomicFolder&) = delete;
+
+  const std::filesystem::path& path() const { return temporary_; }
+  /// @throws Error if the rename fails.
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+  bool committed_ = false;
+};
+
 /// Both or neither: if the second cannot be renamed, the first target holds again what it held, or nothing.
 /// @throws Error as commit() does.
 void commit_together(AtomicFile& first, AtomicFile& second);
 
-/// Removes the temporary files of every AtomicFile that is still open. For the moment before a process ends
+/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open. For the moment before a process ends
 /// itself.
 void remove_unfinished_files() noexcept;
 

@@ -108,5 +108,27 @@ TEST_F(AtomicFileTest, WritesThroughLinksAndNotOverDevices) {
   EXPECT_THROW(AtomicFile(folder / ""), Error);
 }
 
+TEST_F(AtomicFileTest, AFolderComesWholeOrNotAtAll) {
+  {
+    AtomicFolder given_up(folder / "out");
+    write(given_up.path() / "a.txt", "a");
+    EXPECT_FALSE(fs::exists(folder / "out"));
+  }
+  EXPECT_TRUE(fs::is_empty(folder));
+  {
+    AtomicFolder ended(folder / "out");
+    write(ended.path() / "a.txt", "a");
+    std::thread(remove_unfinished_files).join();
+    EXPECT_TRUE(fs::is_empty(folder));
+    EXPECT_THROW(ended.commit(), Error);
+  }
+  AtomicFolder kept((folder / "out").string() + "/");
+  write(kept.path() / "a.txt", "a");
+  kept.commit();
+  EXPECT_TRUE(fs::exists(folder / "out" / "a.txt"));
+  EXPECT_THROW(AtomicFolder(folder / "out"), Error);  // it is not empty
+  EXPECT_THROW(AtomicFolder(folder / "missing" / "out"), Error);
+}
+
 }  // namespace
 }  // namespace hermesh

@@ -64,7 +64,7 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
 /// that cost. Reading the file back gives the same double positions, and the same PolygonMesh bit for bit
 /// wherever the sums origin + point are exact in double precision: always where the origin is 0, and as long
 /// as a point's last bit is at least 2^-52 of its distance from 0. A PLY keeps the attributes
-/// of points, colours as bytes; the other formats keep none.
+/// of points and of polygons, colours as bytes, and "uv" of corners; the other formats keep none.
 /// @throws Error for an unknown extension or a path that cannot be written.
 void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
 

@@ -126,18 +126,32 @@ std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
   return names;
 }
 
-/// Of the attributes those of points; PLY as others read it has no place for the rest.
-std::vector<PlyAttribute> ply_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
-  std::vector<PlyAttribute> result;
+/// By the element that they are properties of. Of corners PLY as others read it has a place for texture coordinates alone.
+struct PlyAttributes {
+  std::vector<PlyAttribute> points, polygons;
+  const MeshAttribute* corner_uv = nullptr;
+};
+
+PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
+  PlyAttributes result;
+  const std::size_t polygons = mesh.triangles.size() + mesh.quads.size();
+  const std::array<std::size_t, 3> elements = {mesh.points.size(), 3 * mesh.triangles.size() + 4 * mesh.quads.size(),
+                                               polygons};
   for (const MeshAttribute& attribute : mesh.attributes) {
     const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
-    if (attribute.domain != AttributeDomain::point ||
-        values != mesh.points.size() * static_cast<std::size_t>(attribute.components)) {
-      context.note(in_quotes(file) + ": the attribute " + attribute.name + " is not one of points and was left out");
+    const bool fits = values == elements[static_cast<std::size_t>(attribute.domain)] *
+                                    static_cast<std::size_t>(attribute.components);
+    const bool uv = attribute.name == "uv" && attribute.components == 2 && attribute.values.index() == 0;
+    if (!fits || (attribute.domain == AttributeDomain::corner && !uv)) {
+      context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name + ", which was left out");
       continue;
     }
     const bool bytes = attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
-    result.push_back({attribute, ply_properties(attribute), bytes});
+    if (attribute.domain == AttributeDomain::corner)
+      result.corner_uv = &attribute;
+    else
+      (attribute.domain == AttributeDomain::point ? result.points : result.polygons)
+          .push_back({attribute, ply_properties(attribute), bytes});
   }
   return result;
 }
@@ -149,31 +163,47 @@ void write_ply_value(Output& out, const PlyAttribute& from, std::size_t i) {
   out.binary(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f))));
 }
 
-void write_ply(Output& out, const MeshFile& mesh, const std::vector<PlyAttribute>& attributes) {
+void declare_ply_properties(Output& out, const std::vector<PlyAttribute>& attributes) {
+  for (const PlyAttribute& each : attributes)
+    for (const std::string& name : each.properties)
+      out.text(std::string("property ") + (each.bytes ? "uchar " : each.attribute.values.index() == 1 ? "int " : "float ") +
+               name + "\n");
+}
+
+void write_ply_values(Output& out, const std::vector<PlyAttribute>& attributes, std::size_t element) {
+  for (const PlyAttribute& each : attributes)
+    for (std::size_t j = 0; j < each.properties.size(); ++j)
+      write_ply_value(out, each, element * each.properties.size() + j);
+}
+
+void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attributes) {
   const bool single = fits_single_precision(mesh);
   const std::string type = single ? "float" : "double";
   out.text("ply\nformat binary_little_endian 1.0\n");
   if (mesh.origin) write_numbers(out, "comment origin", *mesh.origin);
   out.text("element vertex " + std::to_string(mesh.points.size()) + "\n");
   for (const char* axis : {" x\n", " y\n", " z\n"}) out.text("property " + type + axis);
-  for (const PlyAttribute& each : attributes)
-    for (const std::string& name : each.properties)
-      out.text(std::string("property ") + (each.bytes ? "uchar " : each.attribute.values.index() == 1 ? "int " : "float ") +
-               name + "\n");
+  declare_ply_properties(out, attributes.points);
   out.text("element face " + std::to_string(mesh.triangles.size() + mesh.quads.size()) + "\n");
   // Most programs know signed indices only.
-  out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\nend_header\n"
-                                            : "property list uchar uint vertex_indices\nend_header\n");
+  out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\n"
+                                            : "property list uchar uint vertex_indices\n");
+  declare_ply_properties(out, attributes.polygons);
+  if (attributes.corner_uv) out.text("property list uchar float texcoord\n");
+  out.text("end_header\n");
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     for (const double x : mesh.points[i]) single ? out.binary(static_cast<float>(x)) : out.binary(x);
-    for (const PlyAttribute& each : attributes)
-      for (std::size_t j = 0; j < each.properties.size(); ++j)
-        write_ply_value(out, each, i * each.properties.size() + j);
+    write_ply_values(out, attributes.points, i);
   }
+  std::size_t number = 0, uv = 0;
   const auto write_polygons = [&](const auto& polygons) {
     for (const auto& polygon : polygons) {
       out.binary(static_cast<std::uint8_t>(polygon.size()));
       for (const std::uint32_t corner : polygon) out.binary(corner);
+      write_ply_values(out, attributes.polygons, number++);
+      if (!attributes.corner_uv) continue;
+      out.binary(static_cast<std::uint8_t>(2 * polygon.size()));
+      for (std::size_t i = 0; i < 2 * polygon.size(); ++i) out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
     }
   };
   write_polygons(mesh.triangles);

@@ -67,6 +67,7 @@ int run_program(int argc, char** argv) {
   add_import(app, session);
   add_conversions(app, session);
   add_combine(app, session);
+  add_fracture(app, session);
   add_validate(app, session);
   add_info(app, session);
   add_experiments(app, session);

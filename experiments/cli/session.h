@@ -46,6 +46,7 @@ void add_voxelize(CLI::App& app, Session& session);
 void add_import(CLI::App& app, Session& session);
 void add_conversions(CLI::App& app, Session& session);  ///< extract, remesh
 void add_combine(CLI::App& app, Session& session);
+void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_experiments(CLI::App& app, Session& session);  ///< run, report

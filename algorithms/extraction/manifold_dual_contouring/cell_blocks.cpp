@@ -6,7 +6,8 @@
 
 namespace hermesh {
 
-CellBlocks::CellBlocks(const HermiteView& grid, RunContext& context) : grid_(grid), blocks_(grid.blocks().size()) {
+CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
+    : grid_(grid), cuts_(grid.cuts()), blocks_(grid.blocks().size()) {
   Stage stage(context, "find cells");
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
@@ -19,11 +20,12 @@ CellBlocks::CellBlocks(const HermiteView& grid, RunContext& context) : grid_(gri
   parallel_blocks(n, context, [&](std::size_t b) {
     Block& block = blocks_[b];
     const std::array<BlockMask, 8> signs = corner_signs(static_cast<std::int32_t>(b));
+    block.joints = cells_with_cuts(static_cast<std::int32_t>(b));
     std::uint32_t before = 0;
     for (int word = 0; word < 8; ++word) {
       std::uint64_t all = ~std::uint64_t{0}, some = 0;
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
-      block.active[word] = some & ~all;
+      block.active[word] = (some & ~all) | block.joints[word];
       block.rank[word] = before;
       before += static_cast<std::uint32_t>(std::popcount(block.active[word]));
     }
@@ -33,7 +35,7 @@ CellBlocks::CellBlocks(const HermiteView& grid, RunContext& context) : grid_(gri
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
       found[b].push_back(static_cast<std::uint8_t>(code));
-      const int sheets = kCellSheets[code].sheets;
+      const int sheets = test(block.joints, cell) ? 1 : kCellSheets[code].sheets;
       if (sheets > 1) {
         block.several.emplace_back(static_cast<std::uint16_t>(cell), later);
         later = static_cast<std::uint16_t>(later + sheets - 1);
@@ -61,14 +63,37 @@ bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
   return false;
 }
 
-/// Signs of every cell's corners, from its first corner's and the crossings on the way.
+/// A cell has the cuts along an axis that start from its corners of offset 0 there.
+BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
+  static constexpr BlockMask kNone{};
+  BlockMask cells{};
+  if (cuts_.empty()) return cells;
+  const HermiteView::Block& block = grid_.blocks()[b];
+  for (int corner = 0; corner < 7; ++corner)
+    for (int axis = 0; axis < 3; ++axis) {
+      if ((corner >> axis) & 1) continue;
+      const BlockMask edges =
+          shifted_mask(corner & 1, (corner >> 1) & 1, corner >> 2, [&](int ax, int ay, int az) -> const BlockMask& {
+            const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
+            return there >= 0 ? cuts_[there][axis] : kNone;
+          });
+      for (int word = 0; word < 8; ++word) cells[word] |= edges[word];
+    }
+  return cells;
+}
+
+/// Signs of every cell's corners, from its first corner's and the crossings on the way that are no cuts.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   static constexpr BlockMask kNone{};
   const HermiteView::Block& block = grid_.blocks()[b];
   const auto crossed = [&](int axis, int dx, int dy, int dz) {
-    return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) -> const BlockMask& {
+    return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) -> BlockMask {
       const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
-      return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
+      if (there < 0) return kNone;
+      BlockMask edges = grid_.blocks()[there].crossing[axis];
+      if (!cuts_.empty())
+        for (int word = 0; word < 8; ++word) edges[word] &= ~cuts_[there][axis][word];
+      return edges;
     });
   };
   std::array<BlockMask, 8> signs;
@@ -122,7 +147,8 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
     const Cell cell = locate(edge.block, at[0], at[1], at[2]);
     result.cells[i] = cell;
     result.sheets[i] = &sheets(cell.block, cell.cell);
-    result.points[i] = point(cell.block, cell.cell, result.sheets[i]->sheet_of[edge_in(edge.axis, i)]);
+    const bool joint = is_joint(cell.block, cell.cell);
+    result.points[i] = point(cell.block, cell.cell, joint ? 0 : result.sheets[i]->sheet_of[edge_in(edge.axis, i)]);
   }
   return result;
 }

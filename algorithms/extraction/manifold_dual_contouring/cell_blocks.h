@@ -1,9 +1,16 @@
-// The cells of Hermite data by block, with their sheets, points and edges by number.
+// The cells of a lattice by block, with their sheets, points and edges by number.
+//
+// The lattice is that of Hermite data, or one whose inside is divided among several pieces (algorithms/fracture/): then
+// an edge is crossed, too, whose ends are both inside, but in different pieces. Such an edge is a *cut*. A cell without
+// a cut is as in Hermite data: kCellSheets tells its sheets from the inside bits of its corners. A cell with a cut is a
+// *joint*: it has one point, which all its crossing edges share. Who makes such a lattice sees to it that the corners of
+// a joint that are in one piece, and those outside, are each cut off by a single loop (fracture/label_repair.h).
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
@@ -19,6 +26,19 @@ inline std::uint32_t rank_in(const BlockMask& mask, int sample) {
          static_cast<std::uint32_t>(std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1)));
 }
 
+/// What the cells are made from.
+class CellGrid {
+ public:
+  virtual ~CellGrid() = default;
+  /// Of a block whose `leaf` is −1 the signs are unknown, but one and the same.
+  virtual const std::vector<HermiteView::Block>& blocks() const = 0;
+  virtual const IndexToWorld& placement() const = 0;
+  /// Of an edge that is crossed.
+  virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
+  /// By block and axis those crossing edges that are cuts; empty where there are none.
+  virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
+};
+
 class CellBlocks {
  public:
   /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
@@ -28,6 +48,7 @@ class CellBlocks {
   struct Block {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
+    BlockMask joints{};  ///< of these, those with a cut
     std::uint32_t first_point = 0, first_code = 0;
     std::array<std::uint32_t, 8> rank{};  ///< active cells before each word
     /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
@@ -49,14 +70,21 @@ class CellBlocks {
     int axis;
   };
 
-  CellBlocks(const HermiteView& grid, RunContext& context);
+  CellBlocks(const CellGrid& grid, RunContext& context);
 
   std::size_t size() const { return blocks_.size(); }
   const Block& operator[](std::int32_t block) const { return blocks_[block]; }
-  const HermiteView& grid() const { return grid_; }
+  const CellGrid& grid() const { return grid_; }
   std::size_t point_count() const { return points_; }
 
+  /// By the inside bits of the corners: of a joint it tells the segments on faces without a cut, and that no face is
+  /// explicit for the joint's own sake, for it has one sheet (or none, all corners being inside) and no ambiguous face.
   const CellSheets& sheets(std::int32_t block, int cell) const { return kCellSheets[codes_[code_at(block, cell)]]; }
+  bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
+  /// Points of an active cell.
+  int point_count(std::int32_t block, int cell) const {
+    return is_joint(block, cell) ? 1 : sheets(block, cell).sheets;
+  }
   std::uint32_t point(std::int32_t block, int cell, int sheet) const;
   /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;
@@ -65,6 +93,9 @@ class CellBlocks {
             sample_index(x & 7, y & 7, z & 7)};
   }
   Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
+  bool is_crossed(const Edge& edge) const {
+    return edge.block >= 0 && test(grid_.blocks()[edge.block].crossing[edge.axis], edge.sample);
+  }
   Eigen::Vector3d crossing_point(const Edge& edge) const;
   Around around(const Edge& edge) const;
 
@@ -103,8 +134,10 @@ class CellBlocks {
   }
   bool sign_of_added(const HermiteView::Block& block) const;
   std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
+  BlockMask cells_with_cuts(std::int32_t block) const;
 
-  const HermiteView& grid_;
+  const CellGrid& grid_;
+  const std::span<const std::array<BlockMask, 3>> cuts_;
   std::vector<Block> blocks_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;

@@ -7,7 +7,6 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
-#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 
 namespace hermesh {
 namespace {
@@ -27,9 +26,9 @@ double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 
 class Contourer {
  public:
-  Contourer(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
-            RunContext& context)
-      : cells_(grid, context), options_(options), file_(file), wishes_(cells_.size()), edges_(cells_.size()) {}
+  Contourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file, RunContext& context,
+            PolygonEdges* numbers)
+      : numbers_(numbers), cells_(grid, context), options_(options), file_(file), wishes_(cells_.size()), edges_(cells_.size()) {}
 
   UniformMesh run(RunContext& context) {
     UniformMesh mesh;
@@ -58,28 +57,32 @@ class Contourer {
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       for_each_bit(cells_[block].active, [&](int cell) {
-        const CellSheets& sheets = cells_.sheets(block, cell);
-        several[b] += sheets.sheets > 1;
-        for (int sheet = 0; sheet < sheets.sheets; ++sheet)
+        const int sheets = cells_.point_count(block, cell);
+        several[b] += sheets > 1;
+        for (int sheet = 0; sheet < sheets; ++sheet)
           mesh.points[cells_.point(block, cell, sheet)] = file_.rounded(place(block, cell, sheet, sheets));
       });
     });
     for (std::size_t b = 0; b < cells_.size(); ++b) {
       mesh.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
+      mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
       mesh.several_sheets += several[b];
     }
   }
 
   /// Within the cell, and noted if it would be better off outside. With several sheets the mean of the loop's crossings:
   /// in their hull.
-  Vector3d place(std::int32_t block, int cell, int sheet, const CellSheets& sheets) {
+  Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
+    const CellSheets& loops = cells_.sheets(block, cell);
+    const bool joint = cells_.is_joint(block, cell);
     const Vector3d corner = cells_.corner(block, cell);
     Qef qef(corner + Vector3d::Constant(0.5));
     Vector3d sum = Vector3d::Zero();
     int crossings = 0;
     for (int edge = 0; edge < 12; ++edge) {
-      if (sheets.sheet_of[edge] != sheet) continue;
+      if (!joint && loops.sheet_of[edge] != sheet) continue;
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
+      if (joint && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
       const Vector3d point = cells_.crossing_point(at);
       const auto& n = crossing.normal;
@@ -87,7 +90,7 @@ class Contourer {
       sum += point;
       ++crossings;
     }
-    if (sheets.sheets > 1 || options_.placement == DualContouringOptions::Placement::average) return sum / crossings;
+    if (sheets > 1 || options_.placement == DualContouringOptions::Placement::average) return sum / crossings;
     return best_place(block, cell, qef, corner);
   }
 
@@ -195,6 +198,41 @@ class Contourer {
       edges_[b].first_triangle = static_cast<std::uint32_t>(triangles[b]);
     }
     parallel_blocks(blocks, context, [&](std::size_t b) { fill(static_cast<std::int32_t>(b), mesh); });
+    if (numbers_) number_polygons(mesh, context);
+  }
+
+  /// Blocks count their crossing edges in the order in which fill() makes the polygons.
+  void number_polygons(const UniformMesh& mesh, RunContext& context) {
+    std::vector<std::uint64_t> first(cells_.size());
+    for (std::size_t b = 0; b < cells_.size(); ++b)
+      for (const BlockMask& edges : cells_.grid().blocks()[b].crossing) first[b] += static_cast<std::uint64_t>(count(edges));
+    exclusive_scan(first, "edge crossings");
+    numbers_->quads.resize(mesh.quads.size());
+    numbers_->triangles.resize(mesh.triangles.size());
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      auto number = static_cast<std::uint32_t>(first[b]);
+      std::uint32_t* quad = numbers_->quads.data() + edges_[b].first_quad;
+      std::uint32_t* triangle = numbers_->triangles.data() + edges_[b].first_triangle;
+      cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
+        if (test(edges_[b].fanned[edge.axis], edge.sample))
+          for (int left = fan_size(edge, cells_.around(edge)); left > 0; --left) *triangle++ = number;
+        else
+          *quad++ = number;
+        ++number;
+      });
+    });
+  }
+
+  /// Triangles of a fanned edge: 0 where the other ends of its segments speak for all of them.
+  int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const {
+    int made = 0;
+    for (int i = 0; i < 4; ++i) {
+      if (!cells_.is_explicit(around, i))
+        ++made;
+      else if (cells_.comes_first(edge, cells_.other_end(around, i)))
+        made += 2;
+    }
+    return made;
   }
 
   /// Number of triangles that the edge is fanned into, which is 0 where the other ends of its segments speak for them;
@@ -202,16 +240,12 @@ class Contourer {
   std::optional<int> decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points) {
     BlockEdges& edges = edges_[edge.block];
     const CellBlocks::Around around = cells_.around(edge);
-    int made = 0, explicit_faces = 0;
-    for (int i = 0; i < 4; ++i) {
-      if (!cells_.is_explicit(around, i)) continue;
-      ++explicit_faces;
-      if (cells_.comes_first(edge, cells_.other_end(around, i))) made += 2;
-    }
-    const int diagonal = explicit_faces > 0 ? -1 : safe_diagonal(edge, around, points);
+    bool any_explicit = false;
+    for (int i = 0; i < 4; ++i) any_explicit = any_explicit || cells_.is_explicit(around, i);
+    const int diagonal = any_explicit ? -1 : safe_diagonal(edge, around, points);
     if (diagonal < 0) {
       set(edges.fanned[edge.axis], edge.sample);
-      return made + 4 - explicit_faces;
+      return fan_size(edge, around);
     }
     if (diagonal == 1) set(edges.second_diagonal[edge.axis], edge.sample);
     return std::nullopt;
@@ -317,6 +351,7 @@ class Contourer {
     });
   }
 
+  PolygonEdges* const numbers_;
   CellBlocks cells_;
   const DualContouringOptions options_;
   const FilePoints& file_;
@@ -324,11 +359,30 @@ class Contourer {
   std::vector<BlockEdges> edges_;
 };
 
+/// Hermite data have no cuts.
+class HermiteCells : public CellGrid {
+ public:
+  explicit HermiteCells(const HermiteView& view) : view_(view) {}
+  const std::vector<HermiteView::Block>& blocks() const override { return view_.blocks(); }
+  const IndexToWorld& placement() const override { return view_.placement(); }
+  EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override {
+    return view_.crossing(block, sample, axis);
+  }
+
+ private:
+  const HermiteView& view_;
+};
+
 }  // namespace
 
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context) {
-  return Contourer(grid, options, file, context).run(context);
+  return uniform_mesh(HermiteCells(grid), options, file, context);
+}
+
+UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
+                         RunContext& context, PolygonEdges* edges) {
+  return Contourer(grid, options, file, context, edges).run(context);
 }
 
 }  // namespace hermesh

@@ -17,6 +17,12 @@
 //                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
 //                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
 //                  This is the last resort, and is counted.
+//
+// None of this asks what lies on the two sides of a crossing edge, so it holds, too, for a lattice whose inside is
+// divided among pieces (cell_blocks.h): the polygons of all pieces together, each seam between two pieces once, meet at
+// most in shared edges and points. A joint has one point strictly inside it and no explicit face of its own; a face
+// between a joint and a cell of several sheets is without a cut, so it holds one segment, and the joint's part of the
+// surface beside that segment is the triangle of it and the joint's point, within the joint's tetrahedra at that face.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,6 +31,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
 #include "algorithms/hermite/hermite_view.h"
 
@@ -36,6 +43,7 @@ struct UniformMesh {
   std::vector<Triangle> triangles;
 
   std::uint64_t cells = 0;           ///< that the surface passes through
+  std::uint64_t joints = 0;          ///< of these: with a cut (cell_blocks.h)
   std::uint64_t several_sheets = 0;  ///< of these: coned over explicit segments
   std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
   std::uint64_t escaped = 0;         ///< points outside their cells
@@ -46,5 +54,14 @@ struct UniformMesh {
 /// its cell. @throws Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context);
+
+/// The edge that each polygon belongs to, numbered by block, axis and sample among the crossing edges.
+struct PolygonEdges {
+  std::vector<std::uint32_t> quads, triangles;
+};
+
+/// The same of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the edge's second sample.
+UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
+                         RunContext& context, PolygonEdges* edges = nullptr);
 
 }  // namespace hermesh

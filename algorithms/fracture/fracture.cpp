@@ -1,0 +1,160 @@
+#include "algorithms/fracture/fracture.h"
+
+#include <algorithm>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/fracture/joint_decimation.h"
+
+namespace hermesh {
+namespace {
+
+/// Until no sliver is left that can be merged: a repair may leave new ones, and a merge may call for a
+/// repair. Should that not end soon, the last slivers stay pieces.
+void settle(LabelledSolid& solid, const FractureOptions& options, LabelledFracture& result,
+            RunContext& context) {
+  constexpr int kPasses = 6;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const bool last = pass + 1 == kPasses;
+    ComponentReport found =
+        settle_components(solid, {options.split, last ? 0 : options.least_samples}, context);
+    result.merged.insert(result.merged.end(), found.merged.begin(), found.merged.end());
+    result.split_off += found.split_off;
+    result.small_kept = found.small_kept;
+    if (pass > 0 && found.merged.empty()) return;
+    const RepairReport repaired = repair_labels(solid, context);
+    result.repair.cells += repaired.cells;
+    result.repair.changed_samples += repaired.changed_samples;
+    result.repair.forced_changes += repaired.forced_changes;
+    if (last) settle_components(solid, {options.split, 0}, context);
+  }
+}
+
+std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const LabelField& field,
+                                         std::size_t numbers) {
+  std::vector<std::uint64_t> result(numbers);
+  for (std::size_t b = 0; b < solid.blocks.size(); ++b) {
+    const auto block = static_cast<std::int32_t>(b);
+    if (field.is_uniform(block))
+      result[field(block, 0)] += 512;
+    else
+      for (int i = 0; i < 512; ++i) ++result[field(block, i)];
+  }
+  return result;
+}
+
+bool meets(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
+  for (const HermiteView::Block& block : solid.blocks) {
+    const std::optional<BlockMask> mask = cutters.signs(cutter, block.lower);
+    if (!mask) return false;
+    for (int word = 0; word < 8; ++word)
+      if ((*mask)[word] & block.inside[word]) return true;
+  }
+  return false;
+}
+
+/// Whether a lattice edge leads from the solid into the cutter.
+bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
+  for (const HermiteView::Block& block : solid.blocks) {
+    const auto own = cutters.signs(cutter, block.lower);
+    if (!own) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto step = [axis](int a) { return a == axis ? 1 : 0; };
+      const std::int32_t next = block.neighbours[neighbour_slot(step(0), step(1), step(2))];
+      Cutters::At lower = block.lower;
+      lower[axis] += 8;
+      const BlockMask upper_cutter = *cutters.signs(cutter, lower);
+      const BlockMask upper_solid =
+          next < 0 ? BlockMask{} : solid.blocks[static_cast<std::size_t>(next)].inside;
+      const auto shifted = [&](const BlockMask& mask, const BlockMask& upper) {
+        return shifted_mask(step(0), step(1), step(2), [&](int x, int y, int z) -> const BlockMask& {
+          return x + y + z > 0 ? upper : mask;
+        });
+      };
+      const BlockMask after = shifted(*own, upper_cutter), solid_after = shifted(block.inside, upper_solid);
+      for (int word = 0; word < 8; ++word)
+        if ((block.inside[word] & after[word]) | ((*own)[word] & solid_after[word])) return true;
+    }
+  }
+  return false;
+}
+
+CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
+                             const CutterRecord& record) {
+  using State = CutterRecord::State;
+  if (cutters.is_empty(cutter)) return State::empty;
+  if (record.edges > 0) return State::cuts;
+  if (record.samples > 0) return record.samples == solid.samples ? State::swallows : State::takes;
+  if (meets(solid, cutters, cutter)) return State::covered;
+  return lies_beside(solid, cutters, cutter) ? State::touches : State::misses;
+}
+
+std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledGrid& grid,
+                                     const Cutters& cutters) {
+  std::vector<CutterRecord> records(cutters.count());
+  for (std::size_t e = 0; e < grid.edge_count(); ++e)
+    if (const std::int32_t cutter = grid.sides(e).cutter; cutter >= 0)
+      ++records[static_cast<std::size_t>(cutter)].edges;
+  const bool codes_are_cutters = !cutters.plane_sides();
+  const std::vector<std::uint64_t> taken = count_samples(solid, solid.codes, solid.code_values.size() + 1);
+  if (codes_are_cutters)
+    for (std::size_t i = 0; i < solid.code_values.size(); ++i)
+      if (solid.code_values[i] < records.size()) records[solid.code_values[i]].samples = taken[i + 1];
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    records[k].name = cutters.name(k);
+    // A wall between two cells carries the lower one's number, so a cell may cut without an edge of its own.
+    const bool cell = codes_are_cutters && !cutters.signs(k, {});
+    if (cell && records[k].samples > 0 && records[k].samples < solid.samples)
+      records[k].state = CutterRecord::State::cuts;
+    else
+      records[k].state = state_of(solid, cutters, k, records[k]);
+  }
+  return records;
+}
+
+}  // namespace
+
+const char* to_string(CutterRecord::State state) {
+  static constexpr const char* kNames[] = {"cuts",    "takes",  "swallows", "covered",
+                                           "touches", "misses", "empty"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+const char* in_words(CutterRecord::State state) {
+  static constexpr const char* kWords[] = {"cuts the object",
+                                           "takes whole parts of the object and cuts none",
+                                           "swallows the object: it takes all of it in one piece",
+                                           "takes nothing: the cutters before it took all that it holds",
+                                           "takes nothing: it only touches the object",
+                                           "takes nothing: it misses the object",
+                                           "takes nothing: it is empty, or too thin to hold a sample"};
+  return kWords[static_cast<std::size_t>(state)];
+}
+
+LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cutters,
+                                   const FractureOptions& options, RunContext& context) {
+  LabelledSolid solid = whole_solid(object, context);
+  if (solid.samples == 0)
+    throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
+  LabelledFracture result;
+  label_by_codes(solid, cutters, context);
+  settle(solid, options, result, context);
+  const LabelledGrid grid(solid, object, cutters, context);
+  result.made_up_crossings = grid.made_up();
+  result.grid_bytes = grid.memory_bytes();
+  for (std::size_t e = 0; e < grid.edge_count(); ++e) result.cut_edges += grid.sides(e).front > 0;
+  result.cutters = records_of(solid, grid, cutters);
+  result.mesh = joint_mesh(grid, options.placement, context);
+  decimate_joint_mesh(result.mesh, options.tolerance, context);
+  result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());
+  result.samples = count_samples(solid, solid.labels, solid.piece_count() + 1);
+  result.samples[0] = 0;
+  result.names.resize(1);
+  result.codes.resize(1);
+  for (std::uint32_t piece = 1; piece <= solid.piece_count(); ++piece) {
+    result.codes.push_back(solid.code_values[solid.code_of[piece] - 1]);
+    result.names.push_back(cutters.name_of(result.codes.back()));
+  }
+  return result;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,41 @@
+// Pieces that fall apart become several, and slivers go to a neighbour.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/core/run_context.h"
+#include "algorithms/fracture/labelled_solid.h"
+
+namespace hermesh {
+
+struct ComponentOptions {
+  /// Samples of one piece that hang together by no lattice edge become several pieces; else a piece may have
+  /// several closed surfaces.
+  bool split = true;
+  /// In voxels, that is samples: whatever is smaller joins the neighbour that it shares most lattice edges
+  /// with (the lowest of equals), the smallest first. 0 keeps everything.
+  std::uint64_t least_samples = 0;
+};
+
+/// A piece that was given to another one.
+struct MergedSliver {
+  std::uint32_t code;  ///< as in LabelledSolid::codes
+  std::uint64_t samples;
+  std::uint32_t into_code;
+};
+
+struct ComponentReport {
+  std::vector<MergedSliver> merged;
+  std::uint64_t split_off = 0;   ///< pieces more than codes, before any was merged
+  std::uint64_t small_kept = 0;  ///< below the least volume, but without a neighbour
+};
+
+/// Numbers the pieces anew, 1 to n without a gap, by their code and then by their first sample.
+///
+/// **Splitting keeps every cell simple** (label_repair.h). In a simple joint the corners of a piece hang
+/// together by the cell's own edges, so they stay one piece; in a cell without a cut no cut appears, for two
+/// corners of one edge hang together. Merging may not, so the labels are to be repaired after it.
+ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& options, RunContext& context);
+
+}  // namespace hermesh

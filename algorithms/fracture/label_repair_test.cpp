@@ -1,0 +1,132 @@
+#include "algorithms/fracture/label_repair.h"
+
+#include <gtest/gtest.h>
+
+#include "algorithms/fracture/label_components.h"
+#include "algorithms/fracture/noise.h"
+#include "algorithms/hermite/test_lattice.h"
+
+namespace hermesh {
+namespace {
+
+/// Any function of the sample as code, without surfaces.
+class CodeFunction : public Cutters {
+ public:
+  explicit CodeFunction(std::function<CutCode(int, int, int)> code) : code_(std::move(code)) {}
+  void codes(const At& lower, std::span<CutCode, 512> codes) const override {
+    for (int i = 0; i < 512; ++i)
+      codes[static_cast<std::size_t>(i)] =
+          code_(lower[0] + (i >> 6), lower[1] + ((i >> 3) & 7), lower[2] + (i & 7));
+  }
+  std::optional<CutCrossing> crossing(const At&, int, CutCode, CutCode) const override {
+    return std::nullopt;
+  }
+  std::size_t count() const override { return 0; }
+  std::string name(std::size_t) const override { return ""; }
+  std::string name_of(CutCode) const override { return ""; }
+  std::optional<Eigen::Vector3d> plane_between(CutCode, CutCode) const override { return std::nullopt; }
+
+ private:
+  std::function<CutCode(int, int, int)> code_;
+};
+
+LabelledSolid labelled(const Solid& solid, std::function<CutCode(int, int, int)> code) {
+  RunContext context;
+  LabelledSolid result = whole_solid(to_sparse(sample_solid(solid)), context);
+  label_by_codes(result, CodeFunction(std::move(code)), context);
+  return result;
+}
+
+template <class F>
+void for_each_cell(const LabelledSolid& solid, F&& f) {
+  for (std::int32_t b = 0; b < static_cast<std::int32_t>(solid.blocks.size()); ++b)
+    for (int cell = 0; cell < 512; ++cell) {
+      CornerLabels labels;
+      for (int c = 0; c < 8; ++c)
+        labels[c] =
+            solid.label(b, (cell >> 6) + (c & 1), ((cell >> 3) & 7) + ((c >> 1) & 1), (cell & 7) + (c >> 2));
+      f(labels);
+    }
+}
+
+TEST(LabelRepair, TellsSimpleCells) {
+  // Corner c has the offsets (c & 1, c >> 1 & 1, c >> 2).
+  EXPECT_TRUE(is_simple({1, 1, 1, 1, 1, 1, 1, 1}));
+  EXPECT_TRUE(is_simple({1, 2, 1, 2, 1, 2, 1, 2}));   // a wall across x
+  EXPECT_TRUE(is_simple({1, 2, 3, 4, 1, 2, 3, 4}));   // four pieces along an edge
+  EXPECT_TRUE(is_simple({1, 2, 1, 2, 0, 0, 0, 0}));   // a wall that ends at the original surface
+  EXPECT_FALSE(is_simple({1, 2, 2, 1, 1, 2, 2, 1}));  // faces alternate between 1 and 2
+  EXPECT_FALSE(is_simple({1, 2, 2, 2, 2, 2, 2, 1}));  // 1 at two opposite corners: two loops
+  EXPECT_FALSE(is_simple({1, 2, 0, 0, 0, 0, 2, 2}));  // the outside is cut in two around 2 … and a cut
+  EXPECT_TRUE(is_simple({1, 0, 0, 2, 0, 0, 0, 0}));   // no cut: the sheets of a cell without one serve
+  EXPECT_FALSE(has_cut({1, 0, 0, 2, 0, 0, 0, 0}));
+  EXPECT_TRUE(has_cut({1, 2, 0, 0, 0, 0, 0, 0}));
+}
+
+TEST(LabelRepair, EndsOnNoiseAndTouchesNoOutside) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 6; ++trial) {
+    const CutCode kinds = 2 + static_cast<CutCode>(trial);
+    LabelledSolid solid = labelled(random_blobs(random), [&](int x, int y, int z) {
+      return hashed(static_cast<std::uint64_t>(x * 1000003 + y * 1009 + z)) % kinds;
+    });
+    const std::vector<HermiteView::Block> before = solid.blocks;
+    RunContext context;
+    const RepairReport report = repair_labels(solid, context);
+    EXPECT_GT(report.changed_samples, 0u);
+    for_each_cell(solid, [](const CornerLabels& labels) { ASSERT_TRUE(is_simple(labels)); });
+    for (std::int32_t b = 0; b < static_cast<std::int32_t>(before.size()); ++b)
+      for (int i = 0; i < 512; ++i)
+        ASSERT_EQ(solid.labels(b, i) > 0, test(before[static_cast<std::size_t>(b)].inside, i));
+    // What is simple stays so when pieces are split.
+    settle_components(solid, {.split = true, .least_samples = 0}, context);
+    for_each_cell(solid, [](const CornerLabels& labels) { ASSERT_TRUE(is_simple(labels)); });
+  }
+}
+
+TEST(LabelRepair, LeavesAPlaneWallAlone) {
+  LabelledSolid solid =
+      labelled(box(10, 10, 10, 8.5, 8.5, 8.5), [](int x, int y, int) { return x + y > 20 ? 1u : 0u; });
+  RunContext context;
+  EXPECT_EQ(repair_labels(solid, context).changed_samples, 0u);
+}
+
+TEST(LabelComponents, SplitWhatHangsTogetherNowhere) {
+  const Solid two = joined({ball(4, 10, 10, 3.2), ball(16, 10, 10, 3.2)});
+  for (const bool split : {true, false}) {
+    LabelledSolid solid = labelled(two, [](int, int, int) { return 7u; });
+    RunContext context;
+    const ComponentReport report = settle_components(solid, {split, 0}, context);
+    EXPECT_EQ(solid.piece_count(), split ? 2u : 1u);
+    EXPECT_EQ(report.split_off, split ? 1u : 0u);
+    EXPECT_EQ(solid.code_of[1], 1u);
+  }
+}
+
+TEST(LabelComponents, SliversJoinTheNeighbourThatTheyShareMostWith) {
+  // Of the box 2 … 18 the layer x = 2 is a sliver between nothing and what is behind it; half of it is 16 ×
+  // 16 samples.
+  LabelledSolid solid = labelled(box(10, 10, 10, 8.5, 8.5, 8.5), [](int x, int y, int) -> CutCode {
+    if (x == 2 && y < 5) return 9;  // 3 × 17 samples beside code 1, 17 beside code 2
+    return x == 2 ? 2 : 1;
+  });
+  RunContext context;
+  const ComponentReport report = settle_components(solid, {true, 100}, context);
+  ASSERT_EQ(report.merged.size(), 1u);
+  EXPECT_EQ(report.merged[0].samples, 51u);
+  EXPECT_EQ(solid.code_values[report.merged[0].code - 1], 9u);
+  EXPECT_EQ(solid.code_values[report.merged[0].into_code - 1], 1u);
+  EXPECT_EQ(solid.piece_count(), 2u);
+  EXPECT_EQ(report.small_kept, 0u);
+}
+
+TEST(LabelComponents, ASmallPieceWithoutNeighbourIsKept) {
+  LabelledSolid solid = labelled(ball(10, 10, 10, 1.5), [](int, int, int) { return 0u; });
+  RunContext context;
+  const ComponentReport report = settle_components(solid, {true, 1000}, context);
+  EXPECT_EQ(report.small_kept, 1u);
+  EXPECT_EQ(solid.piece_count(), 1u);
+}
+
+}  // namespace
+}  // namespace hermesh

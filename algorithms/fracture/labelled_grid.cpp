@@ -1,0 +1,105 @@
+#include "algorithms/fracture/labelled_grid.h"
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+
+LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
+                           RunContext& context)
+    : solid_(solid), cuts_(solid.blocks.size()), first_(solid.blocks.size()) {
+  const Stage stage(context, "crossings of the cuts");
+  find_edges(context);
+  std::vector<std::uint64_t> made_up(solid.blocks.size());
+  parallel_blocks(solid.blocks.size(), context,
+                  [&](std::size_t b) { made_up[b] = fill_block(b, hermite, cutters); });
+  for (const std::uint64_t n : made_up) made_up_ += n;
+}
+
+void LabelledGrid::find_edges(RunContext& context) {
+  static constexpr int kStep[3] = {81, 9, 1};
+  std::vector<std::uint64_t> counts(solid_.blocks.size());
+  parallel_blocks(solid_.blocks.size(), context, [&](std::size_t b) {
+    auto& crossing = solid_.blocks[b].crossing;
+    crossing = {};
+    cuts_[b] = {};
+    LabelCube cube;
+    if (!gather_labels(solid_, solid_.labels, static_cast<std::int32_t>(b), cube)) return;
+    for (int sample = 0; sample < 512; ++sample) {
+      const int at = 81 * (sample >> 6) + 9 * ((sample >> 3) & 7) + (sample & 7);
+      const std::uint32_t label = cube[static_cast<std::size_t>(at)];
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::uint32_t next = cube[static_cast<std::size_t>(at + kStep[axis])];
+        if (label == next) continue;
+        const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
+        crossing[axis][sample >> 6] |= bit;
+        if (label > 0 && next > 0) cuts_[b][axis][sample >> 6] |= bit;
+      }
+    }
+    for (const BlockMask& edges : crossing) counts[b] += static_cast<std::uint64_t>(count(edges));
+  });
+  const std::uint64_t total = exclusive_scan(counts, "edge crossings");
+  for (std::size_t b = 0; b < counts.size(); ++b) first_[b] = static_cast<std::uint32_t>(counts[b]);
+  crossings_.resize(total);
+  sides_.resize(total);
+}
+
+std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermite, const Cutters& cutters) {
+  const auto block = static_cast<std::int32_t>(b);
+  const std::int32_t leaf = solid_.leaf_of[b];
+  // The original surface's crossings come in the same order as here, with the cuts in between.
+  const EdgeCrossing* original =
+      leaf < 0 ? nullptr : hermite.crossings_of(static_cast<std::size_t>(leaf)).data();
+  std::size_t number = first_[b];
+  std::uint64_t made_up = 0;
+  const auto value = [&](std::uint32_t code) { return solid_.code_values[code - 1]; };
+  for (int axis = 0; axis < 3; ++axis)
+    for_each_bit(solid_.blocks[b].crossing[axis], [&](int sample) {
+      const LabelledSolid::Place next = solid_.locate(
+          block, (sample >> 6) + (axis == 0), ((sample >> 3) & 7) + (axis == 1), (sample & 7) + (axis == 2));
+      const std::uint32_t from = solid_.labels(block, sample), to = solid_.label(next);
+      EdgeSides& sides = sides_[number];
+      EdgeCrossing& crossing = crossings_[number];
+      ++number;
+      sides = from > 0 ? EdgeSides{from, to, -1} : EdgeSides{to, 0, -1};
+      if (!test(cuts_[b][axis], sample)) {
+        crossing = *original++;
+        return;
+      }
+      const std::uint32_t codes[2][2] = {{solid_.codes(block, sample), solid_.codes(next.block, next.sample)},
+                                         {solid_.code_of[from], solid_.code_of[to]}};
+      for (const auto& [first, second] : codes) {
+        if (first == second) continue;
+        const auto found = cutters.crossing(solid_.index(block, sample), axis, value(first), value(second));
+        if (!found) continue;
+        crossing = found->crossing;
+        sides.cutter = found->cutter;
+        return;
+      }
+      ++made_up;
+      if (codes[1][0] != codes[1][1])
+        if (const auto found =
+                cutters.nearest(solid_.index(block, sample), axis, value(codes[1][0]), value(codes[1][1]))) {
+          crossing = found->crossing;
+          sides.cutter = found->cutter;
+          return;
+        }
+      crossing = {0.5f, {}};
+      crossing.normal[axis] = 1.0f;
+    });
+  return made_up;
+}
+
+EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) const {
+  const auto& edges = solid_.blocks[static_cast<std::size_t>(block)].crossing;
+  std::uint32_t number = first_[static_cast<std::size_t>(block)] + rank_in(edges[axis], sample);
+  for (int a = 0; a < axis; ++a) number += static_cast<std::uint32_t>(count(edges[a]));
+  return crossings_[number];
+}
+
+std::size_t LabelledGrid::memory_bytes() const {
+  return crossings_.capacity() * sizeof(EdgeCrossing) + sides_.capacity() * sizeof(EdgeSides) +
+         cuts_.capacity() * sizeof(cuts_[0]) + solid_.blocks.capacity() * sizeof(solid_.blocks[0]) +
+         solid_.labels.memory_bytes() + solid_.codes.memory_bytes();
+}
+
+}  // namespace hermesh

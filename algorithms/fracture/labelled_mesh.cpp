@@ -1,0 +1,97 @@
+#include "algorithms/fracture/labelled_mesh.h"
+
+#include <algorithm>
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+
+JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context) {
+  const FilePoints file(grid.placement());
+  PolygonEdges edges;
+  UniformMesh uniform = uniform_mesh(grid, options, file, context, &edges);
+  const Stage stage(context, "sides of the triangles");
+  JointMesh mesh;
+  mesh.placement = grid.placement();
+  mesh.points = std::move(uniform.points);
+  mesh.joints = uniform.joints;
+  mesh.several_sheets = uniform.several_sheets;
+  mesh.fanned_edges = uniform.fanned_edges;
+  mesh.escaped = uniform.escaped;
+  const std::size_t fanned = uniform.triangles.size(), quads = uniform.quads.size();
+  mesh.triangles = std::move(uniform.triangles);
+  mesh.triangles.resize(fanned + 2 * quads);
+  mesh.sides.resize(mesh.triangles.size());
+  constexpr std::size_t kChunk = 4096;
+  const auto in_chunks = [&](std::size_t n, auto&& f) {
+    parallel_blocks((n + kChunk - 1) / kChunk, context, [&](std::size_t chunk) {
+      for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) f(i);
+    });
+  };
+  in_chunks(fanned, [&](std::size_t i) { mesh.sides[i] = grid.sides(edges.triangles[i]); });
+  in_chunks(quads, [&](std::size_t i) {
+    const Quad& q = uniform.quads[i];
+    mesh.triangles[fanned + 2 * i] = {q[0], q[1], q[2]};
+    mesh.triangles[fanned + 2 * i + 1] = {q[0], q[2], q[3]};
+    mesh.sides[fanned + 2 * i] = mesh.sides[fanned + 2 * i + 1] = grid.sides(edges.quads[i]);
+  });
+  return mesh;
+}
+
+PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : first_(pieces + 2) {
+  for (const EdgeSides& sides : mesh.sides) {
+    ++first_[sides.back];
+    if (sides.front > 0) ++first_[sides.front];
+  }
+  std::size_t sum = 0;
+  for (std::size_t& first : first_) {
+    const std::size_t here = first;
+    first = sum;
+    sum += here;
+  }
+  sides_.resize(sum);
+  std::vector<std::size_t> next = first_;
+  for (std::uint32_t t = 0; t < mesh.sides.size(); ++t) {
+    sides_[next[mesh.sides[t].back]++] = {t, false};
+    if (mesh.sides[t].front > 0) sides_[next[mesh.sides[t].front]++] = {t, true};
+  }
+}
+
+PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Side> triangles) {
+  std::vector<std::uint32_t> used;
+  used.reserve(3 * triangles.size());
+  for (const PieceTriangles::Side& side : triangles)
+    used.insert(used.end(), mesh.triangles[side.triangle].begin(), mesh.triangles[side.triangle].end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+
+  PolygonMesh result;
+  result.origin = mesh.placement.origin;
+  const FilePoints file(mesh.placement);
+  result.points.reserve(used.size());
+  for (const std::uint32_t p : used) result.points.push_back(file.in_file(mesh.points[p]));
+  std::vector<std::int32_t> surface, cutter, neighbour;
+  result.triangles.reserve(triangles.size());
+  const bool mirrors = mesh.placement.mirrors();
+  for (const auto& [number, reversed] : triangles) {
+    Triangle t = mesh.triangles[number];
+    for (std::uint32_t& p : t)
+      p = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), p) - used.begin());
+    if (reversed != mirrors) std::swap(t[1], t[2]);
+    result.triangles.push_back(t);
+    const EdgeSides& sides = mesh.sides[number];
+    surface.push_back(sides.front > 0);
+    cutter.push_back(sides.cutter);
+    const std::uint32_t other = reversed ? sides.back : sides.front;
+    neighbour.push_back(other > 0 ? static_cast<std::int32_t>(other) : -1);
+  }
+  const auto add = [&](const char* name, std::vector<std::int32_t>& values) {
+    result.attributes.push_back({name, AttributeDomain::polygon, 1, std::move(values), {}});
+  };
+  add("surface", surface);
+  add("cutter", cutter);
+  add("neighbour", neighbour);
+  return result;
+}
+
+}  // namespace hermesh

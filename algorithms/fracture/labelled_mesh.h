@@ -1,0 +1,65 @@
+// The joint mesh of all pieces at the finest level: every seam once, with what lies on its two sides.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
+#include "algorithms/fracture/labelled_grid.h"
+
+namespace hermesh {
+
+/// One point for each joint and for each sheet of another cell, and triangles for each crossing edge.
+///
+/// **Guarantees**, if every cell of the grid is simple (label_repair.h): the triangles with a piece on one
+/// side, turned so that it is behind them, are a closed oriented manifold; the triangles of all pieces meet
+/// in nothing but the edges and points that they share (uniform_mesh.h). So each piece is free of
+/// self-intersections, no two of them overlap, and what lies between two pieces is the same triangles in
+/// both. All of it holds for points as a file has them.
+struct JointMesh {
+  IndexToWorld placement;
+  std::vector<Eigen::Vector3d>
+      points;  ///< index space relative to the placement's base; FilePoints::rounded()
+  /// Counter-clockwise in index space seen from `front`.
+  std::vector<Triangle> triangles;
+  std::vector<EdgeSides> sides;  ///< of each triangle
+
+  std::uint64_t joints = 0;          ///< cells where pieces meet
+  std::uint64_t several_sheets = 0;  ///< cells held to explicit segments
+  std::uint64_t fanned_edges = 0, escaped = 0;
+};
+
+/// With placement by all of a joint's crossings, so that the rim of a cut is a sharp crease where the
+/// original surface is smooth, too. The same bytes at any thread count. @throws Cancelled.
+JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context);
+
+/// Which triangles of a joint mesh bound each piece.
+class PieceTriangles {
+ public:
+  struct Side {
+    std::uint32_t triangle;
+    bool reversed;  ///< the piece is in front of the triangle
+  };
+  PieceTriangles(const JointMesh& mesh, std::uint32_t pieces);
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(first_.size()) - 2; }
+  /// Of piece 1 … count(), in the order of the joint mesh.
+  std::span<const Side> of(std::uint32_t piece) const {
+    return std::span(sides_).subspan(first_[piece], first_[piece + 1] - first_[piece]);
+  }
+
+ private:
+  std::vector<std::size_t> first_;
+  std::vector<Side> sides_;
+};
+
+/// A piece as a mesh of its own. Points keep the order that they have in the joint mesh; all pieces have the
+/// placement's origin, so that files keep the seams exact. The polygon attributes `surface` (0 original, 1
+/// cut), `cutter` (−1 for the original surface, and for a cut that is no cutter's) and `neighbour` (the piece
+/// on the other side, −1 for the outside) tell the polygons apart.
+PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Side> triangles);
+
+}  // namespace hermesh

@@ -1,0 +1,23 @@
+// What a piece weighs, and how it turns.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "algorithms/core/polygon_mesh.h"
+
+namespace hermesh {
+
+/// Of the solid that a closed, outwards oriented mesh bounds, at density 1, in world units.
+struct MassProperties {
+  double volume = 0.0, area = 0.0;
+  Eigen::Vector3d centre =
+      Eigen::Vector3d::Zero();  ///< of mass; of the used points' box where there is no volume
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass
+};
+
+/// Exact integrals over the tetrahedra of the triangles with a point inside the box (the divergence theorem;
+/// Tonon, *Explicit Exact Formulas for the 3-D Tetrahedron Inertia Tensor*, 2004), summed in the order of the
+/// triangles.
+MassProperties mass_properties(const PolygonMesh& mesh);
+
+}  // namespace hermesh

@@ -1,0 +1,86 @@
+#include "algorithms/fracture/scatter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/fracture/noise.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Inside samples, all equally likely.
+class InsideSamples {
+ public:
+  explicit InsideSamples(const LabelledSolid& solid) : solid_(solid), first_(solid.blocks.size() + 1) {
+    for (std::size_t b = 0; b < solid.blocks.size(); ++b)
+      first_[b + 1] = first_[b] + static_cast<std::uint64_t>(count(solid.blocks[b].inside));
+  }
+  std::uint64_t size() const { return first_.back(); }
+
+  Vector3d place(Random& random) const {
+    const std::uint64_t wanted = random.below(size());
+    const auto b =
+        static_cast<std::size_t>(std::upper_bound(first_.begin(), first_.end(), wanted) - first_.begin()) - 1;
+    std::uint64_t left = wanted - first_[b];
+    int sample = 0;
+    for_each_bit(solid_.blocks[b].inside, [&](int i) {
+      if (left-- == 0) sample = i;
+    });
+    const auto index = solid_.index(static_cast<std::int32_t>(b), sample);
+    Vector3d local;
+    for (int a = 0; a < 3; ++a)
+      local[a] = double(index[a]) - double(solid_.placement.base[a]) + random.uniform() - 0.5;
+    return solid_.placement.local(local) + solid_.placement.origin;
+  }
+
+ private:
+  const LabelledSolid& solid_;
+  std::vector<std::uint64_t> first_;
+};
+
+}  // namespace
+
+std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, const ScatterOptions& options,
+                              RunContext& context) {
+  constexpr int kCandidates = 24;
+  constexpr int kTries = 100'000;
+  const Stage stage(context, "scatter");
+  const InsideSamples samples(solid);
+  if (samples.size() == 0)
+    throw Error("the solid has no sample inside, so nothing can be scattered in it: use smaller voxels");
+  Random random(options.seed);
+  std::vector<Vector3d> places;
+  while (places.size() < count) {
+    context.check();
+    double farthest = -1.0;
+    Vector3d best = Vector3d::Zero();
+    int tries = 0;
+    for (int candidate = 0; candidate < kCandidates;) {
+      if (++tries > kTries) break;
+      const Vector3d place = samples.place(random);
+      const double density = options.density ? options.density(place) : 1.0;
+      if (!(density > 0) || random.uniform() >= density) continue;
+      ++candidate;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Vector3d& other : places) nearest = std::min(nearest, (other - place).squaredNorm());
+      nearest = std::sqrt(nearest) * std::cbrt(density);
+      if (nearest > farthest) farthest = nearest, best = place;
+    }
+    if (!(farthest > 0))
+      throw Error("only " + std::to_string(places.size()) + " of " + std::to_string(count) +
+                  " places could be scattered: the density is nowhere above 0 inside the solid, or too low");
+    places.push_back(best);
+  }
+  return places;
+}
+
+std::function<double(const Vector3d&)> density_about(const Vector3d& impact, double radius) {
+  return [=](const Vector3d& x) {
+    const double d = (x - impact).norm() / radius;
+    return 1.0 / (1.0 + d * d * d);
+  };
+}
+
+}  // namespace hermesh

@@ -1,0 +1,148 @@
+#include <nlohmann/json.hpp>
+
+#include "experiments/cli/process_for_tests.h"
+
+namespace hermesh::cli {
+namespace {
+
+using std::chrono::milliseconds;
+
+class FractureTest : public ProgramTest {
+ protected:
+  Outcome fracture(std::vector<std::string> more) {
+    std::vector<std::string> words = {"fracture", "cube.off", "out", "--voxel-size", "0.05"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  }
+  nlohmann::json ledger() const { return nlohmann::json::parse(read("out/pieces.json")); }
+  bool is_there() const { return std::filesystem::exists(path("out")); }
+};
+
+TEST_F(FractureTest, WritesPiecesLedgerAndPicture) {
+  write_cube();
+  const Outcome outcome = fracture({"--cutters", "voronoi:5", "--seed", "3", "--judge"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  EXPECT_NE(outcome.out.find("The books balance: 5 pieces"), std::string::npos) << outcome.out;
+  const nlohmann::json json = ledger();
+  ASSERT_EQ(json.at("pieces").size(), 5u);
+  EXPECT_TRUE(std::filesystem::exists(path("out/exploded.png")));
+  double volume = 0.0;
+  std::uint64_t seams = 0;
+  for (const auto& piece : json.at("pieces")) {
+    EXPECT_TRUE(std::filesystem::exists(path("out") / piece.at("file").get<std::string>()));
+    volume += piece.at("volume").get<double>();
+    seams += piece.at("seam_triangles").get<std::uint64_t>();
+    for (const auto& neighbour : piece.at("neighbours")) {  // each tells of the other, with as many triangles
+      const auto& other = json.at("pieces")[neighbour.at("piece").get<std::size_t>() - 1];
+      bool told = false;
+      for (const auto& back : other.at("neighbours"))
+        told = told ||
+               (back.at("piece") == piece.at("piece") && back.at("triangles") == neighbour.at("triangles"));
+      EXPECT_TRUE(told);
+    }
+  }
+  EXPECT_NEAR(volume, 8.0, 4e-3);  // cells where several cuts meet a crease of the cube have one point
+  EXPECT_GT(seams, 0u);
+  EXPECT_EQ(seams % 2, 0u);
+  for (const auto& cutter : json.at("cutters")) EXPECT_EQ(cutter.at("state"), "cuts");
+}
+
+TEST_F(FractureTest, TheSameSeedGivesTheSameBytes) {
+  write_cube();
+  const auto bytes = [&](const std::string& threads, const std::string& seed) {
+    EXPECT_EQ(
+        fracture({"--cutters", "chunks:6", "--seed", seed, "--threads", threads, "--no-picture"}).exit_code,
+        0);
+    std::string all = read("out/pieces.json");
+    for (int i = 1; i <= 6; ++i) all += read("out/piece_000" + std::to_string(i) + ".ply");
+    std::filesystem::remove_all(path("out"));
+    return all;
+  };
+  const std::string first = bytes("1", "4");
+  EXPECT_EQ(first, bytes("2", "4"));
+  EXPECT_EQ(first, bytes("7", "4"));
+  EXPECT_NE(first, bytes("2", "5"));
+}
+
+TEST_F(FractureTest, MeshesCutInPlace) {
+  write_cube();
+  write_sphere();
+  const Outcome outcome = fracture({"--cutters", "mesh:sphere.off", "--no-picture", "--judge"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  const nlohmann::json json = ledger();
+  ASSERT_EQ(json.at("pieces").size(), 2u);  // the ball, and what is around it
+  EXPECT_NEAR(
+      json.at("pieces")[0].at("volume").get<double>() + json.at("pieces")[1].at("volume").get<double>(), 8.0,
+      2e-2);
+  EXPECT_EQ(json.at("pieces")[0].at("name"), "taken by sphere.off");
+}
+
+TEST_F(FractureTest, ACutterThatTakesNothingIsNoted) {
+  write_cube();
+  const Outcome outcome = fracture({"--cutters", "planes:0,0,1,0.5;1,0,0,7", "--no-picture"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("plane 1 takes nothing: it misses the object"), std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(ledger().at("cutters")[1].at("state"), "misses");
+  EXPECT_NEAR(ledger().at("pieces")[1].at("volume").get<double>(), 2.0, 1e-3);
+}
+
+TEST_F(FractureTest, OtherMethods) {
+  write_cube();
+  for (const char* method : {"thesis", "openvdb"}) {
+    const Outcome outcome = fracture({"--cutters", "voronoi:4", "--method", method, "--no-picture"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_GE(ledger().at("pieces").size(), 4u) << method;
+    EXPECT_NEAR(ledger().at("pieces_volume").get<double>(), 8.0, 0.2) << method;
+    std::filesystem::remove_all(path("out"));
+  }
+}
+
+TEST_F(FractureTest, BadInputIsOneSentenceAndLeavesNothing) {
+  write_cube();
+  const struct {
+    std::vector<std::string> words;
+    int exit_code;
+    const char* says;
+  } cases[] = {
+      {{"--cutters", "voronoi"}, 2, "is no choice of cutters"},
+      {{"--cutters", "voronoi:0"}, 2, "is no choice of cutters"},
+      {{"--cutters", "planes:1,2,3"}, 2, "is no choice of cutters"},
+      {{"--cutters", "planes:0,0,0,1"}, 2, "no length"},
+      {{"--cutters", "mesh:missing.off"}, 1, "missing.off"},
+      {{"--cutters", "voronoi:3", "--method", "magic"}, 2, "magic"},
+      {{"--cutters", "voronoi:3", "--tolerance", "-1"}, 2, "at least 0"},
+      {{"--cutters", "voronoi:3", "--method", "openvdb", "--tolerance", "2"}, 2, "adaptivity"},
+      {{}, 2, "--cutters"},
+  };
+  for (const auto& c : cases) {
+    const Outcome outcome = fracture(c.words);
+    EXPECT_EQ(outcome.exit_code, c.exit_code) << outcome.err;
+    EXPECT_NE(outcome.err.find(c.says), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(files(), std::set<std::string>{"cube.off"});
+  }
+}
+
+TEST_F(FractureTest, AFolderWithFilesIsNotTouched) {
+  write_cube();
+  std::filesystem::create_directory(path("out"));
+  write("out/mine.txt", "keep");
+  const Outcome outcome = fracture({"--cutters", "voronoi:3"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("no empty folder"), std::string::npos) << outcome.err;
+  EXPECT_EQ(read("out/mine.txt"), "keep");
+}
+
+TEST_F(FractureTest, AnInterruptionLeavesNothingBehind) {
+  write_sphere();
+  const Outcome outcome =
+      run({"fracture", "sphere.off", "out", "--resolution", "400", "--cutters", "voronoi:300"},
+          Interruption{SIGINT, milliseconds(700)});
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_FALSE(is_there());
+  EXPECT_EQ(files(), std::set<std::string>{"sphere.off"});
+}
+
+}  // namespace
+}  // namespace hermesh::cli

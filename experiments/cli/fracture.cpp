@@ -1,0 +1,192 @@
+// hermesh fracture: a solid into pieces, one file each, with a ledger.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/core/vdb_file.h"
+#include "algorithms/hermite/samplers.h"
+#include "experiments/cli/format.h"
+#include "experiments/cli/session.h"
+#include "experiments/cli/signals.h"
+#include "experiments/cli/validators.h"
+#include "experiments/cli/voxelizing.h"
+#include "experiments/fracture_folder.h"
+#include "experiments/fracture_run.h"
+
+namespace hermesh::cli {
+namespace {
+
+constexpr const char* kSizeGroup = "Voxel size, exactly one of";
+
+struct Arguments {
+  Paths paths;
+  VoxelizeArguments voxelizing;
+  std::string cutters, hermite = "auto", density;
+  FractureMethod method;
+  CutterChoices choices;
+  std::vector<double> impact;
+  double least_volume = 27.0;
+  bool no_split = false, no_picture = false, judge = false;
+};
+
+bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
+
+/// The object with its polygons, which `source` keeps.
+FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh>& source, Session& session) {
+  FractureObject object;
+  const bool sized = arguments.voxelizing.voxel_size || arguments.voxelizing.resolution;
+  if (is_volume(arguments.paths.in)) {
+    if (sized)
+      throw UsageError("'" + arguments.paths.in +
+                       "' has voxels already: leave out --resolution and --voxel-size");
+    if (arguments.hermite == "exact") throw UsageError("--hermite exact needs polygons, not a volume");
+    object.level_set = read_level_set(arguments.paths.in, "", session.context);
+    object.hermite = sample_level_set(object.level_set, 0.0, session.context);
+    return object;
+  }
+  if (!sized) throw UsageError("say how large voxels are: --resolution N or --voxel-size S");
+  const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
+  source = read_polygons(arguments.paths.in, session, {.attributes = true});
+  object.source = &*source;
+  object.level_set = voxelize(*source, arguments.paths.in, arguments.voxelizing, chosen, session);
+  object.hermite = arguments.hermite == "level-set"
+                       ? sample_level_set(object.level_set, 0.0, session.context)
+                       : sample_polygons(object.level_set, 0.0, *source, session.context);
+  return object;
+}
+
+nlohmann::ordered_json head_of(const Arguments& arguments, const FractureObject& object) {
+  const Eigen::Vector3d& origin = object.hermite.placement.origin;
+  return {{"object", std::filesystem::path(arguments.paths.in).filename().string()},
+          {"method", arguments.method.name},
+          {"tolerance", arguments.method.tolerance},
+          {"cutters_given", without_folders(arguments.cutters)},
+          {"seed", arguments.choices.seed},
+          {"voxel_size", object.level_set.voxel_size()},
+          {"origin", {origin.x(), origin.y(), origin.z()}},
+          {"minimum_volume_voxels", arguments.method.options.least_samples}};
+}
+
+void summarise(const FractureSummary& summary, const Session& session) {
+  std::string line =
+      "broke into " + std::to_string(summary.pieces) + " pieces, " + seconds_text(summary.seconds);
+  if (const auto& labelled = summary.labelled) {
+    line += "; " + std::to_string(labelled->repair.changed_samples) +
+            " samples changed their piece to keep it manifold";
+    if (!labelled->merged.empty())
+      line += ", " + std::to_string(labelled->merged.size()) + " slivers joined a neighbour";
+  }
+  print_summary(session, line);
+}
+
+void note_idle_cutters(const FractureSummary& summary, Session& session) {
+  for (const CutterRecord& record : summary.cutters)
+    if (record.state != CutterRecord::State::cuts)
+      session.context.note(record.name + " " + in_words(record.state));
+  for (const std::string& name : summary.empty) session.context.note(name + ": nothing");
+}
+
+bool report_ledger(const validation::FractureLedger& ledger) {
+  for (const std::string& sentence : ledger.sentences()) std::cout << sentence << '\n';
+  for (const std::string& place : ledger.places) std::cout << "  " << place << '\n';
+  std::cout << "original surface: " << ledger.rest_triangles << " triangles, volume "
+            << text(ledger.rest_volume) << "; the pieces' volumes differ from it by "
+            << text(ledger.volume_difference()) << " of it\n";
+  return ledger.balances();
+}
+
+int run_fracture_command(const Arguments& given, Session& session) {
+  Arguments arguments = given;
+  const CutterSpec spec = as_usage([&] { return parse_cutters(arguments.cutters); });
+  as_usage([&] { check_method(arguments.method); });
+  if (!arguments.impact.empty())
+    arguments.choices.impact = Eigen::Vector3d(arguments.impact[0], arguments.impact[1], arguments.impact[2]);
+  arguments.method.options.split = !arguments.no_split;
+  arguments.method.options.least_samples = static_cast<std::uint64_t>(arguments.least_volume);
+  { const AtomicFolder reserved(arguments.paths.out); }
+  if (!arguments.density.empty())
+    arguments.choices.density = read_level_set(arguments.density, "", session.context);
+
+  std::optional<PolygonMesh> source;
+  const FractureObject object = read_object(arguments, source, session);
+  if (object.hermite.leaves.empty())
+    throw Error("'" + arguments.paths.in +
+                "' has no inside at this size of voxel, so there is nothing to break");
+  const MadeCutters cutters = make_cutters(spec, object.hermite, arguments.choices, session.context);
+  FractureFolder folder(arguments.paths.out, bounds_of(object.hermite));
+  const FractureSummary summary = run_fracture(
+      object, cutters, arguments.method,
+      [&](PieceOutput&& piece) { folder.add(std::move(piece), session.context); }, session.context);
+  session.context.check();
+  if (summary.pieces == 0) throw Error("no piece has a surface, nothing was written");
+  summarise(summary, session);
+  note_idle_cutters(summary, session);
+  const bool balances = !arguments.judge || report_ledger(folder.judge(session.context));
+  folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
+  work_is_finished();
+  return balances ? kDone : kNotMet;
+}
+
+void add_cutter_options(CLI::App& command, Arguments& arguments) {
+  command
+      .add_option(
+          "--cutters", arguments.cutters,
+          "voronoi:N, chunks:N (Voronoi cells with rough walls), planes:N, planes:NX,NY,NZ,D;... (N.x = D), "
+          "mesh:FILE,... (one after another, in place) or mesh:FILE*N (N copies, scattered and turned)")
+      ->required();
+  command.add_option("--seed", arguments.choices.seed, "Of everything random (default: 0)");
+  command
+      .add_option(
+          "--roughness", arguments.choices.roughness,
+          "How far the walls of chunks are displaced, as a part of the distance of seeds (default: 0.12)")
+      ->check(CLI::Range(0.0, 1.0));
+  command.add_option("--impact", arguments.impact, "X Y Z: scatter densest about this point (world units)")
+      ->expected(3);
+  command
+      .add_option(
+          "--impact-radius", arguments.choices.impact_radius,
+          "Where the density about the impact has halved (world units; default: a quarter of the object)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--density", arguments.density, "A .vdb: scatter in proportion to its values");
+  command.add_option("--mesh-scale", arguments.choices.mesh_scale, "Of scattered meshes (default: 1)")
+      ->check(CLI::PositiveNumber);
+}
+
+}  // namespace
+
+void add_fracture(CLI::App& app, Session& session) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      add_command(app, session, "fracture", "Break a solid into pieces that fit without a gap");
+  add_paths(*command, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb",
+            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty");
+  add_voxelize_options(*command, arguments->voxelizing);
+  command->get_option_group(kSizeGroup)->require_option(0, 1);
+  add_cutter_options(*command, *arguments);
+  command->add_option("--method", arguments->method.name, "labelled, thesis or openvdb (default: labelled)")
+      ->check(CLI::IsMember({"labelled", "thesis", "openvdb"}));
+  command
+      ->add_option("--tolerance", arguments->method.tolerance,
+                   "labelled: how far the pieces may be from their finest meshes, in voxels; thesis: how far merged "
+                   "cells may be off; openvdb: its adaptivity (default: 0, nothing is merged)")
+      ->check(finite_number());
+  command
+      ->add_option(
+          "--min-volume", arguments->least_volume,
+          "Voxels: smaller pieces join the neighbour that they share most with; 0 keeps all (default: 27)")
+      ->check(CLI::Range(0.0, 1e15));
+  command->add_flag("--no-split", arguments->no_split, "Leave a piece that falls apart one piece");
+  command->add_flag("--no-picture", arguments->no_picture, "Do not draw exploded.png");
+  command->add_flag("--judge", arguments->judge,
+                    "Read the files back and judge whether the books balance; if not, the exit code is 3");
+  command
+      ->add_option("--hermite", arguments->hermite,
+                   "Data of the object: auto, exact from polygons, or level-set")
+      ->check(CLI::IsMember({"auto", "exact", "level-set"}));
+  command->callback([arguments, &session] {
+    session.command = [arguments, &session] { return run_fracture_command(*arguments, session); };
+  });
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,315 @@
+// Fractures of procedural solids, judged on what their files would hold.
+#include "algorithms/fracture/fracture.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/fracture/mass_properties.h"
+#include "algorithms/fracture/noise.h"
+#include "algorithms/fracture/scatter.h"
+#include "algorithms/fracture/thesis_fracture.h"
+#include "algorithms/hermite/samplers.h"
+#include "validation/fracture_ledger.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kHalf = 14.0;
+
+FloatHermite sampled(const AnalyticSurface& surface, std::array<int, 3> reach) {
+  RunContext context;
+  return sample_function(surface, IndexToWorld(), {-reach[0], -reach[1], -reach[2]},
+                         {reach[0], reach[1], reach[2]}, 1e-9, context);
+}
+
+FloatHermite sphere() {
+  return sampled({.value = [](const Vector3d& p) { return p.norm() - kHalf; },
+                  .gradient = [](const Vector3d& p) { return p; }},
+                 {20, 20, 20});
+}
+
+FloatHermite turned_box() {
+  const Eigen::Matrix3d back =
+      (Eigen::AngleAxisd(0.4, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY()))
+          .matrix()
+          .transpose();
+  const Vector3d half(12.0, 9.0, 14.0);
+  return sampled({.value = [=](const Vector3d& p) { return ((back * p).cwiseAbs() - half).maxCoeff(); },
+                  .gradient =
+                      [=](const Vector3d& p) {
+                        const Vector3d q = back * p;
+                        int axis;
+                        (q.cwiseAbs() - half).maxCoeff(&axis);
+                        return Vector3d(back.row(axis).transpose() * (q[axis] < 0 ? -1.0 : 1.0));
+                      }},
+                 {24, 24, 24});
+}
+
+/// A ball with a rough surface: overhangs, thin ridges, cells of several sheets.
+FloatHermite rock() {
+  const VectorNoise noise(7);
+  const auto value = [=](const Vector3d& p) { return p.norm() - kHalf - 4.0 * noise(p / 4.0)[0]; };
+  const auto gradient = [=](const Vector3d& p) {
+    Vector3d g;
+    for (int a = 0; a < 3; ++a)
+      g[a] = (value(p + 1e-4 * Vector3d::Unit(a)) - value(p - 1e-4 * Vector3d::Unit(a))) / 2e-4;
+    return g;
+  };
+  return sampled({.value = value, .gradient = gradient, .lipschitz = 8.0}, {24, 24, 24});
+}
+
+std::vector<Vector3d> seeds(const FloatHermite& object, std::size_t count) {
+  RunContext context;
+  return scatter(whole_solid(object, context), count, {.seed = 5, .density = {}}, context);
+}
+
+std::unique_ptr<Cutters> cutters_of(const std::string& kind, const FloatHermite& object, std::size_t count) {
+  const std::vector<Vector3d> places = seeds(object, count);
+  if (kind == "voronoi") return voronoi_cutters(places, {}, object.placement);
+  if (kind == "chunks") return voronoi_cutters(places, {1.5, 5.0, 3}, object.placement);
+  Random random(11);
+  std::vector<CuttingPlane> planes;
+  for (const Vector3d& place : places) {
+    const Vector3d normal = random.direction();
+    planes.push_back({normal, normal.dot(place)});
+  }
+  return plane_cutters(planes, object.placement);
+}
+
+std::vector<PolygonMesh> pieces_of(const LabelledFracture& fracture) {
+  std::vector<PolygonMesh> result;
+  for (std::uint32_t i = 1; i <= fracture.piece_count(); ++i)
+    result.push_back(piece_mesh(fracture.mesh, fracture.pieces->of(i)));
+  return result;
+}
+
+validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces) {
+  RunContext context;
+  std::vector<MeshFile> files;
+  for (const PolygonMesh& piece : pieces) files.push_back(to_mesh_file(piece));
+  for (std::size_t i = 0; i < pieces.size(); ++i) files[i].attributes = pieces[i].attributes;
+  return validation::judge_fracture(files, context);
+}
+
+std::string text(const validation::FractureLedger& ledger) {
+  std::string all;
+  for (const std::string& s : ledger.sentences()) all += s + "\n";
+  for (const std::string& s : ledger.places) all += s + "\n";
+  return all;
+}
+
+struct Case {
+  const char* object;
+  const char* cutters;
+  std::size_t count;
+};
+
+class Fracture : public testing::TestWithParam<Case> {};
+
+TEST_P(Fracture, TheBooksBalance) {
+  const Case c = GetParam();
+  const std::string name = c.object;
+  const FloatHermite object = name == "sphere" ? sphere() : name == "box" ? turned_box() : rock();
+  RunContext context;
+  const auto cutters = cutters_of(c.cutters, object, c.count);
+  std::size_t finest = 0;
+  for (const double tolerance : {0.0, 0.2, 1.0}) {
+    FractureOptions options;
+    options.tolerance = tolerance;
+    const LabelledFracture fracture = labelled_fracture(object, *cutters, options, context);
+    EXPECT_GE(fracture.piece_count(), 2u);
+    const std::vector<PolygonMesh> pieces = pieces_of(fracture);
+    const validation::FractureLedger ledger = judged(pieces);
+    EXPECT_TRUE(ledger.balances()) << tolerance << ": " << text(ledger);
+    EXPECT_GT(ledger.seam_triangles, 0);
+    const std::size_t triangles = fracture.mesh.triangles.size();
+    if (tolerance == 0.0)
+      finest = triangles;
+    else
+      EXPECT_LT(triangles, finest) << tolerance;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Procedural, Fracture,
+    testing::Values(Case{"sphere", "voronoi", 2}, Case{"sphere", "voronoi", 8}, Case{"sphere", "voronoi", 20},
+                    Case{"sphere", "planes", 2}, Case{"sphere", "planes", 8}, Case{"sphere", "chunks", 8},
+                    Case{"sphere", "chunks", 20}, Case{"box", "voronoi", 2}, Case{"box", "voronoi", 20},
+                    Case{"box", "planes", 3}, Case{"box", "chunks", 8}, Case{"rock", "voronoi", 2},
+                    Case{"rock", "voronoi", 8}, Case{"rock", "voronoi", 20}, Case{"rock", "planes", 4},
+                    Case{"rock", "chunks", 8}, Case{"rock", "chunks", 20}));
+
+TEST(FractureBytes, AreTheSameAtAnyThreadCount) {
+  const FloatHermite object = rock();
+  const auto pieces = [&](int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(threads));
+    RunContext context;
+    return pieces_of(labelled_fracture(object, *cutters_of("chunks", object, 12), {}, context));
+  };
+  const std::vector<PolygonMesh> one = pieces(1);
+  EXPECT_GE(one.size(), 12u);
+  EXPECT_TRUE(one == pieces(2));
+  EXPECT_TRUE(one == pieces(7));
+}
+
+TEST(FractureOfABox, CutByTwoPlanesIsExact) {
+  // A box with its faces between samples, and two planes: creases and corners are found exactly by the QEFs.
+  const FloatHermite object = sampled(
+      {.value = [](const Vector3d& p) { return (p.cwiseAbs() - Vector3d(10.3, 9.3, 8.3)).maxCoeff(); },
+       .gradient =
+           [](const Vector3d& p) {
+             int axis;
+             (p.cwiseAbs() - Vector3d(10.3, 9.3, 8.3)).maxCoeff(&axis);
+             return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
+           }},
+      {20, 20, 20});
+  RunContext context;
+  const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 2.4}, {Vector3d(0, 1, 0), -3.7}}, object.placement);
+  const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+  ASSERT_EQ(fracture.piece_count(), 4u);
+  EXPECT_EQ(fracture.repair.changed_samples, 0u);
+  EXPECT_EQ(fracture.made_up_crossings, 0u);
+  const std::vector<PolygonMesh> pieces = pieces_of(fracture);
+  // Codes: bit 0 beyond x = 2.4, bit 1 beyond y = −3.7.
+  const double x[2] = {10.3 + 2.4, 10.3 - 2.4}, y[2] = {9.3 - 3.7, 9.3 + 3.7};
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(mass_properties(pieces[i]).volume, x[i & 1] * y[i >> 1] * 16.6, 1e-3)
+        << fracture.names[i + 1];
+  EXPECT_TRUE(judged(pieces).balances());
+}
+
+TEST(FractureTags, TellCutFromOriginal) {
+  const FloatHermite object = sphere();
+  RunContext context;
+  const Vector3d normal = Vector3d(1, 2, 3).normalized();
+  const auto cutters = plane_cutters({{normal, 1.7}}, object.placement);
+  const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+  ASSERT_EQ(fracture.piece_count(), 2u);
+  std::size_t judged_polygons = 0, wrong = 0;
+  for (const PolygonMesh& piece : pieces_of(fracture)) {
+    const auto& surface = std::get<1>(piece.attributes[0].values);
+    for (std::size_t t = 0; t < piece.triangles.size(); ++t) {
+      Vector3d middle = Vector3d::Zero();
+      for (const std::uint32_t p : piece.triangles[t]) middle += piece.world(p) / 3.0;
+      const double from_plane = std::abs(normal.dot(middle) - 1.7),
+                   from_sphere = std::abs(middle.norm() - kHalf);
+      if (from_plane < 1.0 && from_sphere < 1.0) continue;  // within a voxel of the rim
+      ++judged_polygons;
+      wrong += surface[t] != (from_plane < from_sphere);
+      EXPECT_EQ(std::get<1>(piece.attributes[1].values)[t], surface[t] ? 0 : -1);
+    }
+  }
+  EXPECT_GT(judged_polygons, 8000u);
+  EXPECT_EQ(wrong, 0u);
+}
+
+PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
+  PolygonMesh mesh;
+  for (int c = 0; c < 8; ++c)
+    mesh.points.push_back(
+        Vector3d(c & 1 ? upper.x() : lower.x(), c & 2 ? upper.y() : lower.y(), c & 4 ? upper.z() : lower.z())
+            .cast<float>());
+  mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  return mesh;
+}
+
+FloatHermite box_on_samples() {
+  return sampled({.value = [](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - 8.2; },
+                  .gradient =
+                      [](const Vector3d& p) {
+                        int axis;
+                        p.cwiseAbs().maxCoeff(&axis);
+                        return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
+                      }},
+                 {16, 16, 16});
+}
+
+TEST(FractureCutters, EachGetsARecord) {
+  using State = CutterRecord::State;
+  const FloatHermite object = box_on_samples();
+  const std::vector<CuttingMesh> meshes = {{"corner", cuboid({3.5, 3.5, 3.5}, {12, 12, 12})},
+                                           {"again", cuboid({4.5, 4.5, 4.5}, {12, 12, 12})},
+                                           {"beside", cuboid({8.2, -4, -4}, {12, 4, 4})},
+                                           {"far", cuboid({20, 20, 20}, {24, 24, 24})},
+                                           {"none", {}},
+                                           {"thin", cuboid({1.2, -4, -4}, {1.4, 4, 4})}};
+  RunContext context;
+  const auto cutters = mesh_cutters(meshes, object.placement, context);
+  const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+  ASSERT_EQ(fracture.piece_count(), 2u);
+  const State expected[] = {State::cuts,   State::covered, State::touches,
+                            State::misses, State::empty,   State::empty};
+  for (std::size_t k = 0; k < meshes.size(); ++k)
+    EXPECT_EQ(fracture.cutters[k].state, expected[k]) << meshes[k].name;
+  EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+}
+
+TEST(FractureCutters, OneThatSwallowsTheObjectLeavesItWhole) {
+  const FloatHermite object = box_on_samples();
+  RunContext context;
+  const auto cutters =
+      mesh_cutters({{"all", cuboid({-12, -12, -12}, {12, 12, 12})}}, object.placement, context);
+  const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+  EXPECT_EQ(fracture.piece_count(), 1u);
+  EXPECT_EQ(fracture.cutters[0].state, CutterRecord::State::swallows);
+  EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+}
+
+TEST(FractureCutters, ThatEndInAFaceOfTheObject) {
+  // Faces of cutter and object lie in one plane, between samples and on them.
+  for (const double side : {8.2, 8.0}) {
+    const FloatHermite object = box_on_samples();
+    RunContext context;
+    const auto cutters =
+        mesh_cutters({{"half", cuboid({0.5, -side, -side}, {side, side, side})}}, object.placement, context);
+    const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+    EXPECT_GE(fracture.piece_count(), 2u);
+    const validation::FractureLedger ledger = judged(pieces_of(fracture));
+    EXPECT_TRUE(ledger.balances()) << side << text(ledger);
+  }
+}
+
+TEST(FractureOptions, NoSplitLeavesOnePieceOfSeveralSurfaces) {
+  const auto value = [](const Vector3d& p) {
+    return std::min((p - Vector3d(-9, 0, 0)).norm(), (p - Vector3d(9, 0, 0)).norm()) - 6.0;
+  };
+  const FloatHermite object = sampled(
+      {.value = value,
+       .gradient = [](const Vector3d& p) { return Vector3d(p - Vector3d(p.x() < 0 ? -9 : 9, 0, 0)); }},
+      {20, 20, 20});
+  RunContext context;
+  const auto cutters = plane_cutters({{Vector3d(0, 1, 0), 0.3}}, object.placement);
+  FractureOptions options;
+  EXPECT_EQ(labelled_fracture(object, *cutters, options, context).piece_count(), 4u);
+  options.split = false;
+  const LabelledFracture whole = labelled_fracture(object, *cutters, options, context);
+  EXPECT_EQ(whole.piece_count(), 2u);
+  EXPECT_TRUE(judged(pieces_of(whole)).balances());
+}
+
+TEST(FractureMethods, TheThesisLeavesGapsAndTheVolumeNearlyAddsUp) {
+  const FloatHermite object = turned_box();
+  RunContext context;
+  const auto cutters = cutters_of("voronoi", object, 6);
+  double sum = 0.0;
+  std::size_t pieces = 0;
+  thesis_fracture(
+      object, *cutters, 0.0,
+      [&](ThesisPiece&& piece) {
+        sum += mass_properties(piece.mesh).volume;
+        pieces += !piece.mesh.empty();
+      },
+      context);
+  EXPECT_EQ(pieces, 6u);
+  EXPECT_NEAR(sum, 24.0 * 18.0 * 28.0, 0.01 * 24.0 * 18.0 * 28.0);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,127 @@
+#include "validation/fracture_ledger.h"
+
+#include <gtest/gtest.h>
+
+namespace hermesh::validation {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A cuboid of twelve triangles, each side tagged; the sides at x = lower and x = upper come first.
+MeshFile cuboid(const Vector3d& lower, const Vector3d& upper, bool cut_below, bool cut_above) {
+  MeshFile mesh;
+  for (int c = 0; c < 8; ++c)
+    mesh.points.emplace_back(c & 1 ? upper.x() : lower.x(), c & 2 ? upper.y() : lower.y(),
+                             c & 4 ? upper.z() : lower.z());
+  // The sides across x are split along the same diagonal, so that two cuboids fit.
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 7, 5}, {1, 3, 7}};
+  for (const Quad& q : {Quad{0, 1, 5, 4}, Quad{2, 6, 7, 3}, Quad{0, 2, 3, 1}, Quad{4, 5, 7, 6}}) {
+    mesh.triangles.push_back({q[0], q[1], q[2]});
+    mesh.triangles.push_back({q[0], q[2], q[3]});
+  }
+  std::vector<std::int32_t> surface(12, 0);
+  surface[0] = surface[1] = cut_below;
+  surface[2] = surface[3] = cut_above;
+  mesh.attributes.push_back({"surface", AttributeDomain::polygon, 1, surface, {}});
+  return mesh;
+}
+
+/// A bar in three pieces.
+std::vector<MeshFile> bar() {
+  return {cuboid({0, 0, 0}, {1, 1, 1}, false, true), cuboid({1, 0, 0}, {3, 1, 1}, true, true),
+          cuboid({3, 0, 0}, {4, 1, 1}, true, false)};
+}
+
+FractureLedger judged(const std::vector<MeshFile>& pieces) {
+  RunContext context;
+  return judge_fracture(pieces, context);
+}
+
+TEST(FractureLedger, BalancesForABarInThreePieces) {
+  const FractureLedger ledger = judged(bar());
+  EXPECT_TRUE(ledger.balances()) << ledger.sentences().front();
+  EXPECT_EQ(ledger.pieces, 3);
+  EXPECT_EQ(ledger.triangles, 36);
+  EXPECT_EQ(ledger.seam_triangles, 8);
+  EXPECT_EQ(ledger.rest_triangles, 28);
+  EXPECT_DOUBLE_EQ(ledger.rest_volume, 4.0);
+  EXPECT_DOUBLE_EQ(ledger.pieces_volume, 4.0);
+}
+
+TEST(FractureLedger, NeedsNoTags) {
+  std::vector<MeshFile> pieces = bar();
+  for (MeshFile& piece : pieces) piece.attributes.clear();
+  EXPECT_TRUE(judged(pieces).balances());
+}
+
+TEST(FractureLedger, SeesAShiftedPiece) {
+  std::vector<MeshFile> pieces = bar();
+  for (Vector3d& p : pieces[2].points) p.x() -= 1e-7;
+  const FractureLedger ledger = judged(pieces);
+  EXPECT_EQ(ledger.unmatched_cut, 4);
+  EXPECT_GT(ledger.rest_open_edges, 0);
+  EXPECT_GT(ledger.intersecting_pairs, 0);
+  EXPECT_EQ(ledger.broken_pieces, 0);
+  EXPECT_FALSE(ledger.balances());
+}
+
+TEST(FractureLedger, SeesAPieceThatIsApart) {
+  std::vector<MeshFile> pieces = bar();
+  for (Vector3d& p : pieces[2].points) p.x() += 0.5;
+  const FractureLedger ledger = judged(pieces);
+  EXPECT_EQ(ledger.unmatched_cut, 4);
+  EXPECT_EQ(ledger.intersecting_pairs, 0);
+  EXPECT_FALSE(ledger.balances());
+}
+
+TEST(FractureLedger, SeesAMissingTriangle) {
+  std::vector<MeshFile> pieces = bar();
+  pieces[1].triangles.erase(pieces[1].triangles.begin());
+  auto& surface = std::get<1>(pieces[1].attributes[0].values);
+  surface.erase(surface.begin());
+  const FractureLedger ledger = judged(pieces);
+  EXPECT_EQ(ledger.broken_pieces, 1);
+  EXPECT_EQ(ledger.unmatched_cut, 1);
+  EXPECT_FALSE(ledger.balances());
+}
+
+TEST(FractureLedger, SeesAWrongTag) {
+  std::vector<MeshFile> pieces = bar();
+  std::get<1>(pieces[0].attributes[0].values)[2] = 0;
+  EXPECT_EQ(judged(pieces).matched_original, 1);
+  pieces = bar();
+  std::get<1>(pieces[0].attributes[0].values)[5] = 1;
+  EXPECT_EQ(judged(pieces).unmatched_cut, 1);
+}
+
+TEST(FractureLedger, SeesTheOtherDiagonal) {
+  std::vector<MeshFile> pieces = bar();
+  pieces[1].triangles[0] = {0, 4, 2};
+  pieces[1].triangles[1] = {4, 6, 2};
+  const FractureLedger ledger = judged(pieces);
+  EXPECT_EQ(ledger.unmatched_cut, 4);
+  EXPECT_GT(ledger.intersecting_pairs, 0);  // they lie in one plane, over one another
+}
+
+TEST(FractureLedger, SeesOverlapAndNesting) {
+  std::vector<MeshFile> pieces = bar();
+  pieces.push_back(cuboid({1.5, 0.25, 0.25}, {2.5, 0.75, 0.75}, false, false));
+  FractureLedger ledger = judged(pieces);
+  EXPECT_EQ(ledger.nested_components, 1);
+  EXPECT_EQ(ledger.intersecting_pairs, 0);
+  EXPECT_FALSE(ledger.balances());
+  pieces.back() = cuboid({1.5, 0.25, 0.25}, {2.5, 1.75, 0.75}, false, false);
+  ledger = judged(pieces);
+  EXPECT_GT(ledger.intersecting_pairs, 0);
+}
+
+TEST(FractureLedger, SeesAPieceTwice) {
+  std::vector<MeshFile> pieces = bar();
+  pieces.push_back(pieces[1]);
+  const FractureLedger ledger = judged(pieces);
+  EXPECT_GT(ledger.repeated_triangles, 0);
+  EXPECT_FALSE(ledger.balances());
+}
+
+}  // namespace
+}  // namespace hermesh::validation
