@@ -172,14 +172,23 @@ double droplet_radius(Random& random) {
 PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   Random random(parameters.at("seed"));
   const double detail = parameters.at("detail");
-  PolygonMesh mesh = pool(GradientNoise(random.bits()), detail);
+  const GradientNoise waves(random.bits());
+  const auto wanted = [&](double part) { return parameters.at("part") == 0 || parameters.at("part") == part; };
+  PolygonMesh mesh = wanted(1) ? pool(waves, detail) : PolygonMesh();
   std::vector<Crown> crowns;
-  for (int i = 0; i < parameters.at("crowns"); ++i) {
-    const double radius = random.uniform(0.025, 0.075), reach = 1.6 * radius;
-    crowns.push_back({random.uniform(reach - kHalf.x(), kHalf.x() - reach), random.uniform(reach - 0.5, 0.5 - reach), radius,
+  constexpr int kMostTries = 1000;  // where no place is left there are fewer crowns
+  for (int tries = 0; crowns.size() < parameters.at("crowns") && tries < kMostTries; ++tries) {
+    const double radius = random.uniform(0.025, 0.07), reach = 1.5 * radius;
+    const Crown crown{random.uniform(reach - kHalf.x(), kHalf.x() - reach), random.uniform(reach - 0.5, 0.5 - reach), radius,
                       random.uniform(0.03, 0.13), random.uniform(0.1, 0.5), random.uniform(0.0016, 0.004),
-                      GradientNoise(random.bits())});
-    append(mesh, sheet_of(crowns.back(), detail));
+                      GradientNoise(random.bits())};
+    const auto meets = [&](const Crown& other) {
+      const double apart = reach + 1.5 * other.radius, x = crown.x - other.x, z = crown.z - other.z;
+      return x * x + z * z < apart * apart;
+    };
+    if (std::any_of(crowns.begin(), crowns.end(), meets)) continue;
+    crowns.push_back(crown);
+    if (wanted(2)) append(mesh, sheet_of(crowns.back(), detail));
   }
   // Without crowns what flies starts from the middle of the pool.
   const std::vector<Crown> sources =
@@ -189,11 +198,12 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
     context.check();
     const PolygonMesh thread = ligament(flight_from(source(), random), random, detail);
     if (thread.points.empty()) continue;
-    append(mesh, thread);
+    if (wanted(3)) append(mesh, thread);
     ++made;
   }
   constexpr double kTop = 0.004;
-  add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop, detail);  // so that the box is as high as it should be
+  if (wanted(4))
+    add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop, detail);  // so that the box is as high as it should be
   std::vector<std::pair<Vector3d, double>> droplets;
   for (int made = 1; made < parameters.at("droplets");) {
     context.check();
@@ -205,7 +215,7 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
       return (centre - other.first).squaredNorm() < apart * apart;
     };
     if (!is_inside(centre, radius) || std::any_of(droplets.begin(), droplets.end(), touches)) continue;
-    add_droplet(mesh, centre, radius, detail);
+    if (wanted(4)) add_droplet(mesh, centre, radius, detail);
     droplets.emplace_back(centre, radius);
     ++made;
   }

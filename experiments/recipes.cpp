@@ -90,6 +90,7 @@ std::span<const Recipe> all_recipes() {
         {"ligaments", "threads", 400, 0, 1e5},
         {"droplets", "most of them the smallest", 6000, 1, 1e6},
         {"detail", "1 gives some two million triangles", 1, 0.1, 10},
+        {"part", "0 for all, or the pool (1), the crowns (2), the ligaments (3) or the droplets (4) alone", 0, 0, 4},
         {"seed", "of all places and shapes", 1, 0, 1e9}},
        recipes::splash},
       {"uv-sphere",
