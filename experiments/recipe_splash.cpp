@@ -144,7 +144,7 @@ PolygonMesh ligament(const Flight& flight, Random& random, double detail) {
     const Vector3d u = (aside - along * along.dot(aside)).normalized(),
                    v(along.y() * u.z() - along.z() * u.y(), along.z() * u.x() - along.x() * u.z(),
                      along.x() * u.y() - along.y() * u.x());
-    const double round = std::sqrt(std::min(1.0, 12.0 * std::min(share, 1.0 - share)));
+    const double round = std::sqrt(std::min(1.0, 24.0 * std::min(share, 1.0 - share)));
     const double radius = thick * round * (1.0 - 0.7 * share) * (1.0 + 0.3 * on_circle(beads * share + phase).second);
     for (std::uint32_t i = 0; i < around; ++i) {
       const auto [c, s] = on_circle(double(i) / around);
@@ -173,7 +173,8 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   Random random(parameters.at("seed"));
   const double detail = parameters.at("detail");
   const GradientNoise waves(random.bits());
-  const auto wanted = [&](double part) { return parameters.at("part") == 0 || parameters.at("part") == part; };
+  const double only = std::floor(parameters.at("part"));
+  const auto wanted = [&](double part) { return only == 0 || only == part; };
   PolygonMesh mesh = wanted(1) ? pool(waves, detail) : PolygonMesh();
   std::vector<Crown> crowns;
   constexpr int kMostTries = 1000;  // where no place is left there are fewer crowns
@@ -205,7 +206,9 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   if (wanted(4))
     add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop, detail);  // so that the box is as high as it should be
   std::vector<std::pair<Vector3d, double>> droplets;
-  for (int made = 1; made < parameters.at("droplets");) {
+  // Where no room is left there are fewer.
+  std::size_t tries = 0, most = 20 * static_cast<std::size_t>(parameters.at("droplets"));
+  while (droplets.size() + 1 < parameters.at("droplets") && tries++ < most) {
     context.check();
     const double radius = droplet_radius(random);
     const Vector3d centre = flight_from(source(), random).at(random.uniform(0.08, 0.7));
@@ -217,7 +220,6 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
     if (!is_inside(centre, radius) || std::any_of(droplets.begin(), droplets.end(), touches)) continue;
     if (wanted(4)) add_droplet(mesh, centre, radius, detail);
     droplets.emplace_back(centre, radius);
-    ++made;
   }
   const auto length = static_cast<float>(parameters.at("length"));
   for (Eigen::Vector3f& point : mesh.points) point *= length;

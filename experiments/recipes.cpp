@@ -85,7 +85,7 @@ std::span<const Recipe> all_recipes() {
       {"splash",
        "water: a pool with waves, crowns thrown up from it, ligaments drawn from the crowns' rims and droplets, all of them "
        "closed and overlapping; 0.268 x 0.347 x 1 times the length",
-       {{"length", "along z, world units", 1, 1e-6, 1e6},
+       {{"length", "along z, world units", 10, 1e-6, 1e6},
         {"crowns", "thin sheets, thrown up in a ring", 14, 0, 1000},
         {"ligaments", "threads", 400, 0, 1e5},
         {"droplets", "most of them the smallest", 6000, 1, 1e6},

@@ -57,8 +57,8 @@ class Round {
 
   /// The cube that holds a place, cube_count() if there is none.
   std::uint32_t cube_at(const Vector3d& p) const {
-    std::uint64_t key = 0;
-    for (int a = 0; a < 3; ++a) key = key << 21 | static_cast<std::uint64_t>(std::max(0.0, (p[a] - start_[a]) / side_));
+    const DecimationCube::Index index = DecimationCube::index_of(p, start_, side_);
+    const std::uint64_t key = index[0] << 42 | index[1] << 21 | index[2];
     const auto at = std::partition_point(first_.begin(), first_.end() - 1, [&](std::size_t i) { return entries_[i].cube < key; });
     const bool found = at != first_.end() - 1 && entries_[*at].cube == key;
     return static_cast<std::uint32_t>(found ? at - first_.begin() : first_.size() - 1);
@@ -94,7 +94,9 @@ class Round {
     return std::span(triangles_).subspan(first_[cube], first_[cube + 1] - first_[cube]);
   }
   DecimationCube cube_of(std::uint32_t cube) const {
-    return {lower_of(entries_[first_[cube]].cube), side_, kLongestEdge * side_, side_ == kFirstSide};
+    constexpr std::uint64_t kMask = (1u << 21) - 1;
+    const std::uint64_t key = entries_[first_[cube]].cube;
+    return {start_, side_, {key >> 42, (key >> 21) & kMask, key & kMask}, kLongestEdge * side_, side_ == kFirstSide};
   }
   void file_triangles(RunContext& context) {
     const std::size_t n = mesh_.triangles.size();
@@ -114,20 +116,12 @@ class Round {
     if (!mesh_.alive(t)) return;
     Box3 box;
     for (const std::uint32_t p : mesh_.triangles[t]) box.add(mesh_.points[p]);
-    std::array<std::uint64_t, 3> low, high;
-    for (int a = 0; a < 3; ++a) {
-      low[a] = static_cast<std::uint64_t>(std::max(0.0, (box.lower[a] - start_[a]) / side_));
-      high[a] = static_cast<std::uint64_t>(std::max(0.0, (box.upper[a] - start_[a]) / side_));
-    }
+    const DecimationCube::Index low = DecimationCube::index_of(box.lower, start_, side_),
+                                high = DecimationCube::index_of(box.upper, start_, side_);
     for (std::uint64_t x = low[0]; x <= high[0]; ++x)
       for (std::uint64_t y = low[1]; y <= high[1]; ++y)
         for (std::uint64_t z = low[2]; z <= high[2]; ++z) f(x << 42 | y << 21 | z);
   }
-  Vector3d lower_of(std::uint64_t cube) const {
-    constexpr std::uint64_t kMask = (1u << 21) - 1;
-    return start_ + side_ * Vector3d(double(cube >> 42), double((cube >> 21) & kMask), double(cube & kMask));
-  }
-
   DecimatedMesh& mesh_;
   const double side_;
   const Vector3d start_;

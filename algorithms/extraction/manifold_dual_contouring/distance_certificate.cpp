@@ -18,9 +18,10 @@ static_assert(kNoTriangle == TriangleTree::kNone);
 
 using Eigen::Vector3d;
 
-/// What the bound may be exceeded by, voxels: so that pieces need not get smaller than this, and for the single precision
-/// of the search.
+/// What the bound may be exceeded by, voxels: so that pieces need not get smaller than this.
 constexpr double kSlack = 0.005;
+/// Part of it for a tolerance of 0: what rounding makes of the distance of a triangle to itself.
+constexpr double kRounding = 1e-6;
 
 /// One of the two meshes, as the other's triangles are laid over it.
 class Target {
@@ -68,9 +69,12 @@ bool reaches(const FineMesh& mesh, std::uint32_t triangle, const Corners& piece,
 template <class Bound>
 bool is_near(const Corners& piece, Target& target, double widest, const Bound& bound) {
   const Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0;
-  const NearestTriangle found = target.nearest(middle, widest);
+  const NearestTriangle found = target.nearest(middle, widest + kSlack);
   if (found.triangle == kNoTriangle) return false;
-  const double distance = std::sqrt(found.squared), within = bound(found.triangle);
+  // Once more in double precision: that of the search is single.
+  const Corners nearest = target.mesh().corners(found.triangle);
+  const double distance = std::sqrt(squared_distance(middle, nearest[0], nearest[1], nearest[2]));
+  const double within = bound(found.triangle);
   if (distance > within) return false;
   double radius = 0;
   for (const Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
@@ -99,7 +103,7 @@ Scope everything(const DecimatedMesh& mesh) {
   return scope;
 }
 
-/// Coarse triangles that have changed, and fine ones with a sample that lay or lies on one of these, with their neighbours.
+/// Coarse triangles that have changed, and fine ones with a sample on one of these, with their neighbours.
 Scope changes(const DecimatedMesh& mesh, const DecimatedMesh& before) {
   Scope scope;
   scope.coarse.resize(mesh.triangles.size());
@@ -161,9 +165,9 @@ DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const 
   Target to_fine(fine), to_coarse(coarse);
   const auto least = [&](std::uint32_t t) {
     const Triangle& corners = fine.triangles()[t];
-    return double(std::min({tolerance[corners[0]], tolerance[corners[1]], tolerance[corners[2]]}));
+    return std::max(kRounding, double(std::min({tolerance[corners[0]], tolerance[corners[1]], tolerance[corners[2]]})));
   };
-  double widest = 0;
+  double widest = kRounding;
   for (const float t : tolerance) widest = std::max(widest, double(t));
 
   const std::vector<std::uint32_t> far_from_coarse = far_ones(

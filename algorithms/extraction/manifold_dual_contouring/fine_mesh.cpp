@@ -1,11 +1,17 @@
 #include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
 
 #include <Eigen/Geometry>
+#include <string>
+
+#include "algorithms/core/error.h"
 
 namespace hermesh {
 
 FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
+  if (triangles_.size() > kNone / 3)
+    throw Error("the surface has " + std::to_string(triangles_.size()) +
+                " triangles, more than can be merged; use larger voxels or tolerance 0");
   for (const Triangle& t : triangles_)
     if (t[0] != kNone)
       for (const std::uint32_t p : t) ++first_[p + 1];

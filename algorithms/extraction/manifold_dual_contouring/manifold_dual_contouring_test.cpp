@@ -99,6 +99,25 @@ TEST(ManifoldDualContouring, ScaleOfZeroKeepsEveryPoint) {
   EXPECT_EQ(contour(hermite, 1.0, &field).points.size(), contour(hermite, 0.0).points.size());
 }
 
+/// A tolerance of 0 somewhere must not cost the merging elsewhere.
+TEST(ManifoldDualContouring, ScaleOfZeroInOneHalfLeavesTheOtherToMerge) {
+  const FloatHermite hermite = sphere();
+  initialize_openvdb();
+  const auto scale = openvdb::FloatGrid::create(0.0f);
+  scale->fill(openvdb::CoordBBox(openvdb::Coord(0, -30, -30), openvdb::Coord(30, 30, 30)), 1.0f);
+  AdaptivityField field;
+  field.scale = make_level_set(scale);
+  RunContext context;
+  const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.5, .uniform = {}}, &field, context);
+  EXPECT_EQ(context.figures.back(), (std::pair<std::string, double>("attempts", 1.0)));
+  const auto count = [](const PolygonMesh& of, float from, float to) {
+    return std::ranges::count_if(of.points, [&](const Eigen::Vector3f& p) { return p[0] > from && p[0] < to; });
+  };
+  const PolygonMesh fine = contour(hermite, 0.0);
+  EXPECT_EQ(count(mesh, -30, -2), count(fine, -30, -2));
+  EXPECT_LT(count(mesh, 3, 30), count(fine, 3, 30) / 4);
+}
+
 TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
   const FloatHermite hermite = sphere();
   initialize_openvdb();

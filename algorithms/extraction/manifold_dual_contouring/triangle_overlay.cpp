@@ -43,21 +43,29 @@ bool passes_over(const Place& from, const Place& to) {
   return begin < end;
 }
 
-TriangleOverlay::Cover TriangleOverlay::look_at(const OverTriangle& over, const Corners& corners,
-                                                const std::array<Place, 3>& places, double within) {
-  for (int i = 0; i < 3; ++i)
-    if (places[0][i] >= -kNarrow && places[1][i] >= -kNarrow && places[2][i] >= -kNarrow) return Cover::none;
-  const auto faces_alike = [&] {
-    const Eigen::Vector3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    return n.dot(over.normal()) > kFacing * n.norm();
-  };
-  const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
-  if (highest <= within && faces_alike()) return Cover::near;
+/// Whether the part over the triangle has some area. Seen along the triangle's normal, two of the distances beyond its sides
+/// are coordinates.
+bool TriangleOverlay::overlaps(const std::array<Place, 3>& places) {
   const ClippedTriangle part(places);
-  if (part.size < 3) return Cover::none;
+  double twice_area = 0;
+  for (int i = 1; i + 1 < part.size; ++i) {
+    const Place a = part.corners[i] - part.corners[0], b = part.corners[i + 1] - part.corners[0];
+    twice_area += a[0] * b[1] - a[1] * b[0];
+  }
+  constexpr double kNoArea = 1e-9;  // square voxels
+  return std::abs(twice_area) > kNoArea;
+}
+
+bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Corners& corners,
+                                              const std::array<Place, 3>& places, double within) {
+  const Eigen::Vector3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  if (!(n.dot(over.normal()) > kFacing * n.norm())) return false;
+  const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
+  if (highest <= within) return true;
+  const ClippedTriangle part(places);
   for (int i = 0; i < part.size; ++i)
-    if (!(std::abs(part.corners[i][3]) <= within)) return Cover::far;
-  return faces_alike() ? Cover::near : Cover::far;
+    if (!(std::abs(part.corners[i][3]) <= within)) return false;
+  return true;
 }
 
 }  // namespace hermesh

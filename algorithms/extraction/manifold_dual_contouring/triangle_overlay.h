@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -60,7 +62,7 @@ class TriangleOverlay {
   /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther away than
   /// `within(face)`, a double, says of the face that this lies in.
   ///
-  /// **Why.** From `start` the faces that overlap the prism over t are collected, across every side that passes over its
+  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected, across every side that passes over its
   /// inside. All of them face as t does. So the projection of their union onto t's inside is open; it is closed, too, for
   /// no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are largest at the part's
   /// corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
@@ -73,16 +75,14 @@ class TriangleOverlay {
     if (++question_ == 0) std::fill(seen_.begin(), seen_.end(), 0), question_ = 1;
     faces_.assign(1, start);
     seen_[start] = question_;
-    bool any = false;
     while (!faces_.empty()) {
       const std::uint32_t face = faces_.back();
       faces_.pop_back();
       const Corners corners = mesh.corners(face);
       const std::array<OverTriangle::Place, 3> places = {over(corners[0]), over(corners[1]), over(corners[2])};
-      const Cover cover = look_at(over, corners, places, within(face));
-      if (cover == Cover::far) return false;
-      if (cover == Cover::none) continue;
-      any = true;
+      // All faces but the first were come to over the inside of t.
+      if (face == start && !overlaps(places)) return false;
+      if (!is_near_and_faces_alike(over, corners, places, within(face))) return false;
       for (int i = 0; i < 3; ++i) {
         if (!passes_over(places[i], places[(i + 1) % 3])) continue;
         const std::uint32_t next = mesh.across(face, i);
@@ -92,13 +92,13 @@ class TriangleOverlay {
         faces_.push_back(next);
       }
     }
-    return any;
+    return true;
   }
 
  private:
-  enum class Cover { none, near, far };
-  static Cover look_at(const OverTriangle& over, const Corners& corners,
-                       const std::array<OverTriangle::Place, 3>& places, double within);
+  static bool overlaps(const std::array<OverTriangle::Place, 3>& places);
+  static bool is_near_and_faces_alike(const OverTriangle& over, const Corners& corners,
+                                      const std::array<OverTriangle::Place, 3>& places, double within);
 
   std::vector<std::uint32_t> seen_, faces_;
   std::uint32_t question_ = 0;

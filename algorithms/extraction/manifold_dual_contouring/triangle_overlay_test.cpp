@@ -55,11 +55,24 @@ TEST(TriangleOverlay, SaysNoWhereTheMeshEndsOrFacesTheOtherWay) {
   EXPECT_FALSE(is_near({Vector3d(9, 9, 0), Vector3d(10, 9, 0), Vector3d(9, 10, 0)}, flat, 10, 0.2)) << "elsewhere";
 }
 
+TEST(TriangleOverlay, SaysNoWhereTheFirstFaceLiesElsewhere) {
+  const auto one = [](Vector3d a, Vector3d b, Vector3d c) { return FineMesh({a, b, c}, {{0, 1, 2}}); };
+  EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0)},
+                       one({-1, -1, 0}, {0.5, -1, 0}, {-1, 0.5, 0}), 0, 0.01))
+      << "apart by a side of the face";
+  EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(10, 0, 0), Vector3d(0, 10, 0)},
+                       one({0, 0, 0}, {-5, 1, 0}, {1, -5, 0}), 0, 0.01))
+      << "a corner in common";
+  // A fan whose steep sector lies below the triangle; the first face is the sector on the other side.
+  const FineMesh fan({{0, 0, 0}, {-5, 1, 0}, {1, -5, 0}, {3, 3, -6}}, {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}});
+  EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0.7, 0.7, 0)}, fan, 0, 0.1));
+}
+
 TEST(TriangleOverlay, NeverSaysYesWhereSamplesSayNo) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> height(-0.4, 0.4), place(0.5, 7.5), share(0.0, 1.0);
   int near = 0, far = 0;
-  for (int trial = 0; trial < 300; ++trial) {
+  for (int trial = 0; trial < 600; ++trial) {
     const FineMesh rough = sheet(8, [&](int, int) { return height(random); });
     Corners t;
     for (Vector3d& p : t) p = Vector3d(place(random), place(random), 0.5 * height(random));
@@ -68,7 +81,8 @@ TEST(TriangleOverlay, NeverSaysYesWhereSamplesSayNo) {
     if (n[2] < 0) std::swap(t[1], t[2]);
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3.0;
     const double within = 0.3 + 0.3 * share(random);
-    const std::uint32_t start = rough.walk(0, middle);
+    // Every other time from a face that need not be under the triangle at all.
+    const std::uint32_t start = trial % 2 ? rough.walk(0, middle) : static_cast<std::uint32_t>(random() % 128);
     const bool said = is_near(t, rough, start, within);
     (said ? near : far) += 1;
     if (!said) continue;
