@@ -53,7 +53,8 @@ LevelSet thinned(const LevelSet& volume, int every) {
 }
 
 /// Who competes; add a name to have another.
-constexpr std::array<const char*, 3> kExtractors = {"marching-cubes", "dual-contouring", "openvdb"};
+constexpr std::array<const char*, 4> kExtractors = {"marching-cubes", "dual-contouring",
+                                                         "manifold-dual-contouring", "openvdb"};
 
 class Measurer {
  public:

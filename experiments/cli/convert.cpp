@@ -22,7 +22,7 @@ namespace hermesh::cli {
 namespace {
 
 struct ExtractArguments {
-  std::string extractor = "dual-contouring";
+  std::string extractor;  ///< set by add_extract_options()
   double isovalue = 0.0;
   std::string grid;                  ///< empty: `sdf`, or the only scalar grid there is
   std::string source;                ///< empty: the polygons are not at hand
@@ -38,7 +38,8 @@ struct ChosenExtractor {
   Options options;
 };
 
-void add_extract_options(CLI::App& command, ExtractArguments& arguments) {
+void add_extract_options(CLI::App& command, ExtractArguments& arguments, const std::string& fallback) {
+  arguments.extractor = fallback;
   command.add_option("--extractor", arguments.extractor,
                      "Name of the extractor, see hermesh list (default: " + arguments.extractor + ")");
   command
@@ -144,11 +145,11 @@ void add_conversions(CLI::App& app, Session& session) {
     VoxelizeArguments voxelizing;
     ExtractArguments extracting;
   };
-  const auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<Arguments>();
 
   CLI::App* command = add_command(app, session, "extract", "A volume to a mesh");
   add_paths(*command, arguments->paths, "Volume: .vdb", kMeshOut);
-  add_extract_options(*command, arguments->extracting);
+  add_extract_options(*command, arguments->extracting, "dual-contouring");
   command->add_option("--grid", arguments->extracting.grid,
                       "Name of the grid (default: sdf, or the only scalar grid there is)");
   command->add_option("--source", arguments->extracting.source,
@@ -166,10 +167,11 @@ void add_conversions(CLI::App& app, Session& session) {
     };
   });
 
+  arguments = std::make_shared<Arguments>();
   command = add_command(app, session, "remesh", "Polygons to a level set and back to a mesh");
   add_paths(*command, arguments->paths, kMeshIn, kMeshOut);
   add_voxelize_options(*command, arguments->voxelizing);
-  add_extract_options(*command, arguments->extracting);
+  add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
   command->callback([arguments, &session] {
     session.command = [arguments, &session] {
       return run_remesh(arguments->paths, arguments->voxelizing, arguments->extracting, session);
