@@ -55,7 +55,7 @@ CuttingPlane plane_of(const std::string& text, const std::string& word) {
   return {normal, numbers[3]};
 }
 
-std::function<double(const Vector3d&)> density_of(const CutterChoices& choices, const LabelledSolid& solid,
+std::function<double(const Vector3d&)> density_of(const CutterChoices& choices, const FloatHermite& object,
                                                   RunContext& context) {
   context.check();
   if (choices.density) {
@@ -69,13 +69,9 @@ std::function<double(const Vector3d&)> density_of(const CutterChoices& choices, 
   if (!choices.impact) return {};
   double radius = choices.impact_radius;
   if (!(radius > 0)) {
-    Bounds box;
-    for (const auto& block : solid.blocks) {
-      Vector3d index;
-      for (int a = 0; a < 3; ++a) index[a] = double(block.lower[a]) - double(solid.placement.base[a]);
-      if (any(block.inside)) box.add(solid.placement.local(index));
-    }
-    radius = 0.25 * box.size().maxCoeff();
+    // A box of samples is a voxel smaller than the object, and that of a single sample has no size at all.
+    const double voxel = std::cbrt(std::abs(object.placement.linear.determinant()));
+    radius = 0.25 * (bounds_of(object).size().maxCoeff() + voxel);
   }
   return density_about(*choices.impact, radius);
 }
@@ -154,10 +150,22 @@ std::string without_folders(const std::string& word) {
   return result;
 }
 
+Bounds bounds_of(const FloatHermite& hermite) {
+  Bounds box;
+  for (const SignLeaf& leaf : hermite.leaves)
+    for_each_bit(leaf.inside, [&](int i) {
+      const Vector3d index(leaf.lower[0] + (i >> 6) - hermite.placement.base[0],
+                           leaf.lower[1] + ((i >> 3) & 7) - hermite.placement.base[1],
+                           leaf.lower[2] + (i & 7) - hermite.placement.base[2]);
+      box.add(hermite.placement.local(index) + hermite.placement.origin);
+    });
+  return box;
+}
+
 MadeCutters make_cutters(const CutterSpec& spec, const FloatHermite& object, const CutterChoices& choices,
                          RunContext& context) {
   const LabelledSolid solid = whole_solid(object, context);
-  const ScatterOptions scattering{choices.seed, density_of(choices, solid, context)};
+  const ScatterOptions scattering{choices.seed, density_of(choices, object, context)};
   if (spec.kind == CutterSpec::Kind::meshes) return made_meshes(spec, solid, scattering, choices, context);
   MadeCutters made;
   if (spec.kind == CutterSpec::Kind::planes) {

@@ -49,6 +49,9 @@ struct MadeCutters {
   std::vector<CuttingMesh> meshes;
 };
 
+/// Box of a solid's samples, world units.
+Bounds bounds_of(const FloatHermite& hermite);
+
 /// Scatters in the object where the word asks for it; random planes go through scattered places.
 /// @throws Error for a file that cannot be read; Cancelled.
 MadeCutters make_cutters(const CutterSpec& spec, const FloatHermite& object, const CutterChoices& choices,

@@ -49,9 +49,12 @@ Json json_of(const PieceOutput& piece, const std::string& file) {
 
 Json json_of(const LabelledFracture& fracture) {
   Json merged = Json::array();
-  for (const MergedSliver& sliver : fracture.merged)
-    merged.push_back(
-        {{"samples", sliver.samples}, {"code", sliver.code - 1}, {"into_code", sliver.into_code - 1}});
+  for (const MergedPiece& sliver : fracture.merged)
+    merged.push_back({{"samples", sliver.samples},
+                      {"code", sliver.code},
+                      {"name", sliver.name},
+                      {"into_code", sliver.into_code},
+                      {"into", sliver.into_name}});
   return {{"cut_edges", fracture.cut_edges},         {"made_up_crossings", fracture.made_up_crossings},
           {"repaired_cells", fracture.repair.cells}, {"changed_samples", fracture.repair.changed_samples},
           {"split_off", fracture.split_off},         {"small_pieces_kept", fracture.small_kept},
@@ -120,11 +123,14 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
   sketches_.push_back({std::move(piece.mesh), piece.mass.centre});
 }
 
-validation::FractureLedger FractureFolder::judge(RunContext& context) const {
+validation::FractureLedger FractureFolder::judge(RunContext& context,
+                                                 std::optional<double> uncut_volume) const {
   std::vector<MeshFile> files;
   for (std::uint32_t piece = 1; piece <= sketches_.size(); ++piece)
     files.push_back(read_mesh_file(folder_.path() / file_name(piece), context, {.attributes = true}));
-  return validation::judge_fracture(files, context);
+  validation::ExpectedVolumes expected{uncut_volume, {}};
+  for (const Json& piece : pieces_) expected.pieces.push_back(piece.at("volume").get<double>());
+  return validation::judge_fracture(files, context, expected);
 }
 
 void FractureFolder::commit(Json head, const FractureSummary& summary, bool picture, RunContext& context) {
@@ -176,18 +182,6 @@ void FractureFolder::draw(const std::string& title, RunContext& context) const {
                               return all;
                             }});
   render_sheet(folder_.path() / "exploded.png", sheet, context);
-}
-
-Bounds bounds_of(const FloatHermite& hermite) {
-  Bounds box;
-  for (const SignLeaf& leaf : hermite.leaves)
-    for_each_bit(leaf.inside, [&](int i) {
-      const Vector3d index(leaf.lower[0] + (i >> 6) - hermite.placement.base[0],
-                           leaf.lower[1] + ((i >> 3) & 7) - hermite.placement.base[1],
-                           leaf.lower[2] + (i & 7) - hermite.placement.base[2]);
-      box.add(hermite.placement.local(index) + hermite.placement.origin);
-    });
-  return box;
 }
 
 }  // namespace hermesh

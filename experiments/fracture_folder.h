@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,9 @@ class FractureFolder {
   /// `head` is what pieces.json begins with: how the fracture was made.
   void commit(nlohmann::ordered_json head, const FractureSummary& summary, bool picture, RunContext& context);
 
-  /// The pieces' files read back, judged. @throws Error; Cancelled
-  validation::FractureLedger judge(RunContext& context) const;
+  /// The pieces' files read back, judged, also against the volumes recorded of them and that of the uncut
+  /// object's mesh if it is given. @throws Error; Cancelled
+  validation::FractureLedger judge(RunContext& context, std::optional<double> uncut_volume = {}) const;
 
   static std::string file_name(std::uint32_t piece);
 
@@ -45,8 +47,5 @@ class FractureFolder {
   std::vector<Sketch> sketches_;
   std::size_t drawn_triangles_ = 0;
 };
-
-/// Box of a solid's samples, world units.
-Bounds bounds_of(const FloatHermite& hermite);
 
 }  // namespace hermesh

@@ -114,13 +114,18 @@ class Run {
       handing_over_ += since(start);
       return mesh;
     };
+    const std::size_t count = cutters_.meshes.empty() ? codes.size() : cutters_.meshes.size();
+    std::vector<char> took(count);
     openvdb_fracture(
-        object_.level_set, cutters_.meshes.empty() ? codes.size() : cutters_.meshes.size(), polygons,
-        method_.tolerance,
+        object_.level_set, count, polygons, method_.tolerance,
         [&](OpenvdbFragment&& made) {
-          if (!made.mesh.empty()) finish(piece_of(std::move(made)));
+          if (made.mesh.empty()) return;
+          if (made.cutter) took[*made.cutter] = 1;
+          finish(piece_of(std::move(made)));
         },
         context_);
+    for (std::size_t k = 0; k < count; ++k)
+      if (!took[k]) summary_.empty.push_back(cutters.name_of(cutters_.meshes.empty() ? codes[k] : k));
   }
 
   template <class Made>

@@ -220,8 +220,8 @@ PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
   return mesh;
 }
 
-FloatHermite box_on_samples() {
-  return sampled({.value = [](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - 8.2; },
+FloatHermite cube(double side) {
+  return sampled({.value = [=](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - side; },
                   .gradient =
                       [](const Vector3d& p) {
                         int axis;
@@ -233,26 +233,56 @@ FloatHermite box_on_samples() {
 
 TEST(FractureCutters, EachGetsARecord) {
   using State = CutterRecord::State;
-  const FloatHermite object = box_on_samples();
+  const FloatHermite object = cube(8.2);
   const std::vector<CuttingMesh> meshes = {{"corner", cuboid({3.5, 3.5, 3.5}, {12, 12, 12})},
                                            {"again", cuboid({4.5, 4.5, 4.5}, {12, 12, 12})},
                                            {"beside", cuboid({8.2, -4, -4}, {12, 4, 4})},
                                            {"far", cuboid({20, 20, 20}, {24, 24, 24})},
                                            {"none", {}},
-                                           {"thin", cuboid({1.2, -4, -4}, {1.4, 4, 4})}};
+                                           {"thin", cuboid({1.2, -4, -4}, {1.4, 4, 4})},
+                                           {"sliver", cuboid({-4.5, -4.5, -4.5}, {-2.5, -2.5, -2.5})}};
   RunContext context;
   const auto cutters = mesh_cutters(meshes, object.placement, context);
   const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
   ASSERT_EQ(fracture.piece_count(), 2u);
-  const State expected[] = {State::cuts,   State::covered, State::touches,
-                            State::misses, State::empty,   State::empty};
+  const State expected[] = {State::cuts,  State::covered, State::touches, State::misses,
+                            State::empty, State::empty,   State::merged};
   for (std::size_t k = 0; k < meshes.size(); ++k)
     EXPECT_EQ(fracture.cutters[k].state, expected[k]) << meshes[k].name;
+  ASSERT_EQ(fracture.merged.size(), 1u);
+  EXPECT_EQ(fracture.merged[0].code, 6u);
+  EXPECT_EQ(fracture.merged[0].samples, 8u);
+  EXPECT_EQ(fracture.merged[0].name, "taken by sliver");
+  EXPECT_EQ(fracture.merged[0].into_name, cutters->name_of(meshes.size()));
   EXPECT_TRUE(judged(pieces_of(fracture)).balances());
 }
 
+TEST(FractureCutters, APlaneOrCellWhoseSliverWasMergedSaysSo) {
+  using State = CutterRecord::State;
+  const FloatHermite object = cube(8.2);
+  RunContext context;
+  // One plane cuts off the four samples next to a corner, one misses.
+  const auto planes = plane_cutters(
+      {{Vector3d(0, 0, 1), 0.5}, {Vector3d(1, 1, 1), 22.5}, {Vector3d(1, 0, 0), 30.0}}, object.placement);
+  const LabelledFracture by_planes = labelled_fracture(object, *planes, {}, context);
+  EXPECT_EQ(by_planes.piece_count(), 2u);
+  const State expected[] = {State::cuts, State::merged, State::misses};
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(by_planes.cutters[k].state, expected[k]) << k;
+  const auto cells =
+      voronoi_cutters({{-4, 0, 0}, {4, 0, 0}, {8.2, 8.2, 8.2}, {8.2, 8.2, 6.9}}, {}, object.placement);
+  FractureOptions options;
+  options.least_samples = 200;
+  const LabelledFracture by_cells = labelled_fracture(object, *cells, options, context);
+  for (const CutterRecord& record : by_cells.cutters) {
+    bool has_a_piece = false;
+    for (std::size_t i = 1; i < by_cells.codes.size(); ++i)
+      has_a_piece = has_a_piece || cells->name(by_cells.codes[i]) == record.name;
+    EXPECT_EQ(record.state, has_a_piece ? State::cuts : State::merged) << record.name;
+  }
+}
+
 TEST(FractureCutters, OneThatSwallowsTheObjectLeavesItWhole) {
-  const FloatHermite object = box_on_samples();
+  const FloatHermite object = cube(8.2);
   RunContext context;
   const auto cutters =
       mesh_cutters({{"all", cuboid({-12, -12, -12}, {12, 12, 12})}}, object.placement, context);
@@ -265,7 +295,7 @@ TEST(FractureCutters, OneThatSwallowsTheObjectLeavesItWhole) {
 TEST(FractureCutters, ThatEndInAFaceOfTheObject) {
   // Faces of cutter and object lie in one plane, between samples and on them.
   for (const double side : {8.2, 8.0}) {
-    const FloatHermite object = box_on_samples();
+    const FloatHermite object = cube(side);
     RunContext context;
     const auto cutters =
         mesh_cutters({{"half", cuboid({0.5, -side, -side}, {side, side, side})}}, object.placement, context);
@@ -299,15 +329,18 @@ TEST(FractureMethods, TheThesisLeavesGapsAndTheVolumeNearlyAddsUp) {
   RunContext context;
   const auto cutters = cutters_of("voronoi", object, 6);
   double sum = 0.0;
-  std::size_t pieces = 0;
+  std::vector<PolygonMesh> pieces;
   thesis_fracture(
       object, *cutters, 0.0,
       [&](ThesisPiece&& piece) {
         sum += mass_properties(piece.mesh).volume;
-        pieces += !piece.mesh.empty();
+        if (!piece.mesh.empty()) pieces.push_back(std::move(piece.mesh));
       },
       context);
-  EXPECT_EQ(pieces, 6u);
+  EXPECT_EQ(pieces.size(), 6u);
+  const validation::FractureLedger ledger = judged(pieces);
+  EXPECT_FALSE(ledger.gaps_can_be_judged);
+  EXPECT_FALSE(ledger.balances()) << text(ledger);
   EXPECT_NEAR(sum, 24.0 * 18.0 * 28.0, 0.01 * 24.0 * 18.0 * 28.0);
 }
 

@@ -1,6 +1,7 @@
 // The books of fractures by all methods, and their times: figures 9.15 and 9.16 of the thesis.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <sstream>
 
@@ -150,14 +151,13 @@ class FractureBooks {
           folder.add(std::move(piece), child);
         },
         child);
-    const validation::FractureLedger ledger = folder.judge(child);
+    const validation::FractureLedger ledger = folder.judge(child, uncut_volume_);
     if (method == "labelled")
       folder.commit({{"object", subject.source}, {"seed", input_.seed}}, summary, true, child);
     Json& values = row.values;
     values = {{"pieces", ledger.pieces},
               {"triangles", ledger.triangles},
               {"seams", ledger.seam_triangles},
-              {"unmatched", ledger.unmatched_cut},
               {"open", ledger.rest_open_edges},
               {"crossing", ledger.intersecting_pairs},
               {"nested", ledger.nested_components},
@@ -169,7 +169,10 @@ class FractureBooks {
               {"csg", csg.in_milliseconds()},
               {"extraction", extraction.in_milliseconds()}};
     // Without tags what is no seam counts as original, and the difference says nothing.
-    if (method != "thesis") values["volume"] = ledger.volume_difference();
+    if (ledger.gaps_can_be_judged) {
+      values["unmatched"] = ledger.unmatched_cut;
+      values["volume"] = ledger.volume_difference();
+    }
     if (summary.labelled) add_stages(values, child, double(ledger.pieces));
     if (summary.labelled) values["changed"] = summary.labelled->repair.changed_samples;
     if (method == "labelled" && !ledger.balances()) row.broken = ledger.sentences();
@@ -188,9 +191,9 @@ class FractureBooks {
     };
     values["csg"] = share(
         {"blocks of the solid", "label samples", "find pieces", "repair labels", "crossings of the cuts"});
-    values["extraction"] =
-        share({"find cells", "place points", "let points leave", "connect", "sides of the triangles"}) +
-        " + " + values["extraction"].get<std::string>();
+    values["extraction"] = share({"find cells", "place points", "let points leave", "connect", "quadrics",
+                                  "decimate", "certify", "sides of the triangles"}) +
+                           " + " + values["extraction"].get<std::string>();
   }
 
   /// How fast what the cuts take from the uncut volume falls with the size of voxels.

@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <random>
 #include <functional>
 #include <map>
 #include <ostream>
@@ -100,6 +101,9 @@ class VolumeEnds : public testing::TestWithParam<Extractor> {
     return extract_with_ends(
         GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends);
   }
+  /// How far a cap may lie off its plane, in voxels. Where nothing may meet, points are not moved onto it afterwards; then
+  /// the uniform mesh is near it by its normals, and the tolerance of 0.1 comes on top.
+  double off() const { return GetParam().name == "manifold-dual-contouring" ? 0.15 : 1e-6; }
   RunContext context;
 };
 
@@ -118,13 +122,27 @@ TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
   EXPECT_NEAR(report.volume, 10.0 * 18.0 * 16.0, 30.0);
   for (std::size_t i = 0; i < ended.mesh.points.size(); ++i) {
     const Eigen::Vector3d p = ended.mesh.world(i);
-    EXPECT_GE(p.minCoeff(), -0.5 - 1e-6);
+    EXPECT_GE(p.minCoeff(), -0.5 - off());
     EXPECT_LE(p.x(), 9.51);  // no end, but a surface of the data
-    EXPECT_LE(p.y(), 17.5 + 1e-6);
-    EXPECT_LE(p.z(), 15.5 + 1e-6);
+    EXPECT_LE(p.y(), 17.5 + off());
+    EXPECT_LE(p.z(), 15.5 + off());
   }
-  EXPECT_NEAR(bounds(ended.mesh).lower.x(), -0.5, 1e-6);
-  EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, 1e-6);
+  EXPECT_NEAR(bounds(ended.mesh).lower.x(), -0.5, off());
+  EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, off());
+}
+
+/// Moving points onto the caps' planes made the mesh of a CT intersect itself.
+TEST_P(VolumeEnds, CapsKeepThePromiseThatNothingMeets) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> value(0.0f, 100.0f);
+  const LevelSet noise =
+      make_level_set(dense(Coord(0, 0, 0), Coord(11, 11, 11), -1.0f, [&](int, int, int) { return value(random); }));
+  const EndedMesh ended = extract(noise, 50.0, Ends::closed);
+  EXPECT_EQ(counts_of(ended.mesh).boundary_edges, 0);
+  if (!GetParam().promises.no_self_intersection) return;
+  const validation::MeshReport report = validation::judge(to_mesh_file(ended.mesh), {.libraries = false}, context);
+  ASSERT_TRUE(report.self_intersections);
+  EXPECT_EQ(report.self_intersections->pairs, 0);
 }
 
 TEST_P(VolumeEnds, CutBallHasAFlatCap) {
@@ -141,8 +159,12 @@ TEST_P(VolumeEnds, CutBallHasAFlatCap) {
       const double z = ended.mesh.world(i).z();
       if (z <= 15.0 + 2e-3) continue;
       ++cap;
-      EXPECT_NEAR(z, 15.5, 1e-6);
+      EXPECT_LE(z, 15.5 + off());
+      if (off() < 0.1) {  // rims are round where points stay where they were placed
+        EXPECT_NEAR(z, 15.5, off());
+      }
     }
+    EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, off());
     EXPECT_GE(cap, 4u);  // some extractors merge what is flat
   }
 }
@@ -176,7 +198,7 @@ TEST_P(VolumeEnds, TurnedMirroredAndFarAway) {
   const validation::MeshReport report = counts_of(closed.mesh);
   EXPECT_EQ(report.boundary_edges, 0);
   EXPECT_GT(report.volume, 0.0);  // counter-clockwise seen from outside
-  EXPECT_NEAR(bounds(closed.mesh).upper.z(), 500 + 3 * 15.5, 1e-4);
+  EXPECT_NEAR(bounds(closed.mesh).upper.z(), 500 + 3 * 15.5, 1e-4 + 3 * off());
   for (const Eigen::Vector3d& p : boundary_points(extract(make_level_set(grid), 0.0, Ends::open).mesh))
     EXPECT_NEAR(p.z(), 500 + 3 * 15.0, 1e-4);
 }
@@ -193,7 +215,7 @@ TEST_P(VolumeEnds, ClippedLevelSet) {
   EXPECT_EQ(report.components, 1);
   EXPECT_EQ(report.euler_characteristic, 2);
   const double plane = 0.5 * (last + 0.5);
-  EXPECT_NEAR(bounds(closed.mesh).upper.y(), plane, 1e-6);
+  EXPECT_NEAR(bounds(closed.mesh).upper.y(), plane, off());
   // A ball of radius 10 below the plane.
   const double height = 10.0 + plane, exact = M_PI * height * height * (30.0 - height) / 3.0;
   EXPECT_NEAR(report.volume, exact, 0.02 * exact);

@@ -95,11 +95,12 @@ void openvdb_fracture(const LevelSet& object, std::size_t cutters, const Openvdb
     fracture.fracture(rest, *cut);
     fragment.csg_seconds = watch.seconds();
     fragment.name = "fragment " + std::to_string(k);
+    fragment.cutter = k;
     for (const FloatGrid::Ptr& grid : fracture.fragments()) fragments.emplace_back(grid, fragment);
     context.progress("fracture", 0.5 * double(k + 1) / double(cutters));
   }
   for (const FloatGrid::Ptr& grid : rest)
-    fragments.emplace_back(grid, OpenvdbFragment{"rest", {}, 0.0, 0.0, 0.0});
+    fragments.emplace_back(grid, OpenvdbFragment{.name = "rest", .mesh = {}});
   for (std::size_t i = 0; i < fragments.size(); ++i) {
     context.check();
     auto& [grid, fragment] = fragments[i];

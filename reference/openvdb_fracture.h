@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "algorithms/core/level_set.h"
@@ -17,6 +18,7 @@ struct OpenvdbFragment {
   PolygonMesh
       mesh;  ///< with the polygon attribute `surface`: 1 where OpenVDB does not flag the polygon as exterior
   double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
+  std::optional<std::size_t> cutter = {};  ///< that took it; nothing for what is left
 };
 
 /// Cutter k by its number, with the object's origin and unit of length; called once each, in order.

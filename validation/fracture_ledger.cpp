@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -16,6 +17,11 @@ namespace hermesh::validation {
 namespace {
 
 using Eigen::Vector3d;
+
+/// The uncut mesh differs from the pieces by what their cells along the cuts move, which stays below.
+constexpr double kLostPiece = 0.02;
+/// Of a piece's volume, besides what single precision of its coordinates makes of it.
+constexpr double kRecordError = 1e-6;
 
 /// Polygon attribute `surface`, or null.
 const std::vector<std::int32_t>* surface_of(const MeshFile& mesh) {
@@ -43,14 +49,17 @@ struct Entry {
 
 class Ledger {
  public:
-  Ledger(const std::vector<MeshFile>& pieces, RunContext& context) : pieces_(pieces), context_(context) {}
+  Ledger(const std::vector<MeshFile>& pieces, const ExpectedVolumes& expected, RunContext& context)
+      : pieces_(pieces), expected_(expected), context_(context) {}
 
   FractureLedger run() {
     ledger_.pieces = static_cast<std::int64_t>(pieces_.size());
     judge_pieces();
     weld();
     find_seams();
+    judge_tags();
     judge_rest();
+    compare_volumes();
     {
       const Stage stage(context_, "intersections of all pieces");
       MeshFile all;
@@ -168,13 +177,73 @@ class Ledger {
     }
   }
 
+  /// What is neither matched nor said to be cut passes for original, so that gaps show by tags alone.
+  void judge_tags() {
+    if (pieces_.size() < 2 || ledger_.seam_triangles == ledger_.triangles) return;
+    const bool all_tagged =
+        std::none_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface < 0; });
+    const bool some_cut =
+        std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface > 0; });
+    ledger_.gaps_can_be_judged = (all_tagged && some_cut) || are_far_apart();
+  }
+
+  /// A gap that a fracture leaves is narrower than the cells along it, and their edges are as long as they
+  /// are: pieces whose boxes are farther apart than the longest edge were never one.
+  bool are_far_apart() const {
+    double longest = 0.0;
+    for (const Triangle& t : triangles_)
+      for (int k = 0; k < 3; ++k)
+        longest = std::max(longest, (points_[t[k]] - points_[t[(k + 1) % 3]]).norm());
+    std::vector<Box> boxes;
+    for (const MeshFile& piece : pieces_) {
+      boxes.push_back(box_of(piece));
+      if (boxes.back().empty()) return false;
+      boxes.back().lower.array() -= 0.5 * longest;
+      boxes.back().upper.array() += 0.5 * longest;
+    }
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (boxes[i].overlaps(boxes[j])) return false;
+    return true;
+  }
+
+  void compare_volumes() {
+    if (expected_.whole && *expected_.whole != 0)
+      ledger_.expected_difference = ledger_.pieces_volume / *expected_.whole - 1.0;
+    if (expected_.pieces.empty()) return;
+    ledger_.wrong_records = std::abs(static_cast<std::int64_t>(expected_.pieces.size()) -
+                                     static_cast<std::int64_t>(pieces_.size()));
+    for (std::size_t i = 0; i < std::min(expected_.pieces.size(), pieces_.size()); ++i) {
+      if (std::abs(volumes_[i] - expected_.pieces[i]) <=
+          kRecordError * std::abs(expected_.pieces[i]) + rounding(pieces_[i]))
+        continue;
+      ++ledger_.wrong_records;
+      if (!pieces_[i].points.empty())
+        say("piece " + std::to_string(i) + " holds " + std::to_string(volumes_[i]) + ", its record says " +
+                std::to_string(expected_.pieces[i]),
+            pieces_[i].points.front());
+    }
+  }
+
+  /// How far a volume moves if each coordinate is rounded to single precision.
+  static double rounding(const MeshFile& piece) {
+    double area = 0.0, greatest = 0.0;
+    for (const Triangle& t : TriangleSoup(piece).triangles)
+      area += 0.5 *
+              (piece.points[t[1]] - piece.points[t[0]]).cross(piece.points[t[2]] - piece.points[t[0]]).norm();
+    for (const Vector3d& p : piece.points) greatest = std::max(greatest, p.cwiseAbs().maxCoeff());
+    return area * greatest * double(std::numeric_limits<float>::epsilon());
+  }
+
   void judge_rest() {
     ledger_.rest_triangles = static_cast<std::int64_t>(rest_.size());
     Vector3d about = Vector3d::Zero();
     for (const Vector3d& p : points_) about += p / static_cast<double>(points_.size());
     ledger_.rest_volume = volume_of(points_, rest_, about);
-    for (const MeshFile& piece : pieces_)
-      ledger_.pieces_volume += volume_of(piece.points, TriangleSoup(piece).triangles, about);
+    for (const MeshFile& piece : pieces_) {
+      volumes_.push_back(volume_of(piece.points, TriangleSoup(piece).triangles, about));
+      ledger_.pieces_volume += volumes_.back();
+    }
     // Each directed edge counts for its own way, its opposite against it.
     std::vector<std::tuple<std::uint32_t, std::uint32_t, int>> edges;
     for (const Triangle& t : rest_)
@@ -254,12 +323,14 @@ class Ledger {
   }
 
   const std::vector<MeshFile>& pieces_;
+  const ExpectedVolumes& expected_;
   RunContext& context_;
   FractureLedger ledger_;
   std::vector<Vector3d> points_;            ///< of the whole
   std::vector<std::uint32_t> first_point_;  ///< by piece, in number_
   std::vector<std::uint32_t> number_;       ///< in points_, of each point of each piece
   std::vector<Triangle> triangles_, once_, rest_;
+  std::vector<double> volumes_;  ///< by piece
   std::vector<Entry> entries_;
 };
 
@@ -270,11 +341,19 @@ double FractureLedger::volume_difference() const {
   return size > 0 ? std::abs(rest_volume - pieces_volume) / size : 0.0;
 }
 
+bool FractureLedger::lost_a_piece() const {
+  return expected_difference && !(std::abs(*expected_difference) <= kLostPiece);
+}
+
 std::vector<std::string> FractureLedger::sentences() const {
   std::vector<std::string> result;
   const auto say = [&](std::int64_t n, const std::string& what) {
     if (n > 0) result.push_back(std::to_string(n) + " " + what + ".");
   };
+  if (pieces == 0) result.push_back("There are no pieces.");
+  if (!gaps_can_be_judged)
+    result.push_back(
+        "The pieces are not tagged: gaps cannot be judged (no attribute `surface` says what is cut).");
   say(broken_pieces, "pieces are not closed, manifold, oriented and free of self-intersections");
   say(unmatched_cut, "cut triangles have no other side");
   say(matched_original, "triangles are tagged original but lie between two pieces");
@@ -285,14 +364,20 @@ std::vector<std::string> FractureLedger::sentences() const {
   if (volume_difference() > 1e-9)
     result.push_back("The pieces' volumes sum to " + std::to_string(pieces_volume) +
                      ", the original surface holds " + std::to_string(rest_volume) + ".");
+  if (lost_a_piece())
+    result.push_back("The pieces' volumes sum to " + std::to_string(pieces_volume) +
+                     ", which is not the uncut object's: they differ by " +
+                     std::to_string(100.0 * *expected_difference) + " %.");
+  say(wrong_records, "pieces do not hold the volume that was recorded of them");
   if (result.empty())
     result.push_back("The books balance: " + std::to_string(pieces) + " pieces, " +
                      std::to_string(seam_triangles) + " seam triangles, each reversed in one other piece.");
   return result;
 }
 
-FractureLedger judge_fracture(const std::vector<MeshFile>& pieces, RunContext& context) {
-  return Ledger(pieces, context).run();
+FractureLedger judge_fracture(const std::vector<MeshFile>& pieces, RunContext& context,
+                              const ExpectedVolumes& expected) {
+  return Ledger(pieces, expected, context).run();
 }
 
 }  // namespace hermesh::validation

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,17 @@
 
 namespace hermesh::validation {
 
+/// What the volumes are compared with, as far as it is known.
+struct ExpectedVolumes {
+  std::optional<double> whole;  ///< of the uncut object's mesh
+  std::vector<double> pieces;   ///< of each piece, as it was recorded; empty if nothing was
+};
+
 struct FractureLedger {
   std::int64_t pieces = 0, triangles = 0;
+  /// Of several pieces, that the tags tell what was cut, or that there is no need to know: each triangle is
+  /// matched, or the pieces are so far apart that no two of them were one.
+  bool gaps_can_be_judged = true;
 
   // Triangles with the same three points, compared exactly, in any order.
   std::int64_t seam_triangles = 0;  ///< of a piece, reversed in exactly one other piece and nowhere else
@@ -31,19 +41,27 @@ struct FractureLedger {
   std::int64_t broken_pieces = 0;       ///< not closed, manifold, oriented or intersecting themselves
   std::vector<std::string> places;      ///< a sentence for the first offenders of each kind
 
+  /// By how much the pieces' volumes sum to more than what was expected of the whole, relative to that. Cells
+  /// along the cuts place their points anew, so it is not exactly 0.
+  std::optional<double> expected_difference;
+  std::int64_t wrong_records = 0;  ///< pieces whose volume is not the recorded one, or without a record
+
   double volume_difference() const;  ///< between the two volumes, relative to the greater one's size
+  bool lost_a_piece() const;         ///< too much of the expected volume is missing, or there is too much
   bool balances() const {
-    return unmatched_cut == 0 && matched_original == 0 && repeated_triangles == 0 && rest_open_edges == 0 &&
-           intersecting_pairs == 0 && nested_components == 0 && broken_pieces == 0 &&
-           volume_difference() <= 1e-9;
+    return pieces > 0 && gaps_can_be_judged && unmatched_cut == 0 && matched_original == 0 &&
+           repeated_triangles == 0 && rest_open_edges == 0 && intersecting_pairs == 0 &&
+           nested_components == 0 && broken_pieces == 0 && volume_difference() <= 1e-9 && !lost_a_piece() &&
+           wrong_records == 0;
   }
   std::vector<std::string> sentences() const;  ///< what does not balance, or that all of it does
 };
 
 /// Quads count as their two triangles. Pieces without the polygon attribute `surface` are judged without it:
-/// then unmatched_cut and matched_original stay 0. Neighbourhood goes by exactly equal coordinates across the
-/// pieces.
+/// then unmatched_cut and matched_original stay 0, and gaps cannot be judged. Neighbourhood goes by exactly
+/// equal coordinates across the pieces.
 /// @throws Cancelled; Error for a piece that judge() refuses.
-FractureLedger judge_fracture(const std::vector<MeshFile>& pieces, RunContext& context);
+FractureLedger judge_fracture(const std::vector<MeshFile>& pieces, RunContext& context,
+                              const ExpectedVolumes& expected = {});
 
 }  // namespace hermesh::validation

@@ -32,10 +32,16 @@ std::vector<MeshFile> bar() {
           cuboid({3, 0, 0}, {4, 1, 1}, true, false)};
 }
 
-FractureLedger judged(const std::vector<MeshFile>& pieces) {
+FractureLedger judged(const std::vector<MeshFile>& pieces, const ExpectedVolumes& expected = {}) {
   RunContext context;
-  return judge_fracture(pieces, context);
+  return judge_fracture(pieces, context, expected);
 }
+
+void remove_tags(std::vector<MeshFile>& pieces) {
+  for (MeshFile& piece : pieces) piece.attributes.clear();
+}
+
+std::string first_sentence(const FractureLedger& ledger) { return ledger.sentences().front(); }
 
 TEST(FractureLedger, BalancesForABarInThreePieces) {
   const FractureLedger ledger = judged(bar());
@@ -48,10 +54,68 @@ TEST(FractureLedger, BalancesForABarInThreePieces) {
   EXPECT_DOUBLE_EQ(ledger.pieces_volume, 4.0);
 }
 
-TEST(FractureLedger, NeedsNoTags) {
+TEST(FractureLedger, OfNoPiecesDoesNotBalance) {
+  EXPECT_FALSE(judged({}).balances());
+  EXPECT_EQ(first_sentence(judged({})), "There are no pieces.");
+}
+
+TEST(FractureLedger, DoesNotBalanceWithoutTags) {
   std::vector<MeshFile> pieces = bar();
-  for (MeshFile& piece : pieces) piece.attributes.clear();
-  EXPECT_TRUE(judged(pieces).balances());
+  remove_tags(pieces);
+  for (const double gap : {0.0, 0.5}) {
+    for (Vector3d& p : pieces[2].points) p.x() += gap;
+    const FractureLedger ledger = judged(pieces);
+    EXPECT_EQ(ledger.unmatched_cut, 0) << gap;
+    EXPECT_FALSE(ledger.balances()) << gap;
+    EXPECT_NE(first_sentence(ledger).find("not tagged: gaps cannot be judged"), std::string::npos)
+        << first_sentence(ledger);
+  }
+  pieces = bar();
+  pieces[1].attributes.clear();
+  EXPECT_FALSE(judged(pieces).balances());
+}
+
+TEST(FractureLedger, DoesNotBalanceWhereNothingIsSaidToBeCut) {
+  for (const double gap : {1e-7, 0.5}) {
+    const std::vector<MeshFile> pieces = {cuboid({0, 0, 0}, {1, 1, 1}, false, false),
+                                          cuboid({1 + gap, 0, 0}, {3, 1, 1}, false, false)};
+    const FractureLedger ledger = judged(pieces);
+    EXPECT_FALSE(ledger.balances()) << gap;
+    EXPECT_NE(first_sentence(ledger).find("not tagged: gaps cannot be judged"), std::string::npos)
+        << first_sentence(ledger);
+  }
+}
+
+TEST(FractureLedger, NeedsNoTagsWhereNoGapCanBe) {
+  std::vector<MeshFile> one = {cuboid({0, 0, 0}, {1, 1, 1}, false, false)};
+  remove_tags(one);
+  EXPECT_TRUE(judged(one).balances()) << first_sentence(judged(one));
+  std::vector<MeshFile> apart = {cuboid({0, 0, 0}, {1, 1, 1}, false, false),
+                                 cuboid({4, 0, 0}, {5, 1, 1}, false, false)};
+  EXPECT_TRUE(judged(apart).balances()) << first_sentence(judged(apart));
+  remove_tags(apart);
+  EXPECT_TRUE(judged(apart).balances()) << first_sentence(judged(apart));
+}
+
+TEST(FractureLedger, SeesALostPiece) {
+  std::vector<MeshFile> pieces = {cuboid({0, 0, 0}, {1, 1, 1}, false, true),
+                                  cuboid({1, 0, 0}, {3, 1, 1}, true, false)};
+  FractureLedger ledger = judged(pieces, {.whole = 3.03, .pieces = {1.0, 2.0}});
+  EXPECT_TRUE(ledger.balances()) << first_sentence(ledger);
+  ASSERT_TRUE(ledger.expected_difference.has_value());
+  EXPECT_NEAR(*ledger.expected_difference, 3.0 / 3.03 - 1.0, 1e-12);
+  ledger = judged(pieces, {.whole = 4.0, .pieces = {}});
+  EXPECT_FALSE(ledger.balances());
+  EXPECT_NE(first_sentence(ledger).find("not the uncut object's"), std::string::npos);
+  EXPECT_FALSE(judged(pieces).expected_difference.has_value());
+}
+
+TEST(FractureLedger, SeesAVolumeThatIsNotTheRecorded) {
+  EXPECT_EQ(judged(bar(), {.whole = {}, .pieces = {1.0, 2.0, 1.0 + 1e-7}}).wrong_records, 0);
+  const FractureLedger wrong = judged(bar(), {.whole = {}, .pieces = {1.0, 2.0, 1.001}});
+  EXPECT_EQ(wrong.wrong_records, 1);
+  EXPECT_FALSE(wrong.balances());
+  EXPECT_EQ(judged(bar(), {.whole = {}, .pieces = {1.0, 2.0}}).wrong_records, 1);
 }
 
 TEST(FractureLedger, SeesAShiftedPiece) {

@@ -194,8 +194,8 @@ EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& i
   if (!closed.ends.any()) return result;
   if (ends == Ends::open)
     result.mesh = open_ends(result.mesh, closed.volume, closed.ends);
-  else
-    flatten_ends(result.mesh, closed.volume, closed.ends);
+  else if (!extractor.promises.no_self_intersection)
+    flatten_ends(result.mesh, closed.volume, closed.ends);  // moves points without a look at what they might meet
   return result;
 }
 

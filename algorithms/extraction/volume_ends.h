@@ -56,7 +56,8 @@ struct ClosedVolume {
 ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& context);
 
 /// Moves the points of an extractor's mesh that lie beyond the last samples onto the plane half a voxel beyond, along the
-/// grid's axis: extractors that place points inside cells round the cap's rim. For meshes of close_ends()' volume.
+/// grid's axis: extractors that place points inside cells round the cap's rim. For meshes of close_ends()' volume. May make
+/// polygons intersect, so that extractors that promise otherwise are left with their rims.
 void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends);
 
 /// Cuts the mesh of close_ends()' volume off in the planes of the last samples. Polygons that straddle a plane are cut at

@@ -10,23 +10,24 @@ namespace {
 
 /// Until no sliver is left that can be merged: a repair may leave new ones, and a merge may call for a
 /// repair. Should that not end soon, the last slivers stay pieces.
-void settle(LabelledSolid& solid, const FractureOptions& options, LabelledFracture& result,
-            RunContext& context) {
-  constexpr int kPasses = 6;
+void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions& options,
+            LabelledFracture& result, RunContext& context) {
+  constexpr int kPasses = 5;
+  const auto value = [&](std::uint32_t code) { return solid.code_values[code - 1]; };
   for (int pass = 0; pass < kPasses; ++pass) {
-    const bool last = pass + 1 == kPasses;
-    ComponentReport found =
-        settle_components(solid, {options.split, last ? 0 : options.least_samples}, context);
-    result.merged.insert(result.merged.end(), found.merged.begin(), found.merged.end());
+    const ComponentReport found = settle_components(solid, {options.split, options.least_samples}, context);
+    for (const MergedSliver& sliver : found.merged)
+      result.merged.push_back({value(sliver.code), value(sliver.into_code),
+                               cutters.name_of(value(sliver.code)), cutters.name_of(value(sliver.into_code)),
+                               sliver.samples});
     result.split_off += found.split_off;
-    result.small_kept = found.small_kept;
     if (pass > 0 && found.merged.empty()) return;
     const RepairReport repaired = repair_labels(solid, context);
     result.repair.cells += repaired.cells;
     result.repair.changed_samples += repaired.changed_samples;
     result.repair.forced_changes += repaired.forced_changes;
-    if (last) settle_components(solid, {options.split, 0}, context);
   }
+  result.split_off += settle_components(solid, {options.split, 0}, context).split_off;
 }
 
 std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const LabelField& field,
@@ -78,6 +79,19 @@ bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t
   return false;
 }
 
+/// Whether slivers are all that the cutter took. A plane's sliver is merged across it; a code of its own has
+/// no piece then.
+bool was_merged(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
+                const CutterRecord& record, const std::vector<MergedPiece>& merged) {
+  if (cutters.plane_sides())
+    return record.edges == 0 && std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) {
+             return ((m.code ^ m.into_code) >> cutter & 1) != 0;
+           });
+  for (std::uint32_t piece = 1; piece <= solid.piece_count(); ++piece)
+    if (solid.code_values[solid.code_of[piece] - 1] == cutter) return false;
+  return std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) { return m.code == cutter; });
+}
+
 CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
                              const CutterRecord& record) {
   using State = CutterRecord::State;
@@ -89,7 +103,7 @@ CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters,
 }
 
 std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledGrid& grid,
-                                     const Cutters& cutters) {
+                                     const Cutters& cutters, const std::vector<MergedPiece>& merged) {
   std::vector<CutterRecord> records(cutters.count());
   for (std::size_t e = 0; e < grid.edge_count(); ++e)
     if (const std::int32_t cutter = grid.sides(e).cutter; cutter >= 0)
@@ -103,7 +117,9 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
     records[k].name = cutters.name(k);
     // A wall between two cells carries the lower one's number, so a cell may cut without an edge of its own.
     const bool cell = codes_are_cutters && !cutters.signs(k, {});
-    if (cell && records[k].samples > 0 && records[k].samples < solid.samples)
+    if (was_merged(solid, cutters, k, records[k], merged))
+      records[k].state = CutterRecord::State::merged;
+    else if (cell && records[k].samples > 0 && records[k].samples < solid.samples)
       records[k].state = CutterRecord::State::cuts;
     else
       records[k].state = state_of(solid, cutters, k, records[k]);
@@ -115,7 +131,7 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
 
 const char* to_string(CutterRecord::State state) {
   static constexpr const char* kNames[] = {"cuts",    "takes",  "swallows", "covered",
-                                           "touches", "misses", "empty"};
+                                           "touches", "misses", "merged",   "empty"};
   return kNames[static_cast<std::size_t>(state)];
 }
 
@@ -126,6 +142,8 @@ const char* in_words(CutterRecord::State state) {
                                            "takes nothing: the cutters before it took all that it holds",
                                            "takes nothing: it only touches the object",
                                            "takes nothing: it misses the object",
+                                           "leaves no piece: its pieces were slivers and were merged into a "
+                                           "neighbour",
                                            "takes nothing: it is empty, or too thin to hold a sample"};
   return kWords[static_cast<std::size_t>(state)];
 }
@@ -137,16 +155,19 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
   LabelledFracture result;
   label_by_codes(solid, cutters, context);
-  settle(solid, options, result, context);
+  settle(solid, cutters, options, result, context);
   const LabelledGrid grid(solid, object, cutters, context);
   result.made_up_crossings = grid.made_up();
   result.grid_bytes = grid.memory_bytes();
   for (std::size_t e = 0; e < grid.edge_count(); ++e) result.cut_edges += grid.sides(e).front > 0;
-  result.cutters = records_of(solid, grid, cutters);
+  result.cutters = records_of(solid, grid, cutters, result.merged);
   result.mesh = joint_mesh(grid, options.placement, context);
   decimate_joint_mesh(result.mesh, options.tolerance, context);
   result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());
   result.samples = count_samples(solid, solid.labels, solid.piece_count() + 1);
+  result.small_kept = static_cast<std::uint64_t>(
+      std::count_if(result.samples.begin() + 1, result.samples.end(),
+                    [&](std::uint64_t samples) { return samples < options.least_samples; }));
   result.samples[0] = 0;
   result.names.resize(1);
   result.codes.resize(1);

@@ -1,11 +1,9 @@
 // Fracture: a solid into disjoint pieces (Aldén 2011, chapter 7).
 //
 //   labelled   every sample of the Hermite grid gets the number of its piece, and all pieces are meshed
-//   together, so that
-//              a seam is one surface with two sides (labelled_mesh.h). Ours, the default.
+//              together, so that a seam is one surface with two sides (labelled_mesh.h). Ours, the default.
 //   thesis     §7.1 as printed (thesis_fracture.h): cutters one after another, each piece meshed by itself.
-//   Its gaps are
-//              measured, not repaired.
+//              Its gaps are measured, not repaired.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +29,8 @@ struct CutterRecord {
     covered,   ///< the cutters before it took all that it holds
     touches,   ///< it holds nothing of the object, but samples next to it
     misses,
-    empty  ///< it holds no sample at all
+    merged,  ///< its pieces were slivers, and neighbours have them
+    empty    ///< it holds no sample at all
   };
   std::string name;
   State state = State::misses;
@@ -49,6 +48,13 @@ struct FractureOptions {
   std::uint64_t least_samples = 27;  ///< smaller ones join a neighbour; a cube of 3 voxels. 0 keeps all
 };
 
+/// A sliver that was given to a neighbour: codes as the cutters give them, and what they call them.
+struct MergedPiece {
+  CutCode code = 0, into_code = 0;
+  std::string name, into_name;
+  std::uint64_t samples = 0;
+};
+
 /// A solid in pieces, as labels and as one mesh of all.
 struct LabelledFracture {
   JointMesh mesh;
@@ -57,8 +63,9 @@ struct LabelledFracture {
   std::vector<std::uint64_t> samples;  ///< by piece
   std::vector<CutCode> codes;          ///< by piece: that of the cutters
   std::vector<CutterRecord> cutters;
-  std::vector<MergedSliver> merged;  ///< codes are values of Cutters here, less those that no sample has
-  std::uint64_t split_off = 0, small_kept = 0;
+  std::vector<MergedPiece> merged;
+  std::uint64_t split_off = 0;
+  std::uint64_t small_kept = 0;  ///< pieces that stayed below the least number of samples
   RepairReport repair;
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
   std::size_t grid_bytes = 0;  ///< labels, codes and crossings

@@ -1,5 +1,6 @@
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 
 #include "algorithms/core/variant.h"
 #include "algorithms/fracture/cutters.h"

@@ -1,7 +1,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <boost/math/tools/roots.hpp>
 #include <cmath>
+#include <limits>
 
 #include "algorithms/core/error.h"
 #include "algorithms/fracture/cutters.h"

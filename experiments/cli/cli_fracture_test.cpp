@@ -98,6 +98,48 @@ TEST_F(FractureTest, OtherMethods) {
   }
 }
 
+TEST_F(FractureTest, TheThesisMethodDoesNotPassTheJudge) {
+  write_cube();
+  const Outcome outcome =
+      fracture({"--cutters", "voronoi:4", "--method", "thesis", "--no-picture", "--judge"});
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.err << outcome.out;
+  EXPECT_NE(outcome.out.find("not tagged: gaps cannot be judged"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("The books balance"), std::string::npos) << outcome.out;
+  EXPECT_TRUE(is_there());  // the pieces are written all the same
+}
+
+TEST_F(FractureTest, AnEmptyCutterOfOpenvdbIsNoted) {
+  write_cube();
+  write_sphere();
+  const Outcome outcome =
+      fracture({"--cutters", "mesh:sphere.off,sphere.off", "--method", "openvdb", "--no-picture"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  ASSERT_EQ(ledger().at("cutters").size(), 1u) << outcome.err;
+  EXPECT_EQ(ledger().at("cutters")[0].at("state"), "nothing");
+}
+
+TEST_F(FractureTest, AnImpactNeedsNoRadiusOnASmallObject) {
+  write_cube();
+  const Outcome outcome = run({"fracture", "cube.off", "out", "--voxel-size", "0.5", "--cutters", "voronoi:2",
+                               "--impact", "0", "0", "0", "--min-volume", "0", "--no-picture"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(ledger().at("pieces").size(), 2u);
+}
+
+TEST_F(FractureTest, AMergedSliverIsNamed) {
+  write_cube();
+  const Outcome outcome = fracture({"--cutters", "planes:0,0,1,0.5;1,1,1,2.8", "--no-picture", "--judge"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  const nlohmann::json json = ledger();
+  EXPECT_EQ(json.at("cutters")[1].at("state"), "merged");
+  EXPECT_NE(outcome.err.find("plane 1 leaves no piece"), std::string::npos) << outcome.err;
+  const nlohmann::json& merged = json.at("labels").at("merged_slivers");
+  ASSERT_EQ(merged.size(), 1u);
+  EXPECT_EQ(merged[0].at("code"), 3);
+  EXPECT_EQ(merged[0].at("into_code"), 1);
+  EXPECT_NE(merged[0].at("name"), merged[0].at("into"));
+}
+
 TEST_F(FractureTest, BadInputIsOneSentenceAndLeavesNothing) {
   write_cube();
   const struct {
