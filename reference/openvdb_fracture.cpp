@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/stopwatch.h"
 #include "reference/grid_frame.h"
 #include "reference/openvdb_mesh_to_volume.h"
 
@@ -15,17 +16,6 @@ namespace hermesh {
 namespace {
 
 using openvdb::FloatGrid;
-
-class Stopwatch {
- public:
-  double seconds() {
-    const auto now = std::chrono::steady_clock::now(), before = std::exchange(start_, now);
-    return std::chrono::duration<double>(now - before).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 PolygonMesh mesh_of(const FloatGrid& fragment, const FloatGrid& reference, const GridFrame& frame,
                     double adaptivity) {

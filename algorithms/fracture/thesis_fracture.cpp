@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/stopwatch.h"
 #include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/fracture/labelled_solid.h"
@@ -128,18 +129,6 @@ class CodeSolid {
   At first_{};
   std::array<std::int32_t, 3> size_{};
   std::vector<BlockMask> masks_;
-};
-
-class Stopwatch {
- public:
-  /// Since it was made or asked last.
-  double seconds() {
-    const auto now = std::chrono::steady_clock::now(), before = std::exchange(start_, now);
-    return std::chrono::duration<double>(now - before).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 PolygonMesh meshed(const FloatHermite& piece, double threshold, RunContext& context) {

@@ -60,7 +60,7 @@ class BlockMerging {
     middle /= double(disc_.size());
     double reach = 0;
     for (const std::uint32_t w : disc_) reach = std::max(reach, (mesh_.vertices[w].point - middle).norm());
-    const Vector3d x = collapses_.quadric_about(disc_, middle).minimiser(Vector3d::Zero(), kPull);
+    const Vector3d x = collapses_.quadric_about(disc_, middle).minimiser();
     return collapses_.rounded(middle + x * std::min(1.0, reach / std::max(x.norm(), 1e-30)));
   }
 

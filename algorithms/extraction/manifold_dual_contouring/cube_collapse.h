@@ -14,7 +14,6 @@ class CubeCollapse {
 
   CubeMesh& mesh() { return local_; }
   const Collapse& collapse() const { return collapse_; }
-  const DecimationCube& cube() const { return cube_; }
 
   /// Makes the faces as they will be when v and those that go have become the point at x; v itself moves only if x is not
   /// where it is, and must be free then, as those that go must be. False if x lies outside of the cube, or if a face turns

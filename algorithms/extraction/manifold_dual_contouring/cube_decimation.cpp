@@ -63,7 +63,7 @@ class EdgeCollapses {
     const WideQuadric q = collapses_.quadric_about(std::array{u, v}, middle);
     Vector3d x = !at_u.free   ? Vector3d(at_u.point - middle)
                  : !at_v.free ? Vector3d(at_v.point - middle)
-                              : q.minimiser(Vector3d::Zero(), kPull);
+                              : q.minimiser();
     const double squared = (at_u.point - at_v.point).squaredNorm();
     // Planes that are nearly parallel meet far away: no farther than the edge is long.
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();

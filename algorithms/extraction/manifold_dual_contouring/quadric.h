@@ -46,10 +46,10 @@ struct WideQuadric {
     q.c = static_cast<float>((*this)(x));
     return q;
   }
-  /// Minimiser of the quadric and a weak pull (`pull` of its trace) towards a place, which decides where planes do not.
-  Eigen::Vector3d minimiser(const Eigen::Vector3d& towards, double pull) const {
-    const double weight = pull * a.trace() + 1e-12;
-    return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(weight * towards - b);
+  /// Minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which decides where planes do not.
+  Eigen::Vector3d minimiser() const {
+    const double weight = kPull * a.trace() + 1e-12;
+    return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b);
   }
 };
 
