@@ -184,8 +184,8 @@ MadeCutters make_cutters(const CutterSpec& spec, const FloatHermite& object, con
     const double between = spacing(solid, spec.count);
     displacement = {choices.roughness * between, 0.5 * between, hashed(choices.seed)};
   }
-  made.cutters =
-      voronoi_cutters(scatter(solid, spec.count, scattering, context), displacement, object.placement);
+  made.seeds = scatter(solid, spec.count, scattering, context);
+  made.cutters = voronoi_cutters(made.seeds, displacement, object.placement);
   return made;
 }
 

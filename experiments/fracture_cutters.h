@@ -43,10 +43,11 @@ struct CutterChoices {
   LevelSet density;            ///< where places are scattered: 0 never, its greatest value most often
 };
 
-/// Cutters, and the polygons of those that are meshes.
+/// Cutters, and what they were made from.
 struct MadeCutters {
   std::unique_ptr<Cutters> cutters;
-  std::vector<CuttingMesh> meshes;
+  std::vector<CuttingMesh> meshes = {};
+  std::vector<Eigen::Vector3d> seeds = {};  ///< of cells, world units
 };
 
 /// Box of a solid's samples, world units.

@@ -7,12 +7,16 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "algorithms/core/error.h"
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/core/simd_level.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/fracture/thesis_fracture.h"
 #include "algorithms/hermite/samplers.h"
+#include "experiments/fracture_tags.h"
+#include "experiments/recipes.h"
 #include "validation/fracture_ledger.h"
 
 namespace hermesh {
@@ -145,18 +149,44 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"rock", "voronoi", 8}, Case{"rock", "voronoi", 20}, Case{"rock", "planes", 4},
                     Case{"rock", "chunks", 8}, Case{"rock", "chunks", 20}));
 
-TEST(FractureBytes, AreTheSameAtAnyThreadCount) {
-  const FloatHermite object = rock();
-  const auto pieces = [&](int threads) {
+/// Of radius kHalf.
+PolygonMesh ball_of_polygons(const Vector3d& centre) {
+  RunContext context;
+  PolygonMesh ball = make_recipe("uv-sphere", {{"radius", kHalf}}, context);
+  for (auto& p : ball.points) p += centre.cast<float>();
+  return ball;
+}
+
+TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
+  // The solid from polygons, as the program gets it, and cutters of both kinds: all that runs as vector code.
+  const auto pieces = [&](int threads, const std::string& cutters, double tolerance) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
     RunContext context;
-    return pieces_of(labelled_fracture(object, *cutters_of("chunks", object, 12), {}, context));
+    const FloatHermite object = *hermite_on_lattice(ball_of_polygons(Vector3d::Zero()), {}, context);
+    std::vector<CuttingMesh> meshes(1);
+    meshes[0] = {"ball", ball_of_polygons({6.1, 13.2, -4.3})};
+    std::unique_ptr<Cutters> made;
+    if (cutters == "meshes")
+      made = mesh_cutters(meshes, object.placement, context);
+    else
+      made = cutters_of("chunks", object, 8);
+    FractureOptions options;
+    options.tolerance = tolerance;
+    return pieces_of(labelled_fracture(object, *made, options, context));
   };
-  const std::vector<PolygonMesh> one = pieces(1);
-  EXPECT_GE(one.size(), 12u);
-  EXPECT_TRUE(one == pieces(2));
-  EXPECT_TRUE(one == pieces(7));
+  for (const char* cutters : {"meshes", "chunks"})
+    for (const double tolerance : {0.0, 0.2}) {
+      const std::vector<PolygonMesh> one = pieces(1, cutters, tolerance);
+      EXPECT_GE(one.size(), 2u);
+      EXPECT_TRUE(one == pieces(2, cutters, tolerance));
+      EXPECT_TRUE(one == pieces(7, cutters, tolerance));
+      for (const SimdLevel level : available_simd_levels()) {
+        setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+        EXPECT_TRUE(one == pieces(2, cutters, tolerance)) << name(level);
+      }
+      unsetenv("HERMESH_SIMD");
+    }
 }
 
 TEST(FractureOfABox, CutByTwoPlanesIsExact) {
@@ -185,6 +215,16 @@ TEST(FractureOfABox, CutByTwoPlanesIsExact) {
   EXPECT_TRUE(judged(pieces).balances());
 }
 
+PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
+  PolygonMesh mesh;
+  for (int c = 0; c < 8; ++c)
+    mesh.points.push_back(
+        Vector3d(c & 1 ? upper.x() : lower.x(), c & 2 ? upper.y() : lower.y(), c & 4 ? upper.z() : lower.z())
+            .cast<float>());
+  mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  return mesh;
+}
+
 TEST(FractureTags, TellCutFromOriginal) {
   const FloatHermite object = sphere();
   RunContext context;
@@ -210,14 +250,36 @@ TEST(FractureTags, TellCutFromOriginal) {
   EXPECT_EQ(wrong, 0u);
 }
 
-PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
-  PolygonMesh mesh;
-  for (int c = 0; c < 8; ++c)
-    mesh.points.push_back(
-        Vector3d(c & 1 ? upper.x() : lower.x(), c & 2 ? upper.y() : lower.y(), c & 4 ? upper.z() : lower.z())
-            .cast<float>());
-  mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  return mesh;
+TEST(FractureTags, AreJudgedByInputAndWalls) {
+  // A box of half sides 10, 9, 8 and seeds at x = ±4: the wall is x = 0. Each half is told right at first: its five
+  // sides of the box and a rectangle at the wall, all of two triangles.
+  const std::vector<Vector3d> seeds = {{-4, 0, 0}, {4, 0, 0}};
+  EXPECT_DOUBLE_EQ(distance_to_walls(seeds, {-1.5, 7, 1}), 1.5);
+  EXPECT_DOUBLE_EQ(distance_to_walls({{0, 0, 0}, {2, 0, 0}, {0, 6, 0}}, {0.25, 1, 0}), 0.75);
+  const PolygonMesh box = cuboid({-10, -9, -8}, {10, 9, 8});
+  const DistanceOracle input(triangles_in_voxels(box, 0.5));
+  PolygonMesh left = cuboid({-10, -9, -8}, {0, 9, 8});
+  left.attributes = {{"surface", AttributeDomain::polygon, 1, std::vector<std::int32_t>{0, 1, 0, 0, 0, 0}, {}}};
+  TagJudge judge(input, box.origin, 0.5, seeds);
+  judge.add(left);
+  EXPECT_EQ(judge.counts().polygons, 6);
+  EXPECT_EQ(judge.counts().at_rims, 0);
+  EXPECT_EQ(judge.counts().precision(), 1.0);
+  EXPECT_EQ(judge.counts().recall(), 1.0);
+  // Told wrong: the wall is said to be original, a side to be cut.
+  left.attributes[0].values = std::vector<std::int32_t>{1, 0, 0, 0, 0, 0};
+  judge.add(left);
+  EXPECT_EQ(judge.counts().precision(), 0.5);
+  EXPECT_EQ(judge.counts().recall(), 0.5);
+  // A triangle in the rim: half a voxel from the wall and in a side of the box.
+  PolygonMesh rim;
+  rim.points = {{-0.3f, 9, 0}, {-0.2f, 9, 0}, {-0.25f, 9, 1}};
+  rim.triangles = {{0, 1, 2}};
+  EXPECT_THROW(judge.add(rim), Error);
+  rim.attributes = {{"surface", AttributeDomain::polygon, 1, std::vector<std::int32_t>{0}, {}}};
+  judge.add(rim);
+  EXPECT_EQ(judge.counts().at_rims, 1);
+  EXPECT_EQ(judge.counts().polygons, 13);
 }
 
 FloatHermite cube(double side) {

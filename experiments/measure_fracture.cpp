@@ -11,6 +11,7 @@
 #include "algorithms/hermite/samplers.h"
 #include "experiments/cell.h"
 #include "experiments/fracture_folder.h"
+#include "experiments/fracture_tags.h"
 #include "experiments/measure.h"
 #include "experiments/measurements.h"
 #include "experiments/run_cells.h"
@@ -77,12 +78,15 @@ class FractureBooks {
       if (!input_.parameters.is("cases", "all") && !input_.parameters.is("cases", subject.source)) continue;
       PolygonMesh mesh = load(subject);
       const FractureObject object = sampled(mesh, scale * subject.longest);
+      tag_oracle_.emplace(triangles_in_voxels(mesh, object.level_set.voxel_size()));
+      tag_origin_ = mesh.origin;
       for (const double count : numbers(input_.parameters.text("pieces")))
         for (const char* method : {"labelled", "thesis", "openvdb"})
           for (const double tolerance : tolerances_of(method))
             add_row(subject, object, static_cast<std::size_t>(count), method, tolerance);
     }
     if (input_.parameters.is("order", "yes")) measure_order();
+    std::ranges::move(tag_rows_, std::back_inserter(rows_));
     return std::move(rows_);
   }
 
@@ -141,6 +145,9 @@ class FractureBooks {
     FractureFolder folder(input_.out / name, bounds_of(object.hermite));
     Range conversion, csg, extraction;
     double volume = 0.0;
+    // Displaced walls are known only where they are sought; those of plain cells in closed form.
+    const bool tagged = method != "thesis" && input_.parameters.is("cutters", "voronoi");
+    TagJudge tags(*tag_oracle_, tag_origin_, object.level_set.voxel_size(), cutters.seeds);
     const FractureSummary summary = run_fracture(
         object, cutters, {.name = method, .tolerance = tolerance, .options = {}},
         [&](PieceOutput&& piece) {
@@ -148,6 +155,7 @@ class FractureBooks {
           csg.add(piece.csg_seconds);
           extraction.add(piece.extraction_seconds);
           volume += piece.mass.volume;
+          if (tagged) tags.add(piece.mesh);
           folder.add(std::move(piece), child);
         },
         child);
@@ -176,6 +184,16 @@ class FractureBooks {
     if (summary.labelled) add_stages(values, child, double(ledger.pieces));
     if (summary.labelled) values["changed"] = summary.labelled->repair.changed_samples;
     if (method == "labelled" && !ledger.balances()) row.broken = ledger.sentences();
+    if (tagged) add_tags(row.label, tags.counts());
+  }
+
+  void add_tags(const std::string& label, const TagCounts& tags) {
+    tag_rows_.push_back({"tags",
+                         label,
+                         {{"polygons", tags.polygons},
+                          {"left_out", 100.0 * tags.share_left_out()},
+                          {"precision", 100.0 * tags.precision()},
+                          {"recall", 100.0 * tags.recall()}}});
   }
 
   /// All pieces go through these stages together; each has an even share.
@@ -226,9 +244,11 @@ class FractureBooks {
 
   const MeasurementInput& input_;
   double conversion_ = 0.0, uncut_volume_ = 0.0;
+  std::optional<DistanceOracle> tag_oracle_;  ///< of the subject's input
+  Eigen::Vector3d tag_origin_ = Eigen::Vector3d::Zero();
   bool order_cutters_ = false;
   FloatHermite order_object_;
-  std::vector<MeasuredRow> rows_;
+  std::vector<MeasuredRow> rows_, tag_rows_;
 };
 
 std::vector<MeasuredColumn> ledger_columns() {
@@ -254,6 +274,13 @@ std::vector<MeasuredColumn> ledger_columns() {
        "of a piece; 9.15: 450–779; labelled: a piece's share of the joint mesh, and taking it out of that"}};
 }
 
+std::vector<MeasuredColumn> tag_columns() {
+  return {{"polygons", "polygons", "of all pieces"},
+          {"left_out", "at rims [%]", "left out: their middle is within a voxel of the input and of a wall"},
+          {"precision", "precision [%]", "of the polygons tagged cut, those nearer to a wall than to the input"},
+          {"recall", "recall [%]", "of the polygons nearer to a wall, those tagged cut"}};
+}
+
 }  // namespace
 
 Measurement fracture_measurement() {
@@ -271,7 +298,8 @@ Measurement fracture_measurement() {
                       "what the cuts take from the volume of the uncut mesh",
                       "object, cells, voxels",
                       {{"difference", "difference", "relative"},
-                       {"order", "order", "exponent of the voxel size, from the row above"}}}},
+                       {"order", "order", "exponent of the voxel size, from the row above"}}},
+                     {"tags", "are polygons tagged as what they are?", "object, cells, method", tag_columns()}},
           .measure = [](const MeasurementInput& input) { return FractureBooks(input).run(); }};
 }
 
