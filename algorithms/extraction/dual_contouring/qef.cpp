@@ -20,16 +20,15 @@ double Qef::error(const Eigen::Vector3d& x) const {
   return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
 }
 
-Eigen::Vector3d Qef::minimiser(double truncation) const {
-  const Eigen::Vector3d mass = sum_ / planes_;
+Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncation) const {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
   const Eigen::Vector3d& values = solver.eigenvalues();  // squares of the singular values of A, ascending
-  const Eigen::Vector3d residual = solver.eigenvectors().transpose() * (atb_ - ata_ * mass);
+  const Eigen::Vector3d residual = solver.eigenvectors().transpose() * (atb_ - ata_ * (start - anchor_));
   Eigen::Vector3d step = Eigen::Vector3d::Zero();
   for (int i = 0; i < 3; ++i)
     if (values[i] > truncation * truncation * values[2] && values[i] > 0)
       step += (residual[i] / values[i]) * solver.eigenvectors().col(i);
-  return anchor_ + mass + step;
+  return start + step;
 }
 
 Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,

@@ -19,7 +19,10 @@ class Qef {
 
   /// Minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1, after Kobbelt et
   /// al. 2001): singular values of A below `truncation` times the largest are set to zero.
-  Eigen::Vector3d minimiser(double truncation) const;
+  Eigen::Vector3d minimiser(double truncation) const { return minimiser_near(mass_point(), truncation); }
+
+  /// The minimiser nearest to `start` instead: where the error has a line or a plane of minima, another of them.
+  Eigen::Vector3d minimiser_near(const Eigen::Vector3d& start, double truncation) const;
 
   /// Minimiser within the box; the same as minimiser() where that lies inside. Each face, edge and corner of
   /// the box is tried in turn for the smallest error, with the same truncation in the remaining directions.

@@ -14,6 +14,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/voxelization/triangle_tree.h"
 
 namespace hermesh {
 namespace {
@@ -89,6 +90,44 @@ TEST(ManifoldDualContouring, TurnedCubeNeedsFewTrianglesAndKeepsItsCorners) {
     EXPECT_LT(nearest, 0.12) << corner;
   }
   EXPECT_NEAR(volume(mesh), 8000.0, 0.1 * 2400.0);
+}
+
+/// Mean distance from places along the edges of the turned cube to the mesh.
+double mean_distance_from_edges(const TurnedCube& cube, const PolygonMesh& mesh) {
+  double sum = 0.0;
+  int places = 0;
+  const std::vector<Triangle> triangles = triangulated(mesh);
+  for (int edge = 0; edge < 12; ++edge)
+    for (int step = 0; step <= 40; ++step, ++places) {
+      const int axis = edge / 4;
+      Vector3d p;
+      p[axis] = -10.0 + 0.5 * step;
+      p[(axis + 1) % 3] = edge & 1 ? 10 : -10;
+      p[(axis + 2) % 3] = edge & 2 ? 10 : -10;
+      p = cube.turn * p;
+      double nearest = 1e9;
+      for (const Triangle& t : triangles)
+        if ((mesh.world(t[0]) - p).squaredNorm() < 9.0)
+          nearest = std::min(nearest, squared_distance(p, mesh.world(t[0]), mesh.world(t[1]), mesh.world(t[2])));
+      sum += std::sqrt(nearest);
+    }
+  return sum / places;
+}
+
+TEST(ManifoldDualContouring, TurnedCubeKeepsItsEdges) {
+  TurnedCube cube;
+  cube.turn = (Eigen::AngleAxisd(0.7, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()) *
+               Eigen::AngleAxisd(0.35, Vector3d::UnitX()))
+                  .matrix();
+  const FloatHermite hermite = cube.hermite();
+  RunContext context;
+  const auto contoured = [&](double reach) {
+    ManifoldDualContouringOptions options{.tolerance = 0.0, .uniform = {}};
+    options.uniform.reach = reach;
+    return manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+  };
+  EXPECT_LT(mean_distance_from_edges(cube, contoured(1.0)), 0.01);
+  EXPECT_GT(mean_distance_from_edges(cube, contoured(0.0)), 0.02);  // where no point leaves its cell
 }
 
 TEST(ManifoldDualContouring, ScaleOfZeroKeepsEveryPoint) {

@@ -18,6 +18,9 @@
 //                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
 //                  This is the last resort, and is counted.
 //
+// Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
+// only where the mesh as it is then shows that nothing meets (late_moves.h).
+//
 // None of this asks what lies on the two sides of a crossing edge, so it holds, too, for a lattice whose inside is
 // divided among pieces (cell_blocks.h): the polygons of all pieces together, each seam between two pieces once, meet at
 // most in shared edges and points. A joint has one point strictly inside it and no explicit face of its own; a face
@@ -49,7 +52,8 @@ struct UniformMesh {
   std::uint64_t escaped = 0;         ///< points outside their cells
 };
 
-/// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and the tetrahedra allow.
+/// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its
+/// cell: by kFarthestFromCell at most, whatever the options' reach.
 /// Holds for lattices up to 2^14 voxels from the base along an axis; beyond, single precision may round a point out of
 /// its cell. @throws Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,

@@ -1,0 +1,82 @@
+// The polygons of each crossing edge of a lattice: a quad of the points of its four cells, or a fan (uniform_mesh.h says
+// why no two of them meet).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+
+namespace hermesh {
+
+class EdgePolygons {
+ public:
+  /// Decides for each edge what it becomes, by the places of the cells' points (index space relative to the placement's
+  /// base). Points on fanned edges get the numbers from points.size() on.
+  /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
+  EdgePolygons(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
+
+  std::uint64_t point_count() const { return points_; }  ///< those on fanned edges included
+  std::uint64_t fanned_edges() const { return fanned_edges_; }
+  std::uint64_t quad_count() const { return quads_; }
+  std::uint64_t triangle_count() const { return triangles_; }
+  /// Polygons of the blocks before.
+  std::uint32_t first_quad(std::int32_t block) const { return edges_[block].first_quad; }
+  std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
+
+  bool is_fanned(const CellBlocks::Edge& edge) const { return test(edges_[edge.block].fanned[edge.axis], edge.sample); }
+  /// Of a fanned edge.
+  std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
+
+  /// Calls quad(Quad) or triangle(Triangle), counter-clockwise seen from outside (at a cut from the edge's second sample).
+  /// Of a segment that two fanned edges share, one of them has the two triangles.
+  template <class OnQuad, class OnTriangle>
+  void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle) const {
+    const CellBlocks::Around around = cells_.around(edge);
+    const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
+    if (!is_fanned(edge)) {
+      const int d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
+      Quad q = {around.points[d], around.points[d + 1], around.points[d + 2], around.points[(d + 3) % 4]};
+      if (!outwards) std::swap(q[1], q[3]);
+      quad(q);
+      return;
+    }
+    const std::uint32_t x = crossing_point(edge);
+    const auto add = [&](std::uint32_t b, std::uint32_t c) {
+      triangle(outwards ? Triangle{x, b, c} : Triangle{x, c, b});
+    };
+    for (int i = 0; i < 4; ++i) {
+      const std::uint32_t p = around.points[i], q = around.points[(i + 1) % 4];
+      if (!cells_.is_explicit(around, i)) {
+        add(p, q);
+        continue;
+      }
+      const CellBlocks::Edge other = cells_.other_end(around, i);
+      if (!cells_.comes_first(edge, other)) continue;
+      const std::uint32_t y = crossing_point(other);
+      add(p, y);
+      add(y, q);
+    }
+  }
+
+ private:
+  struct BlockEdges {
+    std::array<BlockMask, 3> fanned{}, second_diagonal{};
+    std::uint32_t first_crossing_point = 0, first_quad = 0, first_triangle = 0;
+  };
+
+  int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
+  int decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points);
+  int safe_diagonal(const CellBlocks::Edge& edge, const CellBlocks::Around& around,
+                    const std::vector<Eigen::Vector3d>& points) const;
+
+  const CellBlocks& cells_;
+  std::vector<BlockEdges> edges_;
+  std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
+};
+
+}  // namespace hermesh
