@@ -23,6 +23,7 @@ std::vector<MeasuredColumn> guarantee_mesh_columns() {
           {"lower", "≥ [vx]", "certified bound from below of the larger of both; beyond the tolerance a disproof"},
           {"cells", "cells", "cells that the surface passes through"},
           {"several_sheets", "sheets", "of these, with several sheets"},
+          {"held_cells", "held", "cells in which the last resort was taken"},
           {"fanned_edges", "fanned", "crossing edges that became four triangles or more"},
           {"escaped", "escaped", "points outside their cells"},
           {"attempts", "attempts", "how often it had to collapse anew to be proved"},

@@ -92,6 +92,16 @@ class CellBlocks {
     return {grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
             sample_index(x & 7, y & 7, z & 7)};
   }
+  /// Calls f(Cell) for the active cells at most so many steps from one along each axis, that one included.
+  template <class F>
+  void for_each_about(const Cell& cell, int steps, F&& f) const {
+    for (int x = -steps; x <= steps; ++x)
+      for (int y = -steps; y <= steps; ++y)
+        for (int z = -steps; z <= steps; ++z) {
+          const Cell at = locate(cell.block, (cell.cell >> 6) + x, ((cell.cell >> 3) & 7) + y, (cell.cell & 7) + z);
+          if (at.block >= 0 && test(blocks_[at.block].active, at.cell)) f(at);
+        }
+  }
   Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
   bool is_crossed(const Edge& edge) const {
     return edge.block >= 0 && test(grid_.blocks()[edge.block].crossing[edge.axis], edge.sample);

@@ -51,24 +51,62 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points, RunContext& context)
     : cells_(cells), edges_(cells.size()) {
+  parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+    cells_.for_each_crossing_edge(static_cast<std::int32_t>(b),
+                                  [&](const CellBlocks::Edge& edge) { decide(edge, points); });
+  });
+  number_all(context);
+}
+
+bool EdgePolygons::can_be_held(const CellBlocks::Cell& cell) const {
+  if (cells_.is_joint(cell.block, cell.cell)) return false;
+  const CellSheets& sheets = cells_.sheets(cell.block, cell.cell);
+  return sheets.sheets > 1 || sheets.ambiguous_faces != 0;
+}
+
+bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
+  int sum = 0;
+  cells_.for_each_about(cell, 1, [&](const CellBlocks::Cell& at) { sum += can_be_held(at); });
+  return sum > 2;
+}
+
+void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Vector3d>& points,
+                        RunContext& context) {
+  for (const CellBlocks::Cell& cell : cells) set(edges_[cell.block].held, cell.cell);
+  for (const CellBlocks::Cell& cell : cells)
+    for (int edge = 0; edge < 12; ++edge)
+      if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
+        decide(at, points);
+  number_all(context);
+}
+
+std::uint64_t EdgePolygons::held_cells() const {
+  std::uint64_t sum = 0;
+  for (const BlockEdges& block : edges_) sum += static_cast<std::uint64_t>(count(block.held));
+  return sum;
+}
+
+void EdgePolygons::number_all(RunContext& context) {
   const std::size_t blocks = cells_.size();
   std::vector<std::uint64_t> crossing_points(blocks), quads(blocks), triangles(blocks);
   parallel_blocks(blocks, context, [&](std::size_t b) {
     cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
-      const int fan = decide(edge, points);
-      quads[b] += !is_fanned(edge);
-      crossing_points[b] += is_fanned(edge);
-      triangles[b] += static_cast<std::uint64_t>(fan);
+      if (!is_fanned(edge)) {
+        ++quads[b];
+        return;
+      }
+      ++crossing_points[b];
+      triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
     });
   });
   fanned_edges_ = exclusive_scan(crossing_points, "points");
-  points_ = points.size() + fanned_edges_;
+  points_ = cells_.point_count() + fanned_edges_;
   if (points_ > std::numeric_limits<std::uint32_t>::max())
     throw Error("the mesh would have more points than 32-bit indices can number; use larger voxels");
   quads_ = exclusive_scan(quads, "quads");
   triangles_ = exclusive_scan(triangles, "triangles");
   for (std::size_t b = 0; b < blocks; ++b) {
-    edges_[b].first_crossing_point = static_cast<std::uint32_t>(points.size() + crossing_points[b]);
+    edges_[b].first_crossing_point = static_cast<std::uint32_t>(cells_.point_count() + crossing_points[b]);
     edges_[b].first_quad = static_cast<std::uint32_t>(quads[b]);
     edges_[b].first_triangle = static_cast<std::uint32_t>(triangles[b]);
   }
@@ -78,7 +116,7 @@ EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>&
 int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const {
   int made = 0;
   for (int i = 0; i < 4; ++i) {
-    if (!cells_.is_explicit(around, i))
+    if (!is_explicit(around, i))
       ++made;
     else if (cells_.comes_first(edge, cells_.other_end(around, i)))
       made += 2;
@@ -86,20 +124,16 @@ int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Aroun
   return made;
 }
 
-/// Number of triangles that the edge is fanned into, which is 0 where the other ends of its segments speak for them, and
-/// for a quad.
-int EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points) {
+void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points) {
   BlockEdges& edges = edges_[edge.block];
   const CellBlocks::Around around = cells_.around(edge);
   bool any_explicit = false;
-  for (int i = 0; i < 4; ++i) any_explicit = any_explicit || cells_.is_explicit(around, i);
+  for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
   const int diagonal = any_explicit ? -1 : safe_diagonal(edge, around, points);
-  if (diagonal < 0) {
+  if (diagonal < 0)
     set(edges.fanned[edge.axis], edge.sample);
-    return fan_size(edge, around);
-  }
-  if (diagonal == 1) set(edges.second_diagonal[edge.axis], edge.sample);
-  return 0;
+  else if (diagonal == 1)
+    set(edges.second_diagonal[edge.axis], edge.sample);
 }
 
 /// 0 or 1 for the diagonal to cut along; −1 if neither keeps the triangles in the envelope.

@@ -16,9 +16,19 @@ namespace hermesh {
 class EdgePolygons {
  public:
   /// Decides for each edge what it becomes, by the places of the cells' points (index space relative to the placement's
-  /// base). Points on fanned edges get the numbers from points.size() on.
+  /// base). Points on fanned edges get the numbers from cells.point_count() on. No cell is held yet.
   /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
   EdgePolygons(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
+
+  /// Whether the cell would have explicit faces of its own if it were held to them.
+  bool can_be_held(const CellBlocks::Cell& cell) const;
+  /// Whether more than two such cells are among the 27 about this one. There, as nearly everywhere in noise, tests of single
+  /// polygons cost much and rarely end well.
+  bool is_crowded(const CellBlocks::Cell& cell) const;
+  bool is_held(const CellBlocks::Cell& cell) const { return test(edges_[cell.block].held, cell.cell); }
+  /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
+  void hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
+  std::uint64_t held_cells() const;
 
   std::uint64_t point_count() const { return points_; }  ///< those on fanned edges included
   std::uint64_t fanned_edges() const { return fanned_edges_; }
@@ -51,7 +61,7 @@ class EdgePolygons {
     };
     for (int i = 0; i < 4; ++i) {
       const std::uint32_t p = around.points[i], q = around.points[(i + 1) % 4];
-      if (!cells_.is_explicit(around, i)) {
+      if (!is_explicit(around, i)) {
         add(p, q);
         continue;
       }
@@ -66,11 +76,16 @@ class EdgePolygons {
  private:
   struct BlockEdges {
     std::array<BlockMask, 3> fanned{}, second_diagonal{};
+    BlockMask held{};
     std::uint32_t first_crossing_point = 0, first_quad = 0, first_triangle = 0;
   };
 
+  bool is_explicit(const CellBlocks::Around& around, int i) const {
+    return cells_.is_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
+  }
+  void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
-  int decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points);
+  void decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points);
   int safe_diagonal(const CellBlocks::Edge& edge, const CellBlocks::Around& around,
                     const std::vector<Eigen::Vector3d>& points) const;
 

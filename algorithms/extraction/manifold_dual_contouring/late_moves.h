@@ -18,13 +18,10 @@ struct PointWish {
   Eigen::Vector3d nearer;  ///< as good, but nearer to where the point is within its cell
 };
 
-/// How far any point may be from its cell along an axis, in voxels: so the polygons near a point are known.
-inline constexpr double kFarthestFromCell = 1.0;
-
 /// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but is
 /// not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one another
-/// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already
-/// are passed over. The same result at any number of threads. @returns the number of moves. @throws Cancelled
+/// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already, and
+/// those of crowded cells, are passed over. The same result at any number of threads. @returns the number of moves. @throws Cancelled
 std::uint64_t move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                           const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
                           std::vector<Eigen::Vector3d>& points, RunContext& context);

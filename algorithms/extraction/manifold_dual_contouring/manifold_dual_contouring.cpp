@@ -16,6 +16,7 @@ namespace {
 void report(const UniformMesh& mesh, RunContext& context) {
   context.figure("cells", double(mesh.cells));
   context.figure("several_sheets", double(mesh.several_sheets));
+  context.figure("held_cells", double(mesh.held));
   context.figure("fanned_edges", double(mesh.fanned_edges));
   context.figure("escaped", double(mesh.escaped));
 }

@@ -9,6 +9,8 @@
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/late_moves.h"
+#include "algorithms/extraction/manifold_dual_contouring/polygon_neighbourhood.h"
+#include "algorithms/extraction/manifold_dual_contouring/sheet_trials.h"
 
 namespace hermesh {
 namespace {
@@ -167,10 +169,12 @@ class Contourer {
   }
 
   void connect(UniformMesh& mesh, RunContext& context) {
-    const EdgePolygons polygons = [&] {
+    EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, mesh.points, context);
     }();
+    hold_cells_that_meet(cells_, polygons, file_, mesh.points, context);
+    mesh.held = polygons.held_cells();
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     mesh.fanned_edges = polygons.fanned_edges();
@@ -179,7 +183,6 @@ class Contourer {
 
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
     Stage stage(context, "connect");
-    mesh.points.resize(polygons.point_count());
     mesh.quads.resize(polygons.quad_count());
     mesh.triangles.resize(polygons.triangle_count());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -187,8 +190,6 @@ class Contourer {
       Quad* quad = mesh.quads.data() + polygons.first_quad(block);
       Triangle* triangle = mesh.triangles.data() + polygons.first_triangle(block);
       cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
-        if (polygons.is_fanned(edge))
-          mesh.points[polygons.crossing_point(edge)] = file_.rounded(cells_.crossing_point(edge));
         polygons.polygons_of(
             edge, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; });
       });

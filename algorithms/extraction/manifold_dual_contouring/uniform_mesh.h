@@ -16,7 +16,7 @@
 //                  between the crossings on the faces (cell_sheets.h). Each sheet is a cone over its loop of segments,
 //                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
 //                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
-//                  This is the last resort, and is counted.
+//                  This is the last resort, and is counted: most such cells do without (sheet_trials.h).
 //
 // Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
 // only where the mesh as it is then shows that nothing meets (late_moves.h).
@@ -47,7 +47,8 @@ struct UniformMesh {
 
   std::uint64_t cells = 0;           ///< that the surface passes through
   std::uint64_t joints = 0;          ///< of these: with a cut (cell_blocks.h)
-  std::uint64_t several_sheets = 0;  ///< of these: coned over explicit segments
+  std::uint64_t several_sheets = 0;  ///< of these
+  std::uint64_t held = 0;            ///< of all: coned over explicit segments, the last resort
   std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
   std::uint64_t escaped = 0;         ///< points outside their cells
 };

@@ -1,0 +1,131 @@
+#include "algorithms/extraction/manifold_dual_contouring/sheet_trials.h"
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/manifold_dual_contouring/polygon_neighbourhood.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Cells = std::vector<CellBlocks::Cell>;
+
+class Trials {
+ public:
+  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points)
+      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points) {}
+
+  Cells not_worth_a_trial(RunContext& context) const {
+    return gathered(context, [&](std::int32_t block, Cells& found) {
+      for_each_bit(cells_[block].active, [&](int cell) {
+        if (polygons_.can_be_held({block, cell}) &&
+            (polygons_.is_crowded({block, cell}) || would_be_pinched(block, cell)))
+          found.push_back({block, cell});
+      });
+    });
+  }
+
+  /// Tried cells with a polygon that meets another, and those of the other one.
+  Cells that_meet(RunContext& context) const {
+    return gathered(context, [&](std::int32_t block, Cells& found) {
+      cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
+        if (is_tried(edge)) test_edge(edge, found);
+      });
+    });
+  }
+
+  void place_crossings(const FilePoints& file, RunContext& context) {
+    points_.resize(polygons_.point_count());
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
+        if (polygons_.is_fanned(edge))
+          points_[polygons_.crossing_point(edge)] = file.rounded(cells_.crossing_point(edge));
+      });
+    });
+  }
+
+ private:
+  template <class F>
+  Cells gathered(RunContext& context, F&& of_block) const {
+    std::vector<Cells> found(cells_.size());
+    parallel_blocks(cells_.size(), context,
+                    [&](std::size_t b) { of_block(static_cast<std::int32_t>(b), found[b]); });
+    Cells all;
+    for (const Cells& some : found) all.insert(all.end(), some.begin(), some.end());
+    return all;
+  }
+
+  /// Whether both segments of an ambiguous face belong to one sheet in either cell beside it: then four polygons would meet
+  /// in the edge between the two cells' points.
+  bool would_be_pinched(std::int32_t block, int cell) const {
+    const CellSheets& own = cells_.sheets(block, cell);
+    for (int face = 0; face < 6; ++face) {
+      if (!((own.ambiguous_faces >> face) & 1)) continue;
+      int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
+      at[face >> 1] += face & 1 ? 1 : -1;
+      const CellBlocks::Cell there = cells_.locate(block, at[0], at[1], at[2]);
+      const auto has_one_sheet = [](const CellSheets& sheets, int f) {
+        const std::array<int, 4> edges = face_edges(f);
+        for (const int edge : edges)
+          if (sheets.sheet_of[edge] != sheets.sheet_of[edges[0]]) return false;
+        return true;
+      };
+      if (has_one_sheet(own, face) && has_one_sheet(cells_.sheets(there.block, there.cell), face ^ 1)) return true;
+    }
+    return false;
+  }
+
+  bool is_tried(const CellBlocks::Cell& cell) const { return polygons_.can_be_held(cell) && !polygons_.is_held(cell); }
+  bool is_tried(const CellBlocks::Edge& edge) const {
+    for (const CellBlocks::Cell& cell : cells_.around(edge).cells)
+      if (is_tried(cell)) return true;
+    return false;
+  }
+  /// With those beside them, so that few rounds do.
+  void add_tried(const CellBlocks::Edge& edge, Cells& found) const {
+    cells_.for_each_about({edge.block, edge.sample}, 2, [&](const CellBlocks::Cell& cell) {
+      if (is_tried(cell)) found.push_back(cell);
+    });
+  }
+
+  void test_edge(const CellBlocks::Edge& edge, Cells& found) const {
+    bool meets = false;
+    mesh_.for_each_triangle(edge, [&](const Triangle& t) {
+      if (meets) return;
+      bool itself = false;
+      mesh_.for_each_near(edge.block, mesh_.box_of(t), [&](const CellBlocks::Edge& other, const Triangle& u) {
+        if (meets) return;
+        if (t == u && !itself) {
+          itself = true;
+        } else if (!mesh_.apart(t, u)) {
+          add_tried(edge, found);
+          add_tried(other, found);
+          meets = true;
+        }
+      });
+    });
+  }
+
+  const CellBlocks& cells_;
+  EdgePolygons& polygons_;
+  const PolygonNeighbourhood mesh_;
+  std::vector<Vector3d>& points_;
+};
+
+}  // namespace
+
+void hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
+                          std::vector<Vector3d>& points, RunContext& context) {
+  Stage stage(context, "try sheets");
+  Trials trials(cells, polygons, points);
+  Cells held = trials.not_worth_a_trial(context);
+  do {
+    if (!held.empty()) polygons.hold(held, points, context);
+    trials.place_crossings(file, context);
+    held = trials.that_meet(context);
+  } while (!held.empty());
+}
+
+}  // namespace hermesh

@@ -1,0 +1,22 @@
+// Cells of several sheets, and ambiguous faces, tried without the last resort of uniform_mesh.h.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
+#include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+
+namespace hermesh {
+
+/// Puts the points of fanned edges behind those of the cells, and holds to their segments those cells of several sheets and
+/// beside ambiguous faces whose polygons, as they would be without, meet others (triangle_contact.h) or leave an edge with
+/// four polygons, or which lie among many of their kind, where trials rarely end well.
+///
+/// Afterwards no two polygons meet: where no cell of an edge is tried, its polygons are those of uniform_mesh.h and its
+/// proof holds of any two; a polygon of another edge has been tested against all polygons nearby, as they are at the end.
+/// @throws Cancelled
+void hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
+                          std::vector<Eigen::Vector3d>& points, RunContext& context);
+
+}  // namespace hermesh
