@@ -150,16 +150,20 @@ void LeafTable::number_leaves(RunContext& context) {
       node.rank[word] = next;
       for (std::uint64_t bits = node.child[word]; bits != 0; bits &= bits - 1) {
         const auto slot = static_cast<std::uint32_t>(64 * word + std::countr_zero(bits));
-        const Leaf* leaf = node.source->getTable()[slot].getChild();
         places_[next] = {static_cast<std::uint32_t>(i), slot};
-        leaves_[next] = leaf;
-        values_[next++] = leaf->buffer().data();
+        leaves_[next++] = node.source->getTable()[slot].getChild();
       }
       for (int bit = 0; bit < 64; ++bit) {
         const std::uint64_t is_tile = ~(node.child[word] >> bit) & 1;
         if (is_tile && rule_(node.source->getTable()[64 * word + bit].getValue()))
           node.tile_inside[word] |= std::uint64_t{1} << bit;
       }
+    }
+    // To wait for one leaf after the other would take longer than all the rest.
+    constexpr std::size_t kAhead = 16;
+    for (std::size_t leaf = counts[i]; leaf < next; ++leaf) {
+      if (leaf + kAhead < next) __builtin_prefetch(leaves_[leaf + kAhead]);
+      values_[leaf] = leaves_[leaf]->buffer().data();
     }
     Accessor access(*tree_);
     for (int slot = 0; slot < 27; ++slot) {
@@ -189,7 +193,12 @@ BlockMask LeafTable::active(std::size_t leaf) const {
   return mask;
 }
 
-Coord LeafTable::lower(std::size_t leaf) const { return leaves_[leaf]->origin(); }
+Coord LeafTable::lower(std::size_t leaf) const {
+  // The leaf itself lies where no cache has it.
+  const Place place = places_[leaf];
+  const auto at = [&](int shift) { return static_cast<std::int32_t>(8 * (place.slot >> shift & 15)); };
+  return nodes_[place.node].lower.offsetBy(at(8), at(4), at(0));
+}
 
 std::int32_t LeafTable::find(const Node& node, std::uint32_t slot) const {
   const std::uint64_t bit = std::uint64_t{1} << (slot & 63), word = node.child[slot >> 6];
@@ -220,6 +229,69 @@ std::array<std::int32_t, 8> LeafTable::neighbours(std::size_t leaf, int side) co
   } else {
     for (int i = 1; i < 8; ++i)
       result[i] = find(node, place.slot + static_cast<std::uint32_t>(side * (256 * (i & 1) + 16 * (i >> 1 & 1) + (i >> 2))));
+  }
+  return result;
+}
+
+/// find() for the slots before, at and behind `slot`, which are those of one row along z.
+[[gnu::always_inline]] inline void LeafTable::find_three(const Node& node, std::uint32_t slot, std::int32_t* result) {
+  const std::uint32_t at = slot >> 6, first = (slot & 63) - 1;
+  const std::uint64_t child = node.child[at], inside = node.tile_inside[at];
+  auto next = static_cast<std::int32_t>(node.rank[at]) + bits_in(child & ((std::uint64_t{1} << first) - 1));
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const bool is_leaf = child >> (first + i) & 1;
+    result[i] = is_leaf ? next : uniform(inside >> (first + i) & 1);
+    next += is_leaf;
+  }
+}
+
+std::array<std::int32_t, 27> LeafTable::surroundings(std::size_t leaf) const {
+  const Place place = places_[leaf];
+  const Node& node = nodes_[place.node];
+  const int x = static_cast<int>(place.slot >> 8), y = static_cast<int>((place.slot >> 4) & 15),
+            z = static_cast<int>(place.slot & 15);
+  const bool within = x > 0 && x < 15 && y > 0 && y < 15;
+  std::array<std::int32_t, 27> result;
+  for (int row = 0; row < 9; ++row) {
+    const int dx = row / 3 - 1, dy = row % 3 - 1;
+    const std::int32_t there =
+        within ? static_cast<std::int32_t>(place.node) : node.neighbours[neighbour_slot((x + dx) >> 4, (y + dy) >> 4, 0)];
+    if (z == 0 || z == 15 || there < 0) {
+      for (int dz = -1; dz <= 1; ++dz) result[neighbour_slot(dx, dy, dz)] = neighbour(leaf, dx, dy, dz);
+    } else {
+      const int slot = (((x + dx) & 15) << 8) | (((y + dy) & 15) << 4) | z;
+      find_three(nodes_[there], static_cast<std::uint32_t>(slot), &result[neighbour_slot(dx, dy, -1)]);
+    }
+  }
+  return result;
+}
+
+std::vector<std::uint32_t> LeafTable::in_order_of_place() const {
+  // No sorting but of the few nodes: their rows of 16 along z follow one another.
+  std::vector<const Node*> nodes;
+  for (const Node& node : nodes_) nodes.push_back(&node);
+  std::ranges::sort(nodes, [](const Node* a, const Node* b) { return a->lower < b->lower; });
+  const auto end_of = [&](std::size_t first, std::size_t end, int axis) {
+    std::size_t i = first;
+    while (i < end && nodes[i]->lower[axis] == nodes[first]->lower[axis]) ++i;
+    return i;
+  };
+  std::vector<std::uint32_t> result;
+  result.reserve(size());
+  const auto add_row = [&](const Node& node, int x, int y) {
+    const int word = 4 * x + (y >> 2), shift = 16 * (y & 3);
+    const std::uint64_t child = node.child[word];
+    std::uint32_t leaf = node.rank[word] + static_cast<std::uint32_t>(bits_in(child & ((std::uint64_t{1} << shift) - 1)));
+    for (int left = bits_in(child >> shift & 0xffff); left > 0; --left) result.push_back(leaf++);
+  };
+  for (std::size_t slab = 0, slab_end; slab < nodes.size(); slab = slab_end) {
+    slab_end = end_of(slab, nodes.size(), 0);
+    for (int x = 0; x < 16; ++x)
+      for (std::size_t column = slab, column_end; column < slab_end; column = column_end) {
+        column_end = end_of(column, slab_end, 1);
+        for (int y = 0; y < 16; ++y)
+          for (std::size_t i = column; i < column_end; ++i) add_row(*nodes[i], x, y);
+      }
   }
   return result;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algorithms/core/blocks.h"
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/level_set.h"
 #include "algorithms/core/run_context.h"
 
@@ -42,6 +43,10 @@ class LeafTable {
 
   const float* values(std::size_t leaf) const { return values_[leaf]; }
   const BlockMask& inside(std::size_t leaf) const { return inside_[leaf]; }
+  /// inside() for what neighbour() gives.
+  const BlockMask& signs(std::int32_t leaf) const {
+    return leaf >= 0 ? inside_[static_cast<std::size_t>(leaf)] : leaf == kUniformInside ? kAllInside : kAllOutside;
+  }
   /// Samples of the band, at the bits of BlockMask.
   BlockMask active(std::size_t leaf) const;
   openvdb::Coord lower(std::size_t leaf) const;
@@ -51,8 +56,13 @@ class LeafTable {
   /// The leaf itself and its seven neighbours one step up (`side` 1) or down (−1) along each axis or not: at
   /// |dx| + 2|dy| + 4|dz|. As neighbour(), but the eight cost little more than one.
   std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const;
+  /// All neighbours, by neighbour_slot(), and the leaf itself at 13.
+  std::array<std::int32_t, 27> surroundings(std::size_t leaf) const;
+  /// The numbers of all leaves, in ascending order of the leaves' coordinates (x, y, z).
+  std::vector<std::uint32_t> in_order_of_place() const;
 
  private:
+  static constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
   using Leaf = openvdb::FloatTree::LeafNodeType;
   using TreeNode = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
   static constexpr int kWords = 64;  ///< of a mask of 16³ bits
@@ -76,15 +86,16 @@ class LeafTable {
   bool tiles_meet(const Node& node) const;
   bool differs_from_tile_below(std::size_t leaf, int axis) const;
   std::int32_t find(const Node& node, std::uint32_t slot) const;
+  static void find_three(const Node& node, std::uint32_t slot, std::int32_t* result);
   std::vector<openvdb::Coord> missing_leaves(RunContext& context) const;
 
   openvdb::FloatTree::ConstPtr tree_;
   InsideRule rule_;
   std::vector<Node> nodes_;
-  std::vector<Place> places_;
-  std::vector<const Leaf*> leaves_;
-  std::vector<const float*> values_;
-  std::vector<BlockMask> inside_;
+  LargeArray<Place> places_;
+  LargeArray<const Leaf*> leaves_;
+  LargeArray<const float*> values_;
+  LargeArray<BlockMask> inside_;
 };
 
 /// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.

@@ -66,6 +66,29 @@ TEST_F(LeafTableTest, NeighboursAndSignsAreTheTrees) {
   EXPECT_GT(across_nodes, 100u);
 }
 
+TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicographic) {
+  // Scattered over 4³ nodes, so that all their sides are met.
+  const auto grid = openvdb::FloatGrid::create(3.0f);
+  std::mt19937 random(3);
+  for (int i = 0; i < 4000; ++i) {
+    const auto at = [&] { return static_cast<int>(random() % 300) - 150; };
+    grid->tree().setValue(Coord(at(), at(), at()), random() % 2 ? 1.0f : -1.0f);
+  }
+  grid->tree().addTile(1, Coord(8, 8, 8), -3.0f, false);
+  const LeafTable leaves = table(grid);
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    const std::array<std::int32_t, 27> around = leaves.surroundings(i);
+    ASSERT_EQ(around[13], static_cast<std::int32_t>(i));
+    for (int slot = 0; slot < 27; ++slot)
+      ASSERT_EQ(around[slot], leaves.neighbour(i, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1)) << slot;
+  }
+  const std::vector<std::uint32_t> order = leaves.in_order_of_place();
+  ASSERT_EQ(order.size(), leaves.size());
+  for (std::size_t i = 1; i < order.size(); ++i) ASSERT_LT(leaves.lower(order[i - 1]), leaves.lower(order[i]));
+  const auto empty = openvdb::FloatGrid::create(3.0f);
+  EXPECT_TRUE(table(empty).in_order_of_place().empty());
+}
+
 TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
   // A tile of 8³, one of 128³ and one of 4096³, all inside, in a background that is outside.
   const auto grid = openvdb::FloatGrid::create(3.0f);

@@ -25,6 +25,13 @@ void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
                     });
 }
 
+/// @throws Error if as many cannot be numbered by 32 bits.
+inline void check_indices(std::uint64_t total, const std::string& what) {
+  if (total > std::numeric_limits<std::uint32_t>::max())
+    throw Error("the mesh would have " + std::to_string(total) + " " + what +
+                ", more than 32-bit indices can number; use larger voxels");
+}
+
 /// Replaces each count by the sum of those before it and returns the total.
 /// @throws Error if the total cannot be an index of 32 bits.
 inline std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what) {
@@ -34,9 +41,7 @@ inline std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const st
     total += count;
     count = before;
   }
-  if (total > std::numeric_limits<std::uint32_t>::max())
-    throw Error("the mesh would have " + std::to_string(total) + " " + what +
-                ", more than 32-bit indices can number; use larger voxels");
+  check_indices(total, what);
   return total;
 }
 

@@ -23,7 +23,9 @@ static_assert(sizeof(EdgeCrossing) == 16);
 /// The code that is left over says that there is no crossing.
 inline constexpr std::uint16_t kLastOffset = 1022, kNoOffset = 1023;
 
-constexpr std::uint16_t pack_offset(float offset) {
+/// Inlined always, as all that packs normals: it is compiled for several levels of vector code, and a copy that one of
+/// them leaves for the linker may end up in the others.
+[[gnu::always_inline]] constexpr std::uint16_t pack_offset(float offset) {
   // A NaN fails every comparison and so becomes 0.
   const float held = offset > 0.0f ? (offset < 1.0f ? offset : 1.0f) : 0.0f;
   return static_cast<std::uint16_t>(static_cast<int>(held * float(kLastOffset) + 0.5f));

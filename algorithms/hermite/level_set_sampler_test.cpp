@@ -157,16 +157,43 @@ TEST_F(LevelSetSamplerTest, EmptyAndFullVolumes) {
   EXPECT_TRUE(hermite.outermost_inside);
 }
 
-TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
-  const LevelSet volume = make_level_set(
-      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
+/// A level set of noise, which crosses edges everywhere and of which every seventh sample is no data: stencils end at all
+/// sides of leaves and of nodes of the tree, and there are tiles of both signs around it.
+openvdb::FloatGrid::Ptr noise_with_tiles() {
+  const auto grid = openvdb::FloatGrid::create(3.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->tree().addTile(1, Coord(128, 128, 104), -3.0f, false);
+  grid->tree().addTile(1, Coord(128, 128, 152), -3.0f, false);
+  std::mt19937 random(23);
+  std::uniform_real_distribution<float> values(-1.0f, 1.0f);
+  for (int x = 111; x < 141; ++x)
+    for (int y = 111; y < 141; ++y)
+      for (int z = 112; z < 152; ++z) {
+        const float value = values(random);
+        if (random() % 7 == 0)
+          grid->tree().setValueOff(Coord(x, y, z), std::copysign(3.0f, value));
+        else
+          grid->tree().setValueOn(Coord(x, y, z), value);
+      }
+  return grid;
+}
+
+TEST_F(LevelSetSamplerTest, NoiseWithStencilsThatEndAnywhere) { expect_as_plain(noise_with_tiles(), 0.0, 40000); }
+
+/// That the data of a volume are the same bytes however they are made, packed in any code or not.
+void expect_same_bytes(const openvdb::FloatGrid::Ptr& grid) {
+  const LevelSet volume = make_level_set(grid);
   RunContext context;
   const FloatHermite expected = sample_level_set(volume, 0.0, context);
-  const PackedHermite packed = sample_level_set_packed(volume, 0.0, NormalCodeId::octahedral, context);
-  EXPECT_EQ(pack(expected, NormalCodeId::octahedral, context).crossings, packed.crossings);
   const auto expect_same = [&](const std::string& how) {
     const FloatHermite again = sample_level_set(volume, 0.0, context);
     EXPECT_TRUE(again.leaves == expected.leaves && again.crossings == expected.crossings) << how;
+    for (const NormalCodeId code : kNormalCodes) {
+      const PackedHermite packed = sample_level_set_packed(volume, 0.0, code, context);
+      EXPECT_EQ(packed.normal_code, code);
+      EXPECT_TRUE(packed.leaves == expected.leaves) << how;
+      EXPECT_TRUE(packed.crossings == pack(expected, code, context).crossings) << how << ", " << name(code);
+    }
   };
   for (const SimdLevel level : available_simd_levels()) {
     setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
@@ -177,6 +204,14 @@ TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
     expect_same(std::to_string(threads) + " threads");
   }
+}
+
+TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
+  expect_same_bytes(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
+  expect_same_bytes(noise_with_tiles());
+  const auto fog = noise_with_tiles();  // no level set: what is not active is no data
+  fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+  expect_same_bytes(fog);
 }
 
 TEST_F(LevelSetSamplerTest, CrossingsAreInAscendingOrderOfLeavesAndSignsFollowFromThem) {

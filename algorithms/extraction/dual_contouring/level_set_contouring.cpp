@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "algorithms/core/large_array.h"
@@ -16,7 +16,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
-#include "algorithms/hermite/incomplete_stencil.h"
+#include "algorithms/hermite/leaf_stencils.h"
 
 namespace hermesh {
 namespace {
@@ -26,8 +26,6 @@ using leaf_kernels::UpperSigns;
 using openvdb::Coord;
 
 constexpr std::uint64_t kLastY = std::uint64_t{0xff} << 56, kLastZ = 0x8080808080808080u;
-constexpr BlockMask kAllOutside{};
-constexpr BlockMask kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
 /// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more than filling it.
 template <class T>
@@ -41,24 +39,11 @@ void reserve_huge(std::vector<T>& array, std::size_t n) {
 #endif
 }
 
-constexpr std::array<float, 512> make_no_data() {
-  std::array<float, 512> values{};
-  for (float& value : values) value = std::numeric_limits<float>::infinity();
-  return values;
-}
-constexpr std::array<float, 512> kNoData = make_no_data();
-
-/// What the vector code leaves over, in the way of the Hermite data's sampler and of the general contouring.
+/// Cells that the vector code leaves over, in the way of the general contouring.
 class Plain final : public leaf_kernels::PlainCode {
  public:
-  Plain(const SampledVolume& volume, std::size_t leaf, const DualContouringOptions& options)
-      : volume_(volume), leaf_(leaf), options_(options) {}
+  explicit Plain(const DualContouringOptions& options) : options_(options) {}
 
-  void crossing(int x, int y, int z, int axis, float* record) const override {
-    const EdgeCrossing crossing = IncompleteStencil(volume_, leaf_).sample(x, y, z, axis);
-    record[0] = crossing.offset;
-    for (int k = 0; k < 3; ++k) record[1 + k] = crossing.normal[(axis + k) % 3];
-  }
   void place(const leaf_kernels::Plane* planes, int count, float* place) const override {
     Qef qef(Eigen::Vector3d::Zero());
     for (int i = 0; i < count; ++i)
@@ -68,8 +53,6 @@ class Plain final : public leaf_kernels::PlainCode {
   }
 
  private:
-  const SampledVolume& volume_;
-  const std::size_t leaf_;
   const DualContouringOptions& options_;
 };
 
@@ -154,10 +137,7 @@ class LevelSetContourer {
 
   UpperSigns upper_signs(const Neighbours& upper) const {
     UpperSigns signs;
-    for (int slot = 0; slot < 8; ++slot)
-      signs.inside[slot] = upper[slot] >= 0                ? table_.inside(static_cast<std::size_t>(upper[slot])).data()
-                           : upper[slot] == kUniformInside ? kAllInside.data()
-                                                           : kAllOutside.data();
+    for (int slot = 0; slot < 8; ++slot) signs.inside[slot] = table_.signs(upper[slot]).data();
     return signs;
   }
 
@@ -196,30 +176,18 @@ class LevelSetContourer {
     }
   }
 
-  /// The same for the stencils of optimal placement, which read samples of all neighbours.
-  void find_stencil_samples(std::size_t leaf, leaf_kernels::PlaceInput& input, std::array<BlockMask, 27>& active) const {
-    for (int slot = 0; slot < 27; ++slot) {
-      const std::int32_t there = table_.neighbour(leaf, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1);
-      input.values[slot] = there >= 0 ? table_.values(static_cast<std::size_t>(there)) : kNoData.data();
-      if (!volume_.masked) continue;
-      active[slot] = there >= 0 ? table_.active(static_cast<std::size_t>(there)) : kAllOutside;
-      input.active[slot] = active[slot].data();
-    }
-  }
-
   void place(std::size_t leaf, leaf_kernels::PlaceOutput output) {
     const LeafCells& cells = cells_[leaf];
     const bool optimal = options_.placement == DualContouringOptions::Placement::optimal;
-    const Plain plain(volume_, leaf, options_);
+    const Plain plain(options_);
     leaf_kernels::PlaceInput input{};
     input.signs = upper_signs(upper_[leaf]);
     input.cells = &cells;
-    std::array<BlockMask, 27> active;
+    std::optional<LeafStencils> stencils;
     if (optimal)
-      find_stencil_samples(leaf, input, active);
+      stencils.emplace(volume_, leaf).fill(input);
     else
       find_corner_samples(leaf, input);
-    input.data_below = volume_.data_below;
     input.truncation = static_cast<float>(options_.truncation);
     input.reach = static_cast<float>(options_.reach);
     input.plain = &plain;

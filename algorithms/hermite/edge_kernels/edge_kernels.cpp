@@ -5,25 +5,25 @@
 namespace hermesh::edge_kernels {
 
 namespace sse2 {
-Sample sample;
+extern const Kernels kKernels;
 }
 namespace avx2 {
-Sample sample;
+extern const Kernels kKernels;
 }
 namespace avx512 {
-Sample sample;
+extern const Kernels kKernels;
 }
 
-Sample* chosen() {
+const Kernels& chosen() {
   switch (chosen_simd_level()) {
     case SimdLevel::avx2:
-      return avx2::sample;
+      return avx2::kKernels;
     case SimdLevel::avx512:
-      return avx512::sample;
+      return avx512::kKernels;
     case SimdLevel::sse2:
       break;
   }
-  return sse2::sample;
+  return sse2::kKernels;
 }
 
 }  // namespace hermesh::edge_kernels

@@ -1,24 +1,59 @@
-// The arithmetic of sampling a level set's edges, compiled for several levels of vector code; all give the same bytes.
-// Light and free of the standard library, because what two levels share the linker may take from either.
+// The Hermite data of one 8³ leaf of a scalar volume, compiled for several levels of vector code; all give the same
+// bytes. Light and free of the standard library's functions, because what two levels share the linker may take from
+// either. Bits are in the order of BlockMask, word x, bit 8y+z.
 #pragma once
+
+#include <cstdint>
+
+#include "algorithms/hermite/crossing.h"
 
 namespace hermesh::edge_kernels {
 
-/// Crossing edges of one leaf along one axis e; u and v are the axes after it.
-struct Edges {
-  int count;                      ///< at most 512
-  int at[512];                    ///< indices of their first samples in the array of samples
-  float offset[512];              ///< along the edge
-  float normal[3][512];           ///< components along e, u and v
-  float largest[512];             ///< magnitude among the twelve samples that went into it
+/// Signs of the leaf and its upper neighbours, at dx + 2dy + 4dz: 8 words each. Crossing edges need those of one step
+/// along one axis alone.
+struct UpperSigns {
+  const std::uint64_t* inside[8];
 };
 
-/// Fills in all but count and at. `stride_…` are those of the array of samples. With t the offset, the gradient is that
-/// of both ends by central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e).
-using Sample = void(const float* samples, int stride_e, int stride_u, int stride_v, float isovalue, float scale,
-                    Edges& edges);
+/// The plain code for edges whose stencils have samples that are no data, which the vector code does not do.
+class PlainCrossing {
+ public:
+  /// Of an edge along `axis` that starts in the leaf or a step beyond: offset, and the normal along the axis and the two
+  /// after it.
+  virtual void crossing(int x, int y, int z, int axis, float* record) const = 0;
+
+ protected:
+  ~PlainCrossing() = default;
+};
+
+/// What a leaf's crossings are made from.
+struct LeafInput {
+  UpperSigns signs;
+  /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; where there is no leaf all must be infinite.
+  const float* values[27];
+  /// Samples of no less than data_below in magnitude are no data; where active[13] is not null, neither are those without
+  /// a bit there.
+  const std::uint64_t* active[27];
+  float data_below;
+  float isovalue, scale;  ///< as in InsideRule
+  const PlainCrossing* incomplete;
+};
+
+/// How many edges that start in the leaf are crossed: at most 1536.
+using Count = int(const UpperSigns& signs);
+/// The crossings of those edges, by axis, in that by sample. With t the offset, the gradient is that of both ends by
+/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e).
+using Sample = void(const LeafInput& input, EdgeCrossing* out);
+/// The same as pack() has them, with tags of 0.
+using SamplePacked = void(const LeafInput& input, PackedCrossing* out);
+
+struct Kernels {
+  Count* count;
+  Sample* sample;
+  SamplePacked* sample_packed[kNormalCodes.size()];  ///< by NormalCodeId
+};
 
 /// For the level of vector code that is chosen, see simd_level.h.
-Sample* chosen();
+const Kernels& chosen();
 
 }  // namespace hermesh::edge_kernels

@@ -1,3 +1,5 @@
+#include <immintrin.h>
+
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
 namespace hermesh::edge_kernels::sse2 {

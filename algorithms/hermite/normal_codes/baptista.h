@@ -11,7 +11,7 @@ namespace hermesh {
 /// third component of -1.
 struct BaptistaNormalCode {
   static constexpr const char* name = "baptista";
-  static std::uint16_t pack(const std::array<float, 3>& normal) {
+  [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     return octant_slots::pack_rounding_down(normal);
   }
   static std::array<float, 3> unpack(std::uint16_t code) { return octant_slots::unpack<126>(code); }

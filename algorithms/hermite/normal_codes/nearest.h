@@ -13,7 +13,7 @@ namespace hermesh {
 struct NearestNormalCode : OctahedralNormalCode {
   static constexpr const char* name = "nearest";
 
-  static std::uint16_t pack(const std::array<float, 3>& normal) {
+  [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     using namespace octant_slots;
     const Projection at = project(normal, kExtent * kStep);
     const int a = nearest_step(at.a), b = nearest_step(at.b), c = nearest_step(at.c);

@@ -16,7 +16,7 @@ struct OctahedralNormalCode {
   static constexpr int kExtent = 127;
 
   /// Rounds both coordinates to the nearest step.
-  static std::uint16_t pack(const std::array<float, 3>& normal) {
+  [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     const octant_slots::Projection at = octant_slots::project(normal, kExtent * octant_slots::kStep);
     return of_lattice(octant_slots::nearest_step(at.a), octant_slots::nearest_step(at.b), at.negative);
   }
@@ -42,13 +42,13 @@ struct OctahedralNormalCode {
     int x, y, z;
   };
 
-  static int sign_mask(int value) { return octant_slots::sign_mask(value); }
-  static int negated_if(int mask, int value) { return octant_slots::negated_if(mask, value); }
+  [[gnu::always_inline]] static int sign_mask(int value) { return octant_slots::sign_mask(value); }
+  [[gnu::always_inline]] static int negated_if(int mask, int value) { return octant_slots::negated_if(mask, value); }
   static int magnitude(int value) { return negated_if(sign_mask(value), value); }
 
   /// The code of a point by the magnitudes of x and y and all three signs. Magnitudes that add up to 128,
   /// both rounded up, lie beyond the equator, which is where the square has them, too.
-  static std::uint16_t of_lattice(int x, int y, std::uint32_t negative) {
+  [[gnu::always_inline]] static std::uint16_t of_lattice(int x, int y, std::uint32_t negative) {
     const int signs = int(negative);
     const int folded = (kExtent - x - y) & -(signs >> 13 & 1);
     const int u = x + folded, v = y + folded;

@@ -32,7 +32,7 @@ struct Projection {
 
 /// Steps 1 and 2, by one division. What has no direction is taken for +z. Negative zero counts as positive.
 /// Masks stand in for branches, with which compilers would not turn loops over normals into vector code.
-inline Projection project(const std::array<float, 3>& normal, int levels) {
+[[gnu::always_inline]] inline Projection project(const std::array<float, 3>& normal, int levels) {
   const float x = std::fabs(normal[0]), y = std::fabs(normal[1]), z = std::fabs(normal[2]);
   const float sum = x + y + z;
   // Floats that are not negative compare like their bits, and the bits of NaN are above those of infinity.
@@ -40,7 +40,7 @@ inline Projection project(const std::array<float, 3>& normal, int levels) {
   const bool directed = (bits > std::bit_cast<std::int32_t>(kShortest)) &
                         (bits < std::bit_cast<std::int32_t>(std::numeric_limits<float>::infinity()));
   const std::uint32_t mask = 0u - std::uint32_t(directed);
-  const auto kept = [mask](float value, float otherwise) {
+  const auto kept = [mask](float value, float otherwise) __attribute__((always_inline)) {
     return std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) & mask) |
                                 (std::bit_cast<std::uint32_t>(otherwise) & ~mask));
   };
@@ -53,7 +53,7 @@ inline Projection project(const std::array<float, 3>& normal, int levels) {
 
 /// Equation 4.7: a component b of 64 or more does not fit into its six bits, and the complements of both
 /// components are stored instead. The condition is that on b before either is replaced.
-inline std::uint16_t fold(std::uint32_t a, std::uint32_t b) {
+[[gnu::always_inline]] inline std::uint16_t fold(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t complement = (b >> 6) * 127u;  // of seven bits: 127 - a is a ^ 127
   return std::uint16_t((a ^ complement) << 6 | (b ^ complement));
 }
@@ -94,11 +94,11 @@ inline constexpr std::array<float, kSlots + 1> kWeights = make_weights<kSum>();
 
 inline constexpr int kStep = 1 << 16;
 
-constexpr int nearest_step(float value) { return (int(value) + kStep / 2) >> 16; }
+[[gnu::always_inline]] constexpr int nearest_step(float value) { return (int(value) + kStep / 2) >> 16; }
 /// How far below the value its step lies, -kStep / 2 to kStep / 2.
-constexpr int below(float value, int step) { return int(value) - step * kStep; }
-constexpr int sign_mask(int value) { return value >> 31; }
-constexpr int negated_if(int mask, int value) { return (value ^ mask) - mask; }
+[[gnu::always_inline]] constexpr int below(float value, int step) { return int(value) - step * kStep; }
+[[gnu::always_inline]] constexpr int sign_mask(int value) { return value >> 31; }
+[[gnu::always_inline]] constexpr int negated_if(int mask, int value) { return (value ^ mask) - mask; }
 
 inline float with_sign(float magnitude, std::uint32_t sign_bit) {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) ^ sign_bit);
@@ -116,7 +116,7 @@ std::array<float, 3> unpack(std::uint16_t code) {
 }
 
 /// Step 3 (equations 4.5 and 4.6): rounds down.
-inline std::uint16_t pack_rounding_down(const std::array<float, 3>& normal) {
+[[gnu::always_inline]] inline std::uint16_t pack_rounding_down(const std::array<float, 3>& normal) {
   const Projection at = project(normal, kLevels);
   return std::uint16_t(at.negative | fold(std::uint32_t(int(at.a)), std::uint32_t(int(at.b))));
 }

@@ -11,7 +11,7 @@ namespace hermesh {
 struct RoundedNormalCode {
   static constexpr const char* name = "rounded";
 
-  static std::uint16_t pack(const std::array<float, 3>& normal) {
+  [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     using namespace octant_slots;
     const Projection at = project(normal, kLevels * kStep);
     int a = nearest_step(at.a), b = nearest_step(at.b);
@@ -31,7 +31,7 @@ struct RoundedNormalCode {
   }
 
  private:
-  static std::uint32_t signs_of_nonzero(int a, int b) {
+  [[gnu::always_inline]] static std::uint32_t signs_of_nonzero(int a, int b) {
     const int c = octant_slots::kLevels - a - b;
     return std::uint32_t((-a & 1 << 20) >> 5 | (-b & 1 << 20) >> 6 | (-c & 1 << 20) >> 7);
   }

@@ -10,7 +10,7 @@ namespace hermesh {
 /// Every normal of the positive octant within about 0.45° of +z has the code 0.
 struct ThesisNormalCode {
   static constexpr const char* name = "thesis";
-  static std::uint16_t pack(const std::array<float, 3>& normal) {
+  [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     return octant_slots::pack_rounding_down(normal);
   }
   static std::array<float, 3> unpack(std::uint16_t code) { return octant_slots::unpack<127>(code); }

@@ -9,7 +9,11 @@
 
 #include <cstdint>
 
+#include "algorithms/hermite/edge_kernels/edge_kernels.h"
+
 namespace hermesh::leaf_kernels {
+
+using edge_kernels::UpperSigns;
 
 /// Floats in the longest vectors.
 inline constexpr int kLargestVector = 16;
@@ -21,12 +25,6 @@ struct LeafCells {
   std::uint32_t first_point;  ///< number of the first cell's point
   std::uint32_t first_quad;   ///< number of the quad of the first crossing edge: by axis, in that by sample
   std::uint16_t points, quads;
-};
-
-/// Signs of the leaf and its upper neighbours, at dx + 2dy + 4dz: 8 words each. Crossing edges need those of one step
-/// along one axis alone.
-struct UpperSigns {
-  const std::uint64_t* inside[8];
 };
 
 /// Lower neighbours that hold a cell with one of the leaf's crossing edges, as bits of 1 << (dx + 2dy + 4dz) with the
@@ -41,12 +39,9 @@ struct Plane {
   float point[3], normal[3];
 };
 
-/// The plain code for the rare cases that the vector code does not do.
+/// The plain code for the rare cells that the vector code does not do.
 class PlainCode {
  public:
-  /// Of an edge that starts in the leaf or a step beyond and whose stencil has samples that are no data: offset, and the
-  /// normal along the axis and the two after it.
-  virtual void crossing(int x, int y, int z, int axis, float* record) const = 0;
   /// The cell's point, from its centre.
   virtual void place(const Plane* planes, int count, float* place) const = 0;
 
@@ -54,19 +49,14 @@ class PlainCode {
   ~PlainCode() = default;
 };
 
-/// What a leaf's cells are placed from.
-struct PlaceInput {
-  UpperSigns signs;
+/// What a leaf's cells are placed from. Average placement reads the values of the leaf and its upper neighbours alone, and
+/// of what else a LeafInput has only the signs, the
+/// isovalue and the scale.
+struct PlaceInput : edge_kernels::LeafInput {
   const LeafCells* cells;
-  /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each. Average placement reads the upper ones alone.
-  const float* values[27];
-  float isovalue, scale;
   double corner[3];     ///< where the leaf's first sample is in the mesh's coordinates
   double linear[3][3];  ///< voxels to mesh, by row
-  /// For optimal placement alone. Samples of no less than data_below in magnitude are no data; where `active` is not null,
-  /// neither are those without a bit there. Where there is no leaf all samples must be infinite.
-  const std::uint64_t* active[27];
-  float data_below;
+  /// For optimal placement alone.
   float truncation, reach;  ///< as in DualContouringOptions; the truncation is no less than kLeastTruncation
   const PlainCode* plain;
 };
