@@ -10,7 +10,7 @@ namespace hermesh {
 /// cutter. The points of rims, where patches meet, stay as they are, so merging never crosses a change of labels, and a
 /// seam has the same triangles on both of its sides because it is there only once. What the joint mesh guarantees holds
 /// after it; and no point of the mesh is farther than `tolerance` voxels (and 0.005) from the one before, or that from it
-/// (certified_decimation.h). Where this is not proved, the mesh stays as it is and a note says so.
+/// (certified_decimation.h).
 /// The same bytes at any thread count. @throws Cancelled.
 void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context);
 

@@ -1,20 +1,33 @@
-// A decimation whose distance to the mesh that it began as is proved.
+// A coarse mesh whose distance from a fine one is proved.
+//
+// *Propose*: sets of points become one, the minimiser of the squared distances to the planes of all triangles that they stand
+// for (quadrics, Garland & Heckbert 1997): first those of blocks of up to 16 voxels (block_forest.h), then the ends of edges,
+// cheapest first (decimation.h).
+// *Prove*: the mesh that results (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that
+// it was made of, at last into single points; so this ends, at worst with the fine mesh.
+// Once boldly, by the quadrics alone, which does most of the work in a small part of the time; and once more with care.
 #pragma once
 
-#include <optional>
+#include <Eigen/Core>
 #include <vector>
 
-#include "algorithms/extraction/manifold_dual_contouring/decimation.h"
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
 
 namespace hermesh {
 
-/// Collapses (decimation.h) until nothing more passes its tests, and proves the two-sided distance (distance_certificate.h):
-/// round by round, where a cube in which the proof fails is done again with less room, and at the end for the whole mesh.
-/// Nothing, and a note, if that is not proved after some attempts with less room round what fails.
-/// @param asked tolerance by point of `fine`, voxels
-/// @param pinned by point of `fine`, or empty: points that stay as and where they are (decimation.h)
-std::optional<DecimatedMesh> decimate_certified(const FineMesh& fine, const std::vector<float>& asked,
-                                                const std::vector<std::uint8_t>& pinned, const FilePoints& file,
-                                                RunContext& context);
+struct CertifiedMesh {
+  std::vector<Eigen::Vector3d> points;       ///< FilePoints::rounded()
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> fine_triangle;  ///< by triangle: one of the fine mesh, all of whose corners went into its corners
+};
+
+/// @param tolerance by point of `fine`, voxels. Points with none stay as and where they are.
+/// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge its ends must be
+///   such; so a complex of patches keeps their rims.
+CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
+                                 std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);
 
 }  // namespace hermesh

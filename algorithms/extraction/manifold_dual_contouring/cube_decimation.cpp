@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "algorithms/extraction/manifold_dual_contouring/block_merging.h"
 #include "algorithms/extraction/manifold_dual_contouring/cube_collapse.h"
 
 namespace hermesh {
@@ -15,6 +14,8 @@ using Eigen::Vector3d;
 /// An edge is not worth a test if the planes that its ends stand for are farther from the new point than this many
 /// tolerances squared in the mean. (1 would lose some 4 % of the collapses of a scan, 4 none and save nothing.)
 constexpr double kHopeless = 2.0;
+/// And this where nothing else is asked.
+constexpr double kBold = 0.3;
 
 /// Collapses of edges, cheapest first.
 class EdgeCollapses {
@@ -29,11 +30,11 @@ class EdgeCollapses {
   };
 
  public:
-  explicit EdgeCollapses(CubeCollapse& collapses) : collapses_(collapses), mesh_(collapses.mesh()) {}
+  EdgeCollapses(CubeCollapse& collapses, double hopeless) : collapses_(collapses), mesh_(collapses.mesh()), hopeless_(hopeless) {}
 
   void run(const RunContext& context) {
     for (const CubeMesh::Face& face : mesh_.faces) {
-      if (!face.own || face.gone()) continue;
+      if (!face.own || face.gone) continue;
       for (int i = 0; i < 3; ++i) {
         const std::uint32_t u = face.corners[i], v = face.corners[(i + 1) % 3];
         if (u < v && (collapses_.is_stirred(u) || collapses_.is_stirred(v))) propose(u, v);
@@ -60,7 +61,7 @@ class EdgeCollapses {
   Target target(std::uint32_t u, std::uint32_t v) const {
     const CubeMesh::Vertex &at_u = mesh_.vertices[u], &at_v = mesh_.vertices[v];
     const Vector3d middle = 0.5 * (at_u.point + at_v.point);
-    const WideQuadric q = collapses_.quadric_about(std::array{u, v}, middle);
+    const WideQuadric q = collapses_.quadric_about(u, v, middle);
     Vector3d x = !at_u.free   ? Vector3d(at_u.point - middle)
                  : !at_v.free ? Vector3d(at_v.point - middle)
                               : q.minimiser();
@@ -68,7 +69,7 @@ class EdgeCollapses {
     // Planes that are nearly parallel meet far away: no farther than the edge is long.
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();
     const double off = q(x), tolerance = std::min(collapses_.tolerance_at(u), collapses_.tolerance_at(v));
-    return {middle + x, off + kPull * q.a.trace() * squared, off > kHopeless * tolerance * tolerance * q.a.trace()};
+    return {middle + x, off + kPull * q.a.trace() * squared, off > hopeless_ * tolerance * tolerance * q.a.trace()};
   }
 
   void propose(std::uint32_t u, std::uint32_t v) {
@@ -87,7 +88,7 @@ class EdgeCollapses {
     if (try_at(u, v, collapses_.rounded(target(u, v).x)) || !mesh_.vertices[v].free) return;
     // Where the best place will not do, one end may.
     const Vector3d &at_u = mesh_.vertices[u].point, &at_v = mesh_.vertices[v].point;
-    const WideQuadric q = collapses_.quadric_about(std::array{u, v}, at_v);
+    const WideQuadric q = collapses_.quadric_about(u, v, at_v);
     try_at(u, v, q(at_u - at_v) < q(Vector3d::Zero()) ? at_u : at_v);
   }
 
@@ -112,7 +113,7 @@ class EdgeCollapses {
   }
 
   bool try_at(std::uint32_t u, std::uint32_t v, const Vector3d& x) {
-    if (!collapses_.gather(v, std::array{u}, x) || !collapses_.passes()) return false;
+    if (!collapses_.gather(u, v, x) || !collapses_.passes()) return false;
     collapses_.apply();
     mesh_.for_each_face(v, [&](std::uint32_t f, int i) { propose(v, mesh_.faces[f].corners[(i + 1) % 3]); });
     return true;
@@ -121,16 +122,17 @@ class EdgeCollapses {
   CubeCollapse& collapses_;
   CubeMesh& mesh_;
   std::vector<Proposal> heap_;
+  double hopeless_;
 };
 
 }  // namespace
 
-void decimate_cube(DecimatedMesh& mesh, const FilePoints& file, const DecimationCube& cube,
-                   std::span<const std::uint32_t> triangles, CubeNumbers& numbers, const RunContext& context) {
-  CubeCollapse collapses(mesh, file, cube, triangles, numbers);
-  if (cube.merges_blocks)
-    for (const double width : {2.0, 4.0}) merge_blocks(collapses, width, context);
-  EdgeCollapses(collapses).run(context);
+std::vector<Join> decimate_cube(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
+                                std::span<const std::uint32_t> triangles, CubeNumbers& numbers,
+                                const RunContext& context) {
+  CubeCollapse collapses(mesh, kind, file, cube, triangles, numbers);
+  EdgeCollapses(collapses, kind == Collapses::bold ? kBold : kHopeless).run(context);
+  return std::move(collapses.joins());
 }
 
 }  // namespace hermesh

@@ -1,9 +1,10 @@
-// Decimation within one cube of a round (decimation.h).
+// Collapses within one cube of a round (decimation.h).
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <span>
+#include <vector>
 
 #include "algorithms/extraction/manifold_dual_contouring/decimation.h"
 
@@ -25,13 +26,19 @@ struct DecimationCube {
   double side;
   Index index;
   double longest_edge;  ///< that a collapse may make, so that cubes of a round coarsen alike
-  bool merges_blocks;   ///< before edges are collapsed
   bool holds(const Eigen::Vector3d& p) const { return index_of(p, start, side) == index; }
+};
+
+/// What a collapse does to the forest.
+struct Join {
+  std::uint32_t going;
+  MergeForest::Node node;
 };
 
 /// `triangles` are those whose boxes touch the cube, ascending. Changes the triangles with all corners in the cube, the
 /// points in it and the samples attached to them, and reads of others only what tells it so.
-void decimate_cube(DecimatedMesh& mesh, const FilePoints& file, const DecimationCube& cube,
-                   std::span<const std::uint32_t> triangles, CubeNumbers& numbers, const RunContext& context);
+std::vector<Join> decimate_cube(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
+                                std::span<const std::uint32_t> triangles, CubeNumbers& numbers,
+                                const RunContext& context);
 
 }  // namespace hermesh

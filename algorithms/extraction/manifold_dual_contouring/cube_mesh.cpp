@@ -3,28 +3,24 @@
 namespace hermesh {
 
 CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::span<const std::uint32_t> triangles,
-                   CubeNumbers& thread_numbers)
-    : numbers(thread_numbers) {
+                   CubeNumbers& numbers) {
   numbers.vertex.resize(mesh.points.size(), kNone);
-  numbers.face.resize(mesh.triangles.size(), kNone);
   vertices.reserve(triangles.size() / 2 + 64);
   faces.resize(triangles.size());
   next_corner.resize(3 * triangles.size());
   for (std::uint32_t f = 0; f < faces.size(); ++f) {
     Face& face = faces[f];
     face.global = triangles[f];
-    numbers.face[face.global] = f;
     face.own = true;
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t point = mesh.triangles[face.global][i];
-      std::uint32_t v = find_vertex(point);
-      if (v == kNone) {
+      std::uint32_t v = numbers.vertex[point];
+      if (v >= vertices.size() || vertices[v].global != point) {
         v = numbers.vertex[point] = static_cast<std::uint32_t>(vertices.size());
         const bool here = cube.holds(mesh.points[point]);
         vertices.push_back({.point = mesh.points[point], .global = point, .here = here, .free = here && !mesh.pinned[point]});
       }
       face.corners[i] = v;
-      face.box.add(vertices[v].point);
       face.own = face.own && vertices[v].here;
       next_corner[3 * f + i] = vertices[v].first_corner;
       vertices[v].first_corner = 3 * f + static_cast<std::uint32_t>(i);
@@ -32,23 +28,6 @@ CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::s
     if (!face.own)
       for (const std::uint32_t v : face.corners) vertices[v].free = false;
   }
-  left = faces.size();
-  file_faces();
-}
-
-void CubeMesh::file_faces() {
-  double widths = 0;
-  for (const Face& face : faces)
-    if (!face.gone()) widths += (face.box.upper - face.box.lower).maxCoeff();
-  left_when_filed = left;
-  grid.emplace(std::max(1e-3, 1.5 * widths / double(std::max<std::size_t>(1, left))), left);
-  for (std::uint32_t f = 0; f < faces.size(); ++f)
-    if (!faces[f].gone()) grid->add(f, faces[f].box);
-}
-
-void CubeMesh::count_out() {
-  constexpr std::size_t kFewer = 3;
-  if (--left * kFewer < left_when_filed) file_faces();
 }
 
 void CubeMesh::merge_corners(std::uint32_t going, std::uint32_t staying) {
@@ -56,7 +35,7 @@ void CubeMesh::merge_corners(std::uint32_t going, std::uint32_t staying) {
   for (const std::uint32_t first : {vertices[going].first_corner, vertices[staying].first_corner})
     for (std::uint32_t corner = first, next; corner != kNone; corner = next) {
       next = next_corner[corner];
-      if (faces[corner / 3].gone()) continue;
+      if (faces[corner / 3].gone) continue;
       next_corner[corner] = kept;
       kept = corner;
     }

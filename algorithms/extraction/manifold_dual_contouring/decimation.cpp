@@ -11,7 +11,6 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/cube_decimation.h"
 #include "algorithms/extraction/manifold_dual_contouring/cube_mesh.h"
-#include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
 
 namespace hermesh {
@@ -48,45 +47,15 @@ class Round {
 
   std::size_t cube_count() const { return first_.size() - 1; }
 
-  void run(std::span<const std::uint32_t> cubes, const FilePoints& file, RunContext& context) {
-    tbb::parallel_for(std::size_t{0}, cubes.size(), [&](std::size_t c) {
+  /// The joins of all cubes, in their order.
+  std::vector<std::vector<Join>> run(Collapses kind, const FilePoints& file, const RunContext& context) {
+    std::vector<std::vector<Join>> joins(cube_count());
+    tbb::parallel_for(std::size_t{0}, cube_count(), [&](std::size_t c) {
       context.check();
-      decimate_cube(mesh_, file, cube_of(cubes[c]), triangles_of(cubes[c]), numbers_.local(), context);
+      const auto cube = static_cast<std::uint32_t>(c);
+      joins[c] = decimate_cube(mesh_, kind, file, cube_of(cube), triangles_of(cube), numbers_.local(), context);
     });
-  }
-
-  /// The cube that holds a place, cube_count() if there is none.
-  std::uint32_t cube_at(const Vector3d& p) const {
-    const DecimationCube::Index index = DecimationCube::index_of(p, start_, side_);
-    const std::uint64_t key = index[0] << 42 | index[1] << 21 | index[2];
-    const auto at = std::partition_point(first_.begin(), first_.end() - 1, [&](std::size_t i) { return entries_[i].cube < key; });
-    const bool found = at != first_.end() - 1 && entries_[*at].cube == key;
-    return static_cast<std::uint32_t>(found ? at - first_.begin() : first_.size() - 1);
-  }
-
-  /// Makes what a cube has changed as it was.
-  void restore(std::uint32_t number, const DecimatedMesh& before) {
-    const DecimationCube cube = cube_of(number);
-    const auto restore_sample = [&](std::uint32_t s) {
-      mesh_.attached_to[s] = before.attached_to[s];
-      mesh_.next_sample[s] = before.next_sample[s];
-    };
-    for (const std::uint32_t t : triangles_of(number)) {
-      const Triangle& corners = before.triangles[t];
-      bool own = true;
-      for (const std::uint32_t p : corners) own = own && cube.holds(before.points[p]);
-      if (!own) continue;
-      mesh_.triangles[t] = corners;
-      mesh_.first_sample[t] = before.first_sample[t];
-      for (std::uint32_t s = before.first_sample[t]; s != kNoSample; s = before.next_sample[s]) restore_sample(s);
-      for (const std::uint32_t p : corners) {
-        if (before.unmoved[p]) restore_sample(p);
-        mesh_.points[p] = before.points[p];
-        mesh_.quadrics[p] = before.quadrics[p];
-        mesh_.unmoved[p] = before.unmoved[p];
-        mesh_.below[p] = before.below[p];
-      }
-    }
+    return joins;
   }
 
  private:
@@ -96,7 +65,7 @@ class Round {
   DecimationCube cube_of(std::uint32_t cube) const {
     constexpr std::uint64_t kMask = (1u << 21) - 1;
     const std::uint64_t key = entries_[first_[cube]].cube;
-    return {start_, side_, {key >> 42, (key >> 21) & kMask, key & kMask}, kLongestEdge * side_, side_ == kFirstSide};
+    return {start_, side_, {key >> 42, (key >> 21) & kMask, key & kMask}, kLongestEdge * side_};
   }
   void file_triangles(RunContext& context) {
     const std::size_t n = mesh_.triangles.size();
@@ -131,38 +100,6 @@ class Round {
   tbb::enumerable_thread_specific<CubeNumbers> numbers_;
 };
 
-/// Cubes that have a part in what could not be proved.
-std::vector<std::uint32_t> cubes_of(const DistanceCertificate& certificate, const Round& round, const DecimatedMesh& mesh) {
-  std::vector<std::uint32_t> cubes;
-  for (const std::uint32_t s : certificate.samples) {
-    cubes.push_back(round.cube_at(mesh.fine->points()[s]));
-    const std::uint32_t t = mesh.attached_to[s];
-    if (t == kNoTriangle) continue;
-    for (const std::uint32_t p : mesh.triangles[t]) cubes.push_back(round.cube_at(mesh.points[p]));
-  }
-  std::sort(cubes.begin(), cubes.end());
-  cubes.erase(std::unique(cubes.begin(), cubes.end()), cubes.end());
-  std::erase(cubes, round.cube_count());
-  return cubes;
-}
-
-/// Where the distance cannot be proved a cube is done again with less room for those concerned, and at last left as it was.
-void run_certified(DecimatedMesh& mesh, Round& round, std::span<const float> tolerance, const FilePoints& file,
-                   RunContext& context) {
-  constexpr int kAttempts = 3;
-  const DecimatedMesh before = mesh;
-  std::vector<std::uint32_t> cubes(round.cube_count());
-  std::iota(cubes.begin(), cubes.end(), 0u);
-  for (int attempt = 1; attempt <= 2 * kAttempts && !cubes.empty(); ++attempt) {
-    if (attempt <= kAttempts) round.run(cubes, file, context);
-    const DistanceCertificate certificate = certify_distance(mesh, tolerance, &before, context);
-    if (certificate.holds()) return;
-    for (const std::uint32_t sample : certificate.samples) mesh.tolerance[sample] *= attempt == 1 ? 0.3f : 0.0f;
-    cubes = cubes_of(certificate, round, mesh);
-    for (const std::uint32_t cube : cubes) round.restore(cube, before);
-  }
-}
-
 void forget_the_dead(DecimatedMesh& mesh) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -170,8 +107,6 @@ void forget_the_dead(DecimatedMesh& mesh) {
     mesh.triangles[kept] = mesh.triangles[t];
     mesh.first_sample[kept] = mesh.first_sample[t];
     mesh.fine_triangle[kept] = mesh.fine_triangle[t];
-    for (std::uint32_t s = mesh.first_sample[kept]; s != kNoSample; s = mesh.next_sample[s])
-      mesh.attached_to[s] = static_cast<std::uint32_t>(kept);
     ++kept;
   }
   mesh.triangles.resize(kept);
@@ -179,54 +114,86 @@ void forget_the_dead(DecimatedMesh& mesh) {
   mesh.fine_triangle.resize(kept);
 }
 
-}  // namespace
+/// Every sample to a triangle near it, but for those that are points where they were.
+void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged, const RunContext& context) {
+  std::vector<std::uint32_t> nearest(mesh.unmoved.size(), kNoTriangle);
+  parallel_blocks(nearest.size(), context, [&](std::size_t i) {
+    const auto sample = static_cast<std::uint32_t>(i);
+    if (mesh.unmoved[sample]) return;
+    const Vector3d& p = mesh.fine->points()[sample];
+    double squared;
+    const std::uint32_t start = merged.mesh->around(merged.number[forest.leader(sample)]).front();
+    nearest[i] = merged.mesh->nearest_around(merged.mesh->walk(start, p), p, squared);
+  });
+  for (std::uint32_t sample = 0; sample < nearest.size(); ++sample) {
+    if (nearest[sample] == kNoTriangle) continue;
+    mesh.next_sample[sample] = mesh.first_sample[nearest[sample]];
+    mesh.first_sample[nearest[sample]] = sample;
+  }
+}
 
-DecimatedMesh begin_decimation(const FineMesh& fine, std::vector<float> tolerance, std::vector<std::uint8_t> pinned,
-                               RunContext& context) {
-  Stage stage(context, "quadrics");
-  const std::vector<Vector3d>& points = fine.points();
+DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
+                    std::span<const float> tolerance, const RunContext& context) {
+  const std::size_t n = fine.points().size();
   DecimatedMesh mesh;
   mesh.fine = &fine;
-  mesh.points = points;
-  mesh.triangles = fine.triangles();
-  mesh.quadrics.resize(points.size());
-  mesh.fine_triangle.resize(mesh.triangles.size());
-  std::iota(mesh.fine_triangle.begin(), mesh.fine_triangle.end(), 0u);
-  mesh.pinned = std::move(pinned);
-  mesh.pinned.resize(points.size(), 0);
-  mesh.unmoved.assign(points.size(), 1);
-  mesh.below.resize(points.size());
-  for (std::uint32_t p = 0; p < points.size(); ++p) mesh.below[p] = fine.around(p).empty() ? 0 : fine.around(p).front();
-  mesh.stirred.assign(points.size(), 1);
-  mesh.stirred_next.assign(points.size(), 0);
-  mesh.first_sample.assign(mesh.triangles.size(), kNoSample);
-  mesh.next_sample.assign(points.size(), kNoSample);
-  mesh.attached_to.assign(points.size(), kNoTriangle);
-  mesh.proposed.assign(points.size(), 0);
-  mesh.tolerance = std::move(tolerance);
-  for (const Triangle& t : mesh.triangles) {
-    const Vector3d normal = (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
-    const double size = normal.norm();
-    if (!(size > 0)) continue;
-    for (const std::uint32_t p : t) mesh.quadrics[p].add_plane(normal / size, size / 6.0);
-  }
+  mesh.tolerance = tolerance;
+  mesh.points.resize(n);
+  mesh.quadrics.resize(n);
+  mesh.least_tolerance.resize(n);
+  mesh.unmoved.resize(n);
+  mesh.stirred.resize(n);
+  mesh.stirred_next.resize(n);
+  mesh.fine_triangle = merged.origin;
+  mesh.first_sample.assign(merged.origin.size(), kNoSample);
+  mesh.next_sample.assign(n, kNoSample);
+  parallel_blocks(n, context, [&](std::size_t i) {
+    mesh.unmoved[i] = forest.set_of(static_cast<std::uint32_t>(i)) == MergeForest::kNone;
+  });
+  parallel_blocks(merged.leaders.size(), context, [&](std::size_t i) {
+    const std::uint32_t p = merged.leaders[i], set = forest.set_of(p);
+    mesh.stirred[p] = 1;
+    mesh.points[p] = merged.mesh->points()[i];
+    mesh.least_tolerance[p] = tolerance[p];
+    if (set == MergeForest::kNone) {
+      mesh.quadrics[p] = quadric_at(fine, p);
+      return;
+    }
+    mesh.quadrics[p] = forest.node(set).quadric;
+    for (const std::uint32_t sample : forest.members(set))
+      mesh.least_tolerance[p] = std::min(mesh.least_tolerance[p], tolerance[sample]);
+  });
+  mesh.triangles = merged.mesh->triangles();
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& p : t) p = merged.leaders[p];
   return mesh;
 }
 
-void decimate(DecimatedMesh& mesh, std::span<const float> tolerance, const FilePoints& file, RunContext& context) {
-  Stage stage(context, "decimate");
+}  // namespace
+
+void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
+                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file, RunContext& context) {
+  DecimatedMesh mesh = begin(forest, merged, fine, tolerance, context);
+  mesh.pinned = pinned;
+  if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
   Box3 box;
-  for (const Vector3d& p : mesh.points) box.add(p);
-  const double largest = mesh.points.empty() ? 0.0 : (box.upper - box.lower).norm();
-  for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
+  for (const Vector3d& p : merged.mesh->points()) box.add(p);
+  const double largest = (box.upper - box.lower).norm();
+  bool any = true;
+  for (double side = kFirstSide; any && !mesh.triangles.empty(); side *= 2) {
     Round round(mesh, box, side, context);
-    run_certified(mesh, round, tolerance, file, context);
+    any = false;
+    for (const auto& joins : round.run(kind, file, context))
+      for (const Join& join : joins) {
+        forest.join(join.going, join.node);
+        any = true;
+      }
     forget_the_dead(mesh);
     mesh.stirred.swap(mesh.stirred_next);
     std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);
-    context.progress("decimate", std::min(1.0, side / (largest / kLongestEdge)));
     if (kLongestEdge * side > largest) break;
   }
+  forest.settle();
 }
 
 }  // namespace hermesh

@@ -1,32 +1,73 @@
-// Proof that two meshes are nowhere farther apart than a bound.
+// Proof that a triangle is nowhere farther from a mesh than a bound.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
-#include <span>
-#include <vector>
 
-#include "algorithms/extraction/manifold_dual_contouring/decimation.h"
+#include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_overlay.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_reach.h"
+#include "algorithms/voxelization/triangle_tree.h"
 
 namespace hermesh {
 
-/// What could not be proved, as the samples that have a part in it; ascending, once each.
-struct DistanceCertificate {
-  std::vector<std::uint32_t> samples;
-  std::uint64_t fine_triangles = 0, coarse_triangles = 0;  ///< that were not proved
-  bool holds() const { return fine_triangles + coarse_triangles == 0; }
-};
+/// What a bound may be exceeded by, voxels: so that pieces need not get smaller than this.
+inline constexpr double kDistanceSlack = 0.005;
 
-/// **What it proves.** Most triangles of either mesh are covered by the other one right above or below, no farther away than
-/// d (triangle_overlay.h), where d is the least tolerance of the samples of the fine triangle concerned. The others, at
-/// creases and rims, are cut into pieces until each is covered so, or until its corners are within d of one triangle (the
-/// distance to a convex set is convex), or until it is so small that its middle's distance and its radius add up to no more
-/// than d + 0.005. So both one-sided Hausdorff distances are at most the tolerance and 0.005 voxel. Nothing that decimate()
-/// has looked at is trusted.
-///
-/// If `before` is given, only what differs from that is looked at, and the fine triangles round about.
-///
-/// `tolerance` by sample, voxels.
-DistanceCertificate certify_distance(const DecimatedMesh& mesh, std::span<const float> tolerance,
-                                     const DecimatedMesh* before, RunContext& context);
+/// **What it proves.** Most triangles are covered by the mesh right above or below, no farther away than the bound
+/// (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so, or until its corners
+/// are within the bound of one triangle of the mesh (the distance to a convex set is convex), or until it is so small that
+/// its middle's distance and its radius add up to no more than the bound and kDistanceSlack. It may fail to prove what is
+/// true: the mesh is searched for the nearest triangle only nearby, and there is an end to the pieces.
+class DistanceCertificate {
+ public:
+  DistanceCertificate(const FineMesh& mesh, TriangleOverlay& overlay) : mesh_(mesh), overlay_(overlay) {}
+
+  /// @param start a triangle of the mesh near the one that is asked about
+  /// @param bound bound(face): how near the triangle has to be to that of the mesh; it hears of every face that the proof
+  ///   rests on
+  /// @param covered told of triangles of the mesh that lie over this one as a whole, within their bounds
+  template <class Bound, class Covered>
+  bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, const Covered& covered) {
+    const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+    start = mesh_.walk(start, middle);
+    if (overlay_.is_near(triangle, mesh_, start, bound, covered)) return true;
+    pieces_left_ = kMostPieces;
+    return holds_in_pieces(triangle, start, bound);
+  }
+
+ private:
+  template <class Bound>
+  bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound) {
+    if (--pieces_left_ < 0) return false;
+    const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0;
+    double squared;
+    const std::uint32_t found = mesh_.nearest_around(start, middle, squared);
+    const double distance = std::sqrt(squared), within = bound(found);
+    if (distance > within) return false;
+    double radius = 0;
+    for (const Eigen::Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
+    if (distance + radius <= within + kDistanceSlack) return true;
+    const TriangleReach reach(mesh_.corners(found));
+    if ((reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within)) ||
+        overlay_.is_near(piece, mesh_, found, bound))
+      return true;
+
+    int i = 0;
+    for (int side = 1; side < 3; ++side)
+      if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm()) i = side;
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const Eigen::Vector3d half = 0.5 * (piece[i] + piece[j]);
+    return holds_in_pieces({piece[i], half, piece[k]}, found, bound) &&
+           holds_in_pieces({half, piece[j], piece[k]}, found, bound);
+  }
+
+  static constexpr int kMostPieces = 5000;
+
+  const FineMesh& mesh_;
+  TriangleOverlay& overlay_;
+  int pieces_left_ = 0;
+};
 
 }  // namespace hermesh

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "algorithms/core/error.h"
+#include "algorithms/voxelization/triangle_tree.h"
 
 namespace hermesh {
 
@@ -50,6 +51,26 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
     if (next == before || next == kNone) return triangle;
     before = triangle;
     triangle = next;
+  }
+  return triangle;
+}
+
+std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const {
+  const auto squared_to = [&](std::uint32_t t) {
+    const Corners c = corners(t);
+    return squared_distance(p, c[0], c[1], c[2]);
+  };
+  constexpr int kMostSteps = 16;
+  squared = squared_to(triangle);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const std::uint32_t from = triangle;
+    for (const std::uint32_t corner : triangles_[from])
+      for (const std::uint32_t t : around(corner))
+        if (const double there = squared_to(t); there < squared) {
+          squared = there;
+          triangle = t;
+        }
+    if (triangle == from) break;
   }
   return triangle;
 }

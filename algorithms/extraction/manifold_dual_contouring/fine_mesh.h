@@ -47,6 +47,8 @@ class FineMesh {
   /// From triangle to triangle, across the side that the point lies farthest beyond, until it lies over one; stops at a
   /// ridge that it lies outside of, and after some steps.
   std::uint32_t walk(std::uint32_t triangle, const Eigen::Vector3d& p) const;
+  /// From triangle to triangle that touches it, as long as there is a nearer one: the nearest if the mesh is smooth.
+  std::uint32_t nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const;
 
  private:
   std::vector<Eigen::Vector3d> points_;

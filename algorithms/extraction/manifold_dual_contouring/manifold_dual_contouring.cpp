@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/adaptivity_field.h"
@@ -107,16 +106,17 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
   parallel_blocks(asked.size(), context, [&](std::size_t i) {
     asked[i] = at_points.tolerance(fine.points()[i], options.tolerance);
   });
-  const std::optional<DecimatedMesh> coarse =
-      options.tolerance > 0 ? decimate_certified(fine, asked, {}, file, context) : std::nullopt;
-  const std::vector<Eigen::Vector3d>& places = coarse ? coarse->points : fine.points();
-  std::vector<std::uint32_t> number(places.size(), kNoSample);
+  CertifiedMesh coarse;
+  if (options.tolerance > 0) coarse = decimate_certified(fine, asked, {}, file, context);
+  const std::vector<Eigen::Vector3d>& places = options.tolerance > 0 ? coarse.points : fine.points();
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<std::uint32_t> number(places.size(), kNone);
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
-  for (Triangle t : coarse ? coarse->triangles : fine.triangles()) {
+  for (Triangle t : options.tolerance > 0 ? coarse.triangles : fine.triangles()) {
     if (!whole && at_points.leaves_out((places[t[0]] + places[t[1]] + places[t[2]]) / 3.0)) continue;
     for (std::uint32_t& p : t) {
-      if (number[p] == kNoSample) {
+      if (number[p] == kNone) {
         number[p] = static_cast<std::uint32_t>(points.size());
         points.push_back(places[p]);
       }

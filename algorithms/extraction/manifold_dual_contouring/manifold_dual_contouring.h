@@ -20,8 +20,8 @@ struct ManifoldDualContouringOptions {
 /// hold there, too.
 inline constexpr double kSimplifiedTolerance = 8.0;
 
-/// Uniform mesh (uniform_mesh.h), then collapses of edges, each tested before it is done (decimation.h), then the bound
-/// proved for every triangle (distance_certificate.h). The same bytes for every number of threads.
+/// Uniform mesh (uniform_mesh.h), then merges of its points, of which those stay that are proved to keep the topology, the
+/// freedom from self-intersection and the bound (certified_decimation.h). The same bytes for every number of threads.
 /// @param field scales the tolerance by the place of the uniform mesh's points, may be null. Where it asks for no mesh
 /// outside of its mask, triangles whose middle lies outside are left out, and the mesh is open there.
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,

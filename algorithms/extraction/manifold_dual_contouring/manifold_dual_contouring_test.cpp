@@ -11,8 +11,6 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/adaptivity_field.h"
-#include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
-#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/voxelization/triangle_tree.h"
 
@@ -148,7 +146,6 @@ TEST(ManifoldDualContouring, ScaleOfZeroInOneHalfLeavesTheOtherToMerge) {
   field.scale = make_level_set(scale);
   RunContext context;
   const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.5, .uniform = {}}, &field, context);
-  EXPECT_EQ(context.figures.back(), (std::pair<std::string, double>("attempts", 1.0)));
   const auto count = [](const PolygonMesh& of, float from, float to) {
     return std::ranges::count_if(of.points, [&](const Eigen::Vector3f& p) { return p[0] > from && p[0] < to; });
   };
@@ -194,32 +191,6 @@ TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
   EXPECT_FALSE(meshes[0].empty());
   EXPECT_TRUE(meshes[0] == meshes[1]);
   EXPECT_TRUE(meshes[0] == meshes[2]);
-}
-
-/// The certificate has to fail before it is trusted.
-TEST(DistanceCertificate, SeesAPointThatIsTooFarAway) {
-  RunContext context;
-  const FloatHermite hermite = sphere();
-  const auto view = view_of(hermite, context);
-  const FilePoints file(view.placement());
-  UniformMesh uniform = uniform_mesh(view, {}, file, context);
-  std::vector<Triangle> triangles = std::move(uniform.triangles);
-  for (const Quad& q : uniform.quads) {
-    triangles.push_back({q[0], q[1], q[2]});
-    triangles.push_back({q[0], q[2], q[3]});
-  }
-  const FineMesh fine(std::move(uniform.points), std::move(triangles));
-  const std::vector<float> tolerance(fine.points().size(), 0.2f);
-  DecimatedMesh mesh = begin_decimation(fine, tolerance, {}, context);
-  EXPECT_TRUE(certify_distance(mesh, tolerance, nullptr, context).holds());
-  const Vector3d outwards = mesh.points[100].normalized();
-  mesh.points[100] += 0.19 * outwards;
-  EXPECT_TRUE(certify_distance(mesh, tolerance, nullptr, context).holds());
-  mesh.points[100] += 0.04 * outwards;
-  const DistanceCertificate certificate = certify_distance(mesh, tolerance, nullptr, context);
-  EXPECT_FALSE(certificate.holds());
-  EXPECT_GT(certificate.coarse_triangles, 0u);
-  EXPECT_TRUE(std::binary_search(certificate.samples.begin(), certificate.samples.end(), 100u));
 }
 
 }  // namespace

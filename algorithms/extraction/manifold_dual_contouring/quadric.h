@@ -3,6 +3,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
 
 namespace hermesh {
 
@@ -19,6 +22,18 @@ struct PlaneQuadric {
     a += w * Eigen::Matrix<float, 6, 1>(n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2], n[2] * n[2]);
   }
 };
+
+/// Of the triangles around a point of a fine mesh, about that; each gives a third of its area to each of its corners.
+inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
+  PlaneQuadric quadric;
+  for (const std::uint32_t t : fine.around(point)) {
+    const Corners at = fine.corners(t);
+    const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
+    const double size = normal.norm();
+    if (size > 0) quadric.add_plane(normal / size, size / 6.0);
+  }
+  return quadric;
+}
 
 /// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to decide on a plane.
 inline constexpr double kPull = 1e-6;

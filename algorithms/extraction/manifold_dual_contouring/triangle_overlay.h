@@ -62,14 +62,15 @@ class TriangleOverlay {
   /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther away than
   /// `within(face)`, a double, says of the face that this lies in.
   ///
-  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected, across every side that passes over its
-  /// inside. All of them face as t does. So the projection of their union onto t's inside is open; it is closed, too, for
-  /// no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are largest at the part's
-  /// corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
+  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected, across every side
+  /// that passes over its inside. All of them face as t does. So the projection of their union onto t's inside is open; it
+  /// is closed, too, for no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are
+  /// largest at the part's corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
   ///
-  /// `Mesh` has corners(face) and across(face, side).
-  template <class Mesh, class Within>
-  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
+  /// `Mesh` has corners(face) and across(face, side). `covered(face)` is told of faces that lie over t as a whole, no
+  /// farther away than within(face), whatever the answer is.
+  template <class Mesh, class Within, class Covered>
+  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Covered&& covered) {
     const OverTriangle over(t);
     if (over.degenerate()) return false;
     if (++question_ == 0) std::fill(seen_.begin(), seen_.end(), 0), question_ = 1;
@@ -83,6 +84,8 @@ class TriangleOverlay {
       // All faces but the first were come to over the inside of t.
       if (face == start && !overlaps(places)) return false;
       if (!is_near_and_faces_alike(over, corners, places, within(face))) return false;
+      if (places[0].head<3>().maxCoeff() <= 0 && places[1].head<3>().maxCoeff() <= 0 && places[2].head<3>().maxCoeff() <= 0)
+        covered(face);
       for (int i = 0; i < 3; ++i) {
         if (!passes_over(places[i], places[(i + 1) % 3])) continue;
         const std::uint32_t next = mesh.across(face, i);
@@ -93,6 +96,11 @@ class TriangleOverlay {
       }
     }
     return true;
+  }
+
+  template <class Mesh, class Within>
+  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
+    return is_near(t, mesh, start, within, [](std::uint32_t) {});
   }
 
  private:
