@@ -213,7 +213,7 @@ Tier read_tier(const Section& file, const std::string& name, const toml::table& 
 Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vocabulary) {
   const Section section(
       file.file(), file.table(node, "a plot"), "a plot",
-      {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent"});
+      {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent", "by_variant"});
   const auto known = [&](const std::string& key, const std::string& name,
                          const std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), name) == names.end())
@@ -232,6 +232,7 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
   plot.log_x = section.flag_or("log_x", false);
   plot.log_y = section.flag_or("log_y", false);
   plot.percent = section.flag_or("percent", false);
+  plot.by_variant = section.flag_or("by_variant", false);
   return plot;
 }
 

@@ -35,11 +35,12 @@ std::optional<double> number_in(const std::string& column, const Json& row) {
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
-/// The first column gives a curve for every label. The others do not depend on who competes: they are taken
+/// The first column gives a curve for every label or variant. The others do not depend on who competes: they are taken
 /// from the rows of the first label alone, and are called by their column's header.
 std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
   std::vector<Curve> curves;
-  const std::string first_label = rows.empty() ? "" : text_at(rows.front(), "/variant/label");
+  const char* const who = plot.by_variant ? "/variant/name" : "/variant/label";
+  const std::string first_label = rows.empty() ? "" : text_at(rows.front(), who);
   const auto curve = [&](const std::string& label) -> Curve& {
     const auto known =
         std::find_if(curves.begin(), curves.end(), [&](const Curve& c) { return c.label == label; });
@@ -52,7 +53,7 @@ std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
     for (std::size_t i = 0; i < plot.y.size(); ++i) {
       const auto y = number_in(plot.y[i], row);
       if (!y || (plot.log_y && *y <= 0.0)) continue;
-      const std::string label = text_at(row, "/variant/label");
+      const std::string label = text_at(row, who);
       if (i > 0 && label != first_label) continue;
       auto& points = curve(i == 0 ? label : column_of(row, plot.y[i]).header).points;
       points.emplace_back(*x, plot.percent ? 100.0 * *y : *y);
@@ -152,12 +153,13 @@ bool run_gnuplot(const std::filesystem::path& script) {
 Json to_json(const Plot& plot) {
   return {{"name", plot.name},   {"title", plot.title},     {"case", plot.case_name},  {"x", plot.x},
           {"y", plot.y},         {"x_label", plot.x_label}, {"y_label", plot.y_label}, {"log_x", plot.log_x},
-          {"log_y", plot.log_y}, {"percent", plot.percent}};
+          {"log_y", plot.log_y}, {"percent", plot.percent}, {"by_variant", plot.by_variant}};
 }
 
 Plot plot_from_json(const Json& json) {
   return {json.at("name"),    json.at("title"),   json.at("case"),  json.at("x"),     json.at("y"),
-          json.at("x_label"), json.at("y_label"), json.at("log_x"), json.at("log_y"), json.at("percent")};
+          json.at("x_label"), json.at("y_label"), json.at("log_x"), json.at("log_y"), json.at("percent"),
+          json.value("by_variant", false)};
 }
 
 void write_plots(const std::vector<Json>& rows, const std::filesystem::path& folder, std::ostream& out) {

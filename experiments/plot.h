@@ -11,7 +11,7 @@
 
 namespace hermesh {
 
-/// A curve for every label, over the rows in which both columns have a value.
+/// A curve for every label, or every variant, over the rows in which both columns have a value.
 struct Plot {
   std::string name;  ///< of the files
   std::string title;
@@ -21,7 +21,8 @@ struct Plot {
       y;  ///< columns; of those after the first, one curve each that has no label of its own
   std::string x_label, y_label;  ///< with the unit
   bool log_x = false, log_y = false;
-  bool percent = false;  ///< y is a share and shown in percent
+  bool percent = false;     ///< y is a share and shown in percent
+  bool by_variant = false;  ///< a curve through all labels of a variant
 
   bool operator==(const Plot&) const = default;
 };

@@ -63,6 +63,14 @@ TEST_F(PlotFiles, HaveACurveForEveryLabelInTheOrderOfX) {
   }
 }
 
+TEST_F(PlotFiles, JoinTheLabelsOfAVariant) {
+  plot_.y = {"wrong_share"};
+  plot_.by_variant = true;
+  EXPECT_EQ(plot_from_json(to_json(plot_)), plot_);
+  draw({row("a", 2, 0.5), row("b", 1, 0.25)});
+  EXPECT_EQ(text("toy-p.dat"), "# v\n1 25\n2 50\n\n\n");
+}
+
 TEST_F(PlotFiles, ColumnsBesidesTheFirstHaveOneCurve) {
   draw({row("a", 1, 0.25), row("b", 1, 0.0), row("a", 2, 0.5), row("b", 2, 0.1)});
   EXPECT_NE(text("toy-p.dat").find("# published [s]\n1 1000\n2 2000\n"), std::string::npos)
