@@ -25,9 +25,7 @@ std::vector<MeasuredColumn> guarantee_mesh_columns() {
           {"several_sheets", "sheets", "of these, with several sheets"},
           {"held_cells", "held", "cells in which the last resort was taken"},
           {"fanned_edges", "fanned", "crossing edges that became four triangles or more"},
-          {"escaped", "escaped", "points outside their cells"},
-          {"attempts", "attempts", "how often it had to collapse anew to be proved"},
-          {"unproved", "unproved", "triangles whose distance the last attempt left unproved"}};
+          {"escaped", "escaped", "points outside their cells"}};
 }
 
 std::vector<MeasuredColumn> guarantee_summary_columns() {
