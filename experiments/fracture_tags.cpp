@@ -48,7 +48,8 @@ void TagJudge::add(const PolygonMesh& piece) {
 void TagJudge::add_polygon(const Vector3d& middle, bool tagged_cut) {
   ++counts_.polygons;
   const double to_wall = distance_to_walls(seeds_, middle) / voxel_size_;
-  const double to_input = input_.distance((middle - origin_) / voxel_size_, std::max(1.0, to_wall));
+  // Nothing nearer than the bound gives the bound itself, which must then say that the wall is nearer.
+  const double to_input = input_.distance((middle - origin_) / voxel_size_, std::max(1.0, 2.0 * to_wall));
   if (to_wall < 1.0 && to_input < 1.0) {
     ++counts_.at_rims;
     return;

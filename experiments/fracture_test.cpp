@@ -271,6 +271,14 @@ TEST(FractureTags, AreJudgedByInputAndWalls) {
   judge.add(left);
   EXPECT_EQ(judge.counts().precision(), 0.5);
   EXPECT_EQ(judge.counts().recall(), 0.5);
+  // Beside the wall by more than a voxel, as where labels were repaired, but much farther from the input.
+  PolygonMesh displaced;
+  displaced.points = {{-0.6f, 0, 0}, {-0.6f, 1, 0}, {-0.6f, 0, 1}};
+  displaced.triangles = {{0, 1, 2}};
+  displaced.attributes = {{"surface", AttributeDomain::polygon, 1, std::vector<std::int32_t>{1}, {}}};
+  TagJudge other(input, box.origin, 0.5, seeds);
+  other.add(displaced);
+  EXPECT_EQ(other.counts().rightly_cut, 1);
   // A triangle in the rim: half a voxel from the wall and in a side of the box.
   PolygonMesh rim;
   rim.points = {{-0.3f, 9, 0}, {-0.2f, 9, 0}, {-0.25f, 9, 1}};

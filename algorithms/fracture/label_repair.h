@@ -8,8 +8,8 @@
 // **Why this makes each piece closed and manifold.** A piece is bounded by the polygons of the lattice edges
 // of which one end is in it. Two of its polygons share the segment between the points of two cells if they
 // belong to two such edges of the cells' common face. A face has none, two or four of them. Four is
-// ambiguous: that does not happen at a joint, and between two cells without a cut the face is held to two
-// separate segments (uniform_mesh.h). So every segment has two polygons of the piece. The polygons around a
+// ambiguous: that does not happen at a joint, and between two cells without a cut the polygons are held to
+// two separate segments or end in different points (uniform_mesh.h, sheet_trials.h). So every segment has two polygons of the piece. The polygons around a
 // joint's point are those of the piece's loop, of which there is one: a single fan. Those around another
 // point belong to the one loop of its sheet, all of whose inside corners hang together by edges of the cell,
 // and so are of one piece.

@@ -28,7 +28,7 @@ struct JointMesh {
   std::vector<EdgeSides> sides;  ///< of each triangle
 
   std::uint64_t joints = 0;          ///< cells where pieces meet
-  std::uint64_t several_sheets = 0;  ///< cells held to explicit segments
+  std::uint64_t several_sheets = 0;  ///< cells with them
   std::uint64_t fanned_edges = 0, escaped = 0;
 };
 

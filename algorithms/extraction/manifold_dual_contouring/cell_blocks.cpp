@@ -1,5 +1,6 @@
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 
 #include "algorithms/core/parallel.h"
@@ -7,7 +8,7 @@
 namespace hermesh {
 
 CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
-    : grid_(grid), cuts_(grid.cuts()), blocks_(grid.blocks().size()) {
+    : grid_(grid), margin_(margin_for_rounding()), cuts_(grid.cuts()), blocks_(grid.blocks().size()) {
   Stage stage(context, "find cells");
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
@@ -107,6 +108,19 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   return signs;
 }
 
+double CellBlocks::margin_for_rounding() const {
+  const IndexToWorld& placement = grid_.placement();
+  Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
+  for (const HermiteView::Block& block : grid_.blocks())
+    for (int corner = 0; corner < 8; ++corner) {
+      Eigen::Vector3d index;
+      for (int a = 0; a < 3; ++a) index[a] = block.lower[a] - placement.base[a] + 8 * ((corner >> a) & 1);
+      farthest = farthest.cwiseMax(placement.local(index).cwiseAbs());
+    }
+  const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
+  return std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
+}
+
 std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const {
   const Block& block = blocks_[number];
   if (sheet == 0)
@@ -133,7 +147,7 @@ CellBlocks::Edge CellBlocks::edge_of_cell(std::int32_t block, int cell, int edge
 Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge) const {
   Eigen::Vector3d point = corner(edge.block, edge.sample);
   const double offset = grid_.crossing(edge.block, edge.sample, edge.axis).offset;
-  point[edge.axis] += std::clamp(offset, kMargin, 1.0 - kMargin);
+  point[edge.axis] += std::clamp(offset, margin_, 1.0 - margin_);
   return point;
 }
 

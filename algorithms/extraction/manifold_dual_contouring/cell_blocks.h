@@ -41,10 +41,6 @@ class CellGrid {
 
 class CellBlocks {
  public:
-  /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
-  /// rounding to the file's precision moves none across.
-  static constexpr double kMargin = 1.0 / 1024.0;
-
   struct Block {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
@@ -71,6 +67,12 @@ class CellBlocks {
   };
 
   CellBlocks(const CellGrid& grid, RunContext& context);
+
+  /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
+  /// rounding to the file's precision moves none across. The mean of a loop's crossings may be as near as a third of it, and
+  /// a crossing is rounded off its edge, too; so it is eight times what rounding may do at the lattice's farthest corner, but
+  /// at least 1/1024, which is that up to 2048 voxels from the base.
+  double margin() const { return margin_; }
 
   std::size_t size() const { return blocks_.size(); }
   const Block& operator[](std::int32_t block) const { return blocks_[block]; }
@@ -146,7 +148,10 @@ class CellBlocks {
   std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
   BlockMask cells_with_cuts(std::int32_t block) const;
 
+  double margin_for_rounding() const;
+
   const CellGrid& grid_;
+  const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   std::vector<Block> blocks_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell

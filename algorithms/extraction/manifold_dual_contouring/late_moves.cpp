@@ -18,6 +18,9 @@ constexpr double kLeastArea = 1e-4;
 /// Voxels from where it would rather be that are not worth a move.
 constexpr double kFulfilled = 1e-3;
 
+/// More than rounding to the file's precision may move a place, in voxels.
+constexpr double kRounding = 0.05;
+
 /// One move makes room for another.
 constexpr int kSweeps = 2;
 
@@ -42,6 +45,8 @@ class Star {
     for (const Vector3d& place : places) box_.add(place);
     for (const Triangle& t : star_)
       for (const std::uint32_t p : t) box_.add(points_[p]);
+    box_.lower.array() -= kRounding;
+    box_.upper.array() += kRounding;
   }
 
   /// Moves the point, if the mesh stays embedded.
@@ -95,13 +100,12 @@ class Star {
 
 }  // namespace
 
-std::uint64_t move_points(const CellBlocks& cells, const EdgePolygons& polygons,
-                          const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
-                          std::vector<Vector3d>& points, RunContext& context) {
+void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
+                 const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
+                 std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "move points");
-  std::vector<std::uint64_t> moved(cells.size());
-  // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most five samples away,
-  // and have their points in cells at most six away. So blocks of one parity, eight apart, do not see one another's moves.
+  // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most six samples away,
+  // and have their points in cells at most seven away. So blocks of one parity, eight apart, do not see one another's moves.
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells.size(), context, [&](std::size_t b) {
@@ -118,15 +122,10 @@ std::uint64_t move_points(const CellBlocks& cells, const EdgePolygons& polygons,
           for (const Vector3d& place :
                {wish.place, between, wish.nearer, halfway, Vector3d(0.5 * (from + halfway))}) {
             if ((place - from).norm() < kFulfilled) break;
-            if (!star.moves_to(file.rounded(place))) continue;
-            ++moved[b];
-            break;
+            if (star.moves_to(file.rounded(place))) break;
           }
         }
       });
-  std::uint64_t sum = 0;
-  for (const std::uint64_t n : moved) sum += n;
-  return sum;
 }
 
 }  // namespace hermesh

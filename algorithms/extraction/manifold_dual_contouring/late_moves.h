@@ -11,7 +11,7 @@
 
 namespace hermesh {
 
-/// Where the point of a cell of one sheet would rather be; index space relative to the placement's base.
+/// Where the point of a cell of one sheet, or of a joint, would rather be; index space relative to the placement's base.
 struct PointWish {
   int cell;
   Eigen::Vector3d place;
@@ -21,9 +21,9 @@ struct PointWish {
 /// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but is
 /// not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one another
 /// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already, and
-/// those of crowded cells, are passed over. The same result at any number of threads. @returns the number of moves. @throws Cancelled
-std::uint64_t move_points(const CellBlocks& cells, const EdgePolygons& polygons,
-                          const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
-                          std::vector<Eigen::Vector3d>& points, RunContext& context);
+/// those of crowded cells, are passed over. The same result at any number of threads. @throws Cancelled
+void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
+                 const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
+                 std::vector<Eigen::Vector3d>& points, RunContext& context);
 
 }  // namespace hermesh

@@ -35,9 +35,9 @@ class PolygonNeighbourhood {
         f);
   }
 
-  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than two voxels out of
-  /// the block. The triangles of an edge lie in the box of its four cells and kFarthestFromCell around it, so their edges
-  /// begin at most five samples outside the block.
+  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than three voxels out
+  /// of the block. The triangles of an edge lie in the box of its four cells and kFarthestFromCell around it, so their edges
+  /// begin at most six samples outside the block.
   template <class F>
   void for_each_near(std::int32_t block, const Box3& box, F&& f) const {
     const Eigen::Vector3d origin = cells_.corner(block, 0);

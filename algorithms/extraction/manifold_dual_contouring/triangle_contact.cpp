@@ -59,6 +59,8 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) {
       const Vector3d axis = a[i].cross(b[j]);
+      // Of parallel rays it is noise, and so would be every sign.
+      if (axis.cwiseAbs().maxCoeff() <= kCertain * a[i].cwiseAbs().maxCoeff() * b[j].cwiseAbs().maxCoeff()) continue;
       if (sign(axis, a[1 - i]) * sign(axis, b[1 - j]) < 0) return true;
     }
   // A plane through one side of a wedge, at right angles to it, with all of the other beyond; one ray of that may lie in

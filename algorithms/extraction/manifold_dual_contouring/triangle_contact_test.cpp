@@ -34,6 +34,19 @@ TEST(TriangleContact, OneSharedCorner) {
   EXPECT_TRUE(certainly_apart(flat, {o, -x - y + z, -x - y - z}, 1));
 }
 
+TEST(TriangleContact, SidesThatLieOnOneAnotherMeet) {
+  // Triangles with a corner in common, sides along one ray from it and the rest on either side, turned at random: the plane
+  // through two parallel sides is noise and separates nothing.
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const auto point = [&] { return Vector3d(unit(random), unit(random), unit(random)); };
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d corner = point(), ray = point();
+    const Corners a = {corner, corner + ray, corner + point()}, b = {corner, corner + 0.37 * ray, corner + point()};
+    EXPECT_FALSE(certainly_apart(a, b, 1)) << i;
+  }
+}
+
 TEST(TriangleContact, SharedEdge) {
   const Corners flat = {o, x, y};
   EXPECT_TRUE(certainly_apart(flat, {o, x, z}, 2));

@@ -89,7 +89,7 @@ class Contourer {
   }
 
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
-    const Vector3d margin = Vector3d::Constant(CellBlocks::kMargin);
+    const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d held = qef.minimiser_within(corner + margin, corner + Vector3d::Ones() - margin, options_.truncation);
     if (reach_ > 0 && qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes()) {
       const auto is_near = [&](const Vector3d& p) {
@@ -105,35 +105,42 @@ class Contourer {
   /// whatever the order within each.
   void let_points_leave(UniformMesh& mesh, RunContext& context) {
     Stage stage(context, "let points leave");
-    std::vector<std::uint32_t> escaped(cells_.size());
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells_.size(), context, [&](std::size_t b) {
         for (const PointWish& wish : wishes_[b]) {
           const int x = wish.cell >> 6, y = (wish.cell >> 3) & 7, z = wish.cell & 7;
           if (((x & 1) | (y & 1) << 1 | (z & 1) << 2) == parity)
-            escaped[b] += leave(static_cast<std::int32_t>(b), wish, mesh.points);
+            leave(static_cast<std::int32_t>(b), wish, mesh.points);
         }
       });
-    for (const std::uint32_t n : escaped) mesh.escaped += n;
   }
 
-  bool leave(std::int32_t block, const PointWish& wish, std::vector<Vector3d>& points) const {
-    if (cells_.has_explicit_face(block, wish.cell)) return false;
+  void count_escaped(UniformMesh& mesh) const {
+    for (std::size_t b = 0; b < cells_.size(); ++b)
+      for (const PointWish& wish : wishes_[b]) {
+        const auto block = static_cast<std::int32_t>(b);
+        const Vector3d from_middle =
+            mesh.points[cells_.point(block, wish.cell, 0)] - cells_.corner(block, wish.cell) - Vector3d::Constant(0.5);
+        mesh.escaped += from_middle.cwiseAbs().maxCoeff() > 0.5;
+      }
+  }
+
+  void leave(std::int32_t block, const PointWish& wish, std::vector<Vector3d>& points) const {
+    if (cells_.has_explicit_face(block, wish.cell)) return;
     Vector3d& point = points[cells_.point(block, wish.cell, 0)];
     const Vector3d corner = cells_.corner(block, wish.cell);
     std::array<Vector3d, 6> beside;
     for (int face = 0; face < 6; ++face) {
       const std::optional<Vector3d> there = point_beside(block, wish.cell, face, points);
-      if (!there) return false;
+      if (!there) return;
       beside[face] = *there;
     }
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
       const Vector3d candidate = file_.rounded(point + share * (wish.place - point));
       if (!tetrahedra_are_positive(corner, candidate, beside)) continue;
       point = candidate;
-      return true;
+      return;
     }
-    return false;
   }
 
   /// The middle of a cell that the surface does not pass through: no polygon uses it, but the tetrahedra do.
@@ -178,7 +185,8 @@ class Contourer {
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     mesh.fanned_edges = polygons.fanned_edges();
-    mesh.escaped += move_points(cells_, polygons, wishes_, file_, mesh.points, context);
+    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
+    count_escaped(mesh);
   }
 
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {

@@ -1,4 +1,5 @@
-// The finest mesh of `manifold-dual-contouring`: closed, oriented, manifold and free of self-intersection by construction.
+// The finest mesh of `manifold-dual-contouring`: closed, oriented, manifold and free of self-intersection, by construction
+// and, where that asks too much, by tests.
 //
 // **Why no two polygons meet** (index space; corners are lattice points). Give every cell a point strictly inside it, and
 // cut space into the tetrahedra of every lattice edge with the points of each two cells that share a face at that edge.
@@ -12,11 +13,11 @@
 //                  (Ju & Udeshi 2006, envelopes on an octree). One diagonal or the other nearly always does.
 //   fanned edge    else four triangles from the crossing itself, which is a point of the mesh then: each of them lies in
 //                  one tetrahedron.
-//   explicit face  where a cell has several sheets, or a face is ambiguous, the surface is held to the straight segments
+//   explicit face  where a cell has several sheets, or a face is ambiguous, the surface can be held to the straight segments
 //                  between the crossings on the faces (cell_sheets.h). Each sheet is a cone over its loop of segments,
 //                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
 //                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
-//                  This is the last resort, and is counted: most such cells do without (sheet_trials.h).
+//                  This is the last resort where polygons of such cells without it meet others (sheet_trials.h), and is counted.
 //
 // Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
 // only where the mesh as it is then shows that nothing meets (late_moves.h).
@@ -55,8 +56,7 @@ struct UniformMesh {
 
 /// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its
 /// cell: by kFarthestFromCell at most, whatever the options' reach.
-/// Holds for lattices up to 2^14 voxels from the base along an axis; beyond, single precision may round a point out of
-/// its cell. @throws Cancelled
+/// @throws Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context);
 
