@@ -132,7 +132,8 @@ void CubeCollapse::merge_vertices() {
   tolerance = std::min(tolerance, mesh_.least_tolerance[going.global]);
   if (collapse_.v_moves) mesh_.unmoved[staying.global] = 0;
   mesh_.unmoved[going.global] = 0;
-  staying.point = mesh_.points[staying.global] = collapse_.x;
+  // One that stays may be a corner of another cube's triangles, who read it at the same time.
+  if (collapse_.v_moves) staying.point = mesh_.points[staying.global] = collapse_.x;
   mesh_.quadrics[staying.global] = q.about(Vector3d::Zero());
   ++staying.version;
   going.gone = true;
@@ -142,7 +143,7 @@ void CubeCollapse::merge_vertices() {
   joins_.push_back({.going = going.global,
                     .node = {.first = staying.global,
                              .merges = true,
-                             .error = static_cast<float>(q(Vector3d::Zero()) / most),
+                             .error = static_cast<float>(q(Vector3d::Zero()) / (most + 1e-30)),
                              .place = collapse_.x,
                              .quadric = mesh_.quadrics[staying.global]}});
 }

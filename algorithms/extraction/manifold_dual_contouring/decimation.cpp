@@ -179,15 +179,10 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMes
   Box3 box;
   for (const Vector3d& p : merged.mesh->points()) box.add(p);
   const double largest = (box.upper - box.lower).norm();
-  bool any = true;
-  for (double side = kFirstSide; any && !mesh.triangles.empty(); side *= 2) {
+  for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
     Round round(mesh, box, side, context);
-    any = false;
     for (const auto& joins : round.run(kind, file, context))
-      for (const Join& join : joins) {
-        forest.join(join.going, join.node);
-        any = true;
-      }
+      for (const Join& join : joins) forest.join(join.going, join.node);
     forget_the_dead(mesh);
     mesh.stirred.swap(mesh.stirred_next);
     std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);

@@ -31,7 +31,7 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
 }
 
 std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
-  constexpr int kMostSteps = 64;
+  constexpr int kMostSteps = 1000;
   std::uint32_t before = triangle;
   for (int step = 0; step < kMostSteps; ++step) {
     const Corners c = corners(triangle);

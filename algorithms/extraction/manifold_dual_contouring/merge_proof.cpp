@@ -102,8 +102,8 @@ class MergeProof {
       const std::uint32_t set = forest_.set_of(p);
       if (set == kNone || set == worst) continue;
       if (splits_ >= kPatience) std::atomic_ref(bold_[set]).store(1, std::memory_order_relaxed);
-      const float error = forest_.node(set).error, most = worst == kNone ? -1.0f : forest_.node(worst).error;
-      if (error > most || (error == most && set > worst)) worst = set;
+      const float error = forest_.node(set).error, most = worst == kNone ? 0.0f : forest_.node(worst).error;
+      if (worst == kNone || error > most || (error == most && set > worst)) worst = set;
     }
     if (worst != kNone) std::atomic_ref(bold_[worst]).store(1, std::memory_order_relaxed);
   }
@@ -211,20 +211,16 @@ class MergeProof {
     const FineMesh& mesh = *merged_.mesh;
     const std::size_t n = mesh.triangles().size();
     std::vector<Box3> boxes(n);
-    double widths = 0;
-    for (std::uint32_t t = 0; t < n; ++t) {
+    for (std::uint32_t t = 0; t < n; ++t)
       for (const Vector3d& p : mesh.corners(t)) boxes[t].add(p);
-      widths += (boxes[t].upper - boxes[t].lower).maxCoeff();
-    }
-    if (n == 0) return;
-    TriangleGrid grid(std::max(1e-3, 1.5 * widths / double(n)), n);
-    for (std::uint32_t t = 0; t < n; ++t) grid.add(t, boxes[t]);
+    const TriangleGrid grid(boxes);
+    const auto is_new = [&](std::uint32_t t) { return !(proofs_[merged_.origin[t]] & kApart); };
     parallel_blocks(n, context_, [&](std::size_t i) {
       const auto t = static_cast<std::uint32_t>(i);
-      if (proofs_[merged_.origin[t]] & kApart) return;
-      grid.visit(boxes[t], [](std::uint32_t) { return false; }, [&](std::uint32_t u) {
-        const bool other_asks = u < t && !(proofs_[merged_.origin[u]] & kApart);
-        if (u == t || other_asks || !boxes[t].overlaps(boxes[u]) || are_apart(mesh, t, u)) return;
+      // Of two triangles of different levels the smaller one asks; of one level a new one, of two new ones the first.
+      grid.visit(t, grid.level(t) + !is_new(t), [&](std::uint32_t u) {
+        const bool asks = grid.level(u) > grid.level(t) ? is_new(t) || is_new(u) : !is_new(u) || t < u;
+        if (u == t || !asks || !boxes[t].overlaps(boxes[u]) || are_apart(mesh, t, u)) return;
         call_bold(merged_.origin[t]);
         call_bold(merged_.origin[u]);
       });

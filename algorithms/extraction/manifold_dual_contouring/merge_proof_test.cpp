@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "algorithms/extraction/manifold_dual_contouring/distance_certificate.h"
@@ -79,6 +80,20 @@ TEST(MergeProof, KeepsWhatIsNearAndTakesBackWhatIsNot) {
     MergeForest forest = pairs(fine, {{0, 60}, {600, 601}}, off);
     const MergedMesh merged = prove_merges(forest, fine, tolerance, context);
     EXPECT_EQ(merged.mesh->points().size(), fine.points().size() - (off < 0.2 ? 2 : 0)) << off;
+  }
+}
+
+TEST(MergeProof, TakesBackWhatFailsWhateverErrorItClaims) {
+  const FineMesh fine = torus(60);
+  RunContext context;
+  const std::vector<float> tolerance(fine.points().size(), 0.2f);
+  for (const float error : {0.0f, -1.0f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    std::vector<std::uint32_t> node_of(fine.points().size(), MergeForest::kNone);
+    node_of[0] = node_of[60] = 0;
+    MergeForest::Node far = set(0, fine.points()[0] * 1.1);
+    far.error = error;
+    MergeForest forest({far}, std::move(node_of));
+    EXPECT_EQ(prove_merges(forest, fine, tolerance, context).mesh->points().size(), fine.points().size()) << error;
   }
 }
 
