@@ -5,6 +5,13 @@
 #include "algorithms/extraction/manifold_dual_contouring/merge_proof.h"
 
 namespace hermesh {
+namespace {
+
+/// Where a proof has taken this share of its points out of sets there is room again, on large flat faces above all.
+constexpr double kWorthAnother = 0.1;
+constexpr int kMostPasses = 6;
+
+}  // namespace
 
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context) {
@@ -17,10 +24,18 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
   };
   MergeForest forest = timed("decimate", [&] { return block_forest(fine, tolerance, pinned, file, context); });
   MergedMesh merged = timed("decimate", [&] { return sort_out_merges(forest, fine, context); });
-  for (const Collapses kind : {Collapses::bold, Collapses::careful}) {
+  // Points that the proof brought back, of those that the mesh has then.
+  const auto brought_back = [&](Collapses kind, bool was_proved) {
+    const std::size_t points = merged.mesh->points().size(), sets = forest.size();
     timed("decimate", [&] { collapse_edges(forest, merged, fine, tolerance, pinned, kind, file, context); });
-    merged = timed("certify", [&] { return prove_merges(forest, fine, tolerance, context); });
-  }
+    const std::size_t proposed = points - (forest.size() - sets);
+    merged = timed("certify", [&] { return prove_merges(forest, fine, tolerance, context, was_proved ? sets : 0); });
+    const std::size_t now = merged.mesh->points().size();
+    return now <= proposed ? 0.0 : double(now - proposed) / double(now);
+  };
+  brought_back(Collapses::bold, false);
+  for (int i = 0; i < kMostPasses; ++i)
+    if (brought_back(Collapses::careful, true) < kWorthAnother) break;
   return {merged.mesh->points(), merged.mesh->triangles(), std::move(merged.origin)};
 }
 

@@ -3,6 +3,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <utility>
 
@@ -34,8 +35,10 @@ constexpr int kPatience = 8;
 
 class MergeProof {
  public:
-  MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context)
+  MergeProof(MergeForest& forest, std::size_t proved, const FineMesh& fine, std::span<const float> tolerance,
+             RunContext& context)
       : forest_(forest),
+        proved_(proved),
         fine_(fine),
         tolerance_(tolerance),
         context_(context),
@@ -95,15 +98,23 @@ class MergeProof {
     merged_.mesh.emplace(std::move(points), std::move(triangles));
   }
 
-  /// Of the sets at a fine triangle's corners, the one whose planes are farthest from its place.
+  /// Of the sets at a fine triangle's corners the one whose planes are farthest from its place, among the new ones if there
+  /// are any: without them the mesh is what was proved before.
   void call_bold(std::uint32_t t) {
+    std::array<std::uint32_t, 3> sets;
+    int count = 0;
+    bool any_new = false;
+    for (const std::uint32_t p : fine_.triangles()[t])
+      if (const std::uint32_t set = forest_.set_of(p); set != kNone) {
+        sets[count++] = set;
+        any_new = any_new || set >= proved_;
+      }
     std::uint32_t worst = kNone;
-    for (const std::uint32_t p : fine_.triangles()[t]) {
-      const std::uint32_t set = forest_.set_of(p);
-      if (set == kNone || set == worst) continue;
-      if (splits_ >= kPatience) std::atomic_ref(bold_[set]).store(1, std::memory_order_relaxed);
-      const float error = forest_.node(set).error, most = worst == kNone ? 0.0f : forest_.node(worst).error;
-      if (worst == kNone || error > most || (error == most && set > worst)) worst = set;
+    for (int i = 0; i < count; ++i) {
+      if (any_new && sets[i] < proved_) continue;
+      if (splits_ >= kPatience) std::atomic_ref(bold_[sets[i]]).store(1, std::memory_order_relaxed);
+      const float error = forest_.node(sets[i]).error, most = worst == kNone ? 0.0f : forest_.node(worst).error;
+      if (worst == kNone || error > most || (error == most && sets[i] > worst)) worst = sets[i];
     }
     if (worst != kNone) std::atomic_ref(bold_[worst]).store(1, std::memory_order_relaxed);
   }
@@ -312,6 +323,7 @@ class MergeProof {
   }
 
   MergeForest& forest_;
+  const std::size_t proved_;  ///< sets that were proved before
   const FineMesh& fine_;
   const std::span<const float> tolerance_;
   RunContext& context_;
@@ -325,12 +337,13 @@ class MergeProof {
 
 }  // namespace
 
-MergedMesh prove_merges(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context) {
-  return MergeProof(forest, fine, tolerance, context).run(true);
+MergedMesh prove_merges(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context,
+                        std::size_t proved) {
+  return MergeProof(forest, proved, fine, tolerance, context).run(true);
 }
 
 MergedMesh sort_out_merges(MergeForest& forest, const FineMesh& fine, RunContext& context) {
-  return MergeProof(forest, fine, {}, context).run(false);
+  return MergeProof(forest, 0, fine, {}, context).run(false);
 }
 
 }  // namespace hermesh

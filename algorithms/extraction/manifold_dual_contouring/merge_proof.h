@@ -22,7 +22,10 @@ struct MergedMesh {
 
 /// Splits sets until the mesh keeps its promises, and returns it.
 /// @param tolerance by point of `fine`, voxels
-MergedMesh prove_merges(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context);
+/// @param proved number of sets, the first ones, with which alone the mesh kept its promises: those of later ones are split
+///   first, so that the mesh does not become finer than it was before them (but for rare failures away from them)
+MergedMesh prove_merges(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context,
+                        std::size_t proved = 0);
 
 /// The topology alone.
 MergedMesh sort_out_merges(MergeForest& forest, const FineMesh& fine, RunContext& context);
