@@ -9,7 +9,7 @@ namespace {
 
 /// Where a proof has taken this share of its points out of sets there is room again, on large flat faces above all.
 constexpr double kWorthAnother = 0.1;
-constexpr int kMostPasses = 6;
+constexpr int kMostPasses = 3;
 
 }  // namespace
 
