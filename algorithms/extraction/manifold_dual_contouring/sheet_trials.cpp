@@ -14,25 +14,29 @@ using Cells = std::vector<CellBlocks::Cell>;
 
 class Trials {
  public:
-  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points)
-      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points) {}
+  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, RunContext& context)
+      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points), candidates_(cells.size()) {
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      const auto block = static_cast<std::int32_t>(b);
+      for_each_bit(cells_[block].active, [&](int cell) {
+        if (polygons_.can_be_held({block, cell})) candidates_[b].push_back({block, cell});
+      });
+    });
+  }
 
   Cells not_worth_a_trial(RunContext& context) const {
-    return gathered(context, [&](std::int32_t block, Cells& found) {
-      for_each_bit(cells_[block].active, [&](int cell) {
-        if (polygons_.can_be_held({block, cell}) &&
-            (polygons_.is_crowded({block, cell}) || would_be_pinched(block, cell)))
-          found.push_back({block, cell});
-      });
+    return gathered(context, [&](const CellBlocks::Cell& cell, Cells& found) {
+      if (polygons_.is_crowded(cell) || would_be_pinched(cell.block, cell.cell)) found.push_back(cell);
     });
   }
 
   /// Tried cells with a polygon that meets another, and those of the other one.
   Cells that_meet(RunContext& context) const {
-    return gathered(context, [&](std::int32_t block, Cells& found) {
-      cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
-        if (is_tried(edge)) test_edge(edge, found);
-      });
+    return gathered(context, [&](const CellBlocks::Cell& cell, Cells& found) {
+      if (!is_tried(cell)) return;
+      for (int edge = 0; edge < 12; ++edge)
+        if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
+          test_edge(at, found);
     });
   }
 
@@ -48,10 +52,11 @@ class Trials {
 
  private:
   template <class F>
-  Cells gathered(RunContext& context, F&& of_block) const {
+  Cells gathered(RunContext& context, F&& of_candidate) const {
     std::vector<Cells> found(cells_.size());
-    parallel_blocks(cells_.size(), context,
-                    [&](std::size_t b) { of_block(static_cast<std::int32_t>(b), found[b]); });
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      for (const CellBlocks::Cell& cell : candidates_[b]) of_candidate(cell, found[b]);
+    });
     Cells all;
     for (const Cells& some : found) all.insert(all.end(), some.begin(), some.end());
     return all;
@@ -78,11 +83,6 @@ class Trials {
   }
 
   bool is_tried(const CellBlocks::Cell& cell) const { return polygons_.can_be_held(cell) && !polygons_.is_held(cell); }
-  bool is_tried(const CellBlocks::Edge& edge) const {
-    for (const CellBlocks::Cell& cell : cells_.around(edge).cells)
-      if (is_tried(cell)) return true;
-    return false;
-  }
   /// With those beside them, so that few rounds do.
   void add_tried(const CellBlocks::Edge& edge, Cells& found) const {
     cells_.for_each_about({edge.block, edge.sample}, 2, [&](const CellBlocks::Cell& cell) {
@@ -112,6 +112,7 @@ class Trials {
   EdgePolygons& polygons_;
   const PolygonNeighbourhood mesh_;
   std::vector<Vector3d>& points_;
+  std::vector<Cells> candidates_;  ///< by block: all that can be held
 };
 
 }  // namespace
@@ -119,7 +120,7 @@ class Trials {
 void hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
                           std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "try sheets");
-  Trials trials(cells, polygons, points);
+  Trials trials(cells, polygons, points, context);
   Cells held = trials.not_worth_a_trial(context);
   do {
     if (!held.empty()) polygons.hold(held, points, context);
