@@ -5,7 +5,7 @@
 // cheapest first (decimation.h).
 // *Prove*: the mesh that results (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that
 // it was made of, at last into single points; so this ends, at worst with the fine mesh.
-// Once boldly, by the quadrics alone, which does most of the work in a small part of the time; and once more with care.
+// Once boldly, by the quadrics alone, which does most of the work in a small part of the time; then with care, once or more.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,8 @@ struct CertifiedMesh {
   std::vector<std::uint32_t> fine_triangle;  ///< by triangle: one of the fine mesh, all of whose corners went into its corners
 };
 
-/// @param tolerance by point of `fine`, voxels. Points with none stay as and where they are.
+/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into another;
+///   others may go into them.
 /// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge its ends must be
 ///   such; so a complex of patches keeps their rims.
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,

@@ -130,10 +130,11 @@ void CubeCollapse::merge_vertices() {
   const WideQuadric q = quadric_about(collapse_.going, collapse_.v, collapse_.x);
   float& tolerance = mesh_.least_tolerance[staying.global];
   tolerance = std::min(tolerance, mesh_.least_tolerance[going.global]);
-  if (collapse_.v_moves) mesh_.unmoved[staying.global] = 0;
   mesh_.unmoved[going.global] = 0;
-  // One that stays may be a corner of another cube's triangles, who read it at the same time.
-  if (collapse_.v_moves) staying.point = mesh_.points[staying.global] = collapse_.x;
+  if (collapse_.v_moves) {  // else it may be a corner of another cube's triangles, read at the same time
+    mesh_.unmoved[staying.global] = 0;
+    staying.point = mesh_.points[staying.global] = collapse_.x;
+  }
   mesh_.quadrics[staying.global] = q.about(Vector3d::Zero());
   ++staying.version;
   going.gone = true;

@@ -1,7 +1,6 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "algorithms/core/parallel.h"
@@ -101,8 +100,7 @@ void EdgePolygons::number_all(RunContext& context) {
   });
   fanned_edges_ = exclusive_scan(crossing_points, "points");
   points_ = cells_.point_count() + fanned_edges_;
-  if (points_ > std::numeric_limits<std::uint32_t>::max())
-    throw Error("the mesh would have more points than 32-bit indices can number; use larger voxels");
+  check_indices(points_, "points");
   quads_ = exclusive_scan(quads, "quads");
   triangles_ = exclusive_scan(triangles, "triangles");
   for (std::size_t b = 0; b < blocks; ++b) {

@@ -231,28 +231,13 @@ class MergeProof {
       // Of two triangles of different levels the smaller one asks; of one level a new one, of two new ones the first.
       grid.visit(t, grid.level(t) + !is_new(t), [&](std::uint32_t u) {
         const bool asks = grid.level(u) > grid.level(t) ? is_new(t) || is_new(u) : !is_new(u) || t < u;
-        if (u == t || !asks || !boxes[t].overlaps(boxes[u]) || are_apart(mesh, t, u)) return;
+        if (u == t || !asks || !boxes[t].overlaps(boxes[u])) return;
+        if (certainly_apart(mesh.triangles()[t], mesh.triangles()[u], mesh.points())) return;
         call_bold(merged_.origin[t]);
         call_bold(merged_.origin[u]);
       });
     });
     for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
-  }
-
-  bool are_apart(const FineMesh& mesh, std::uint32_t t, std::uint32_t u) const {
-    Triangle mine = mesh.triangles()[t], theirs = mesh.triangles()[u];
-    int shared = 0;  // corners, to the front in the same order in both
-    for (int i = 0; i < 3; ++i)
-      for (int j = shared; j < 3; ++j)
-        if (mine[i] == theirs[j]) {
-          std::swap(theirs[j], theirs[shared]);
-          std::swap(mine[i], mine[shared]);
-          ++shared;
-          break;
-        }
-    if (shared == 3) return false;
-    const std::vector<Vector3d>& at = mesh.points();
-    return certainly_apart({at[mine[0]], at[mine[1]], at[mine[2]]}, {at[theirs[0]], at[theirs[1]], at[theirs[2]]}, shared);
   }
 
   std::vector<std::uint32_t> bold_sets() const {

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
@@ -60,20 +59,7 @@ class PolygonNeighbourhood {
   }
 
   /// Whether it is certain that two triangles meet in nothing but the corners that they share.
-  bool apart(Triangle a, Triangle b) const {
-    int shared = 0;
-    for (int i = 0; i < 3; ++i)
-      for (int j = shared; j < 3; ++j)
-        if (a[i] == b[j]) {
-          std::swap(a[i], a[shared]);
-          std::swap(b[j], b[shared]);
-          ++shared;
-          break;
-        }
-    if (shared == 3) return false;
-    const auto corners = [&](const Triangle& t) { return Corners{points_[t[0]], points_[t[1]], points_[t[2]]}; };
-    return certainly_apart(corners(a), corners(b), shared);
-  }
+  bool apart(const Triangle& a, const Triangle& b) const { return certainly_apart(a, b, points_); }
 
  private:
   /// Crossing edges that begin at samples between two, seen from a block; row by row, of which a mask has eight bits.

@@ -101,4 +101,19 @@ bool certainly_apart(const Corners& a, const Corners& b, int shared) {
   return half_planes_apart(a[1] - o, a[2] - o, b[2] - o);
 }
 
+bool certainly_apart(Triangle a, Triangle b, const std::vector<Vector3d>& points) {
+  int shared = 0;  // corners, to the front in the same order in both
+  for (int i = 0; i < 3; ++i)
+    for (int j = shared; j < 3; ++j)
+      if (a[i] == b[j]) {
+        std::swap(a[i], a[shared]);
+        std::swap(b[j], b[shared]);
+        ++shared;
+        break;
+      }
+  if (shared == 3) return false;
+  const auto corners = [&](const Triangle& t) { return Corners{points[t[0]], points[t[1]], points[t[2]]}; };
+  return certainly_apart(corners(a), corners(b), shared);
+}
+
 }  // namespace hermesh

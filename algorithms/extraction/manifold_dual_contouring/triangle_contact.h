@@ -3,6 +3,9 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
 
 namespace hermesh {
 
@@ -13,5 +16,8 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 /// contact, and so does whatever is nearer than rounding can tell (about 1e-9 of the triangles' size). By separating
 /// planes (Gottschalk et al. 1996, with the planes through a shared corner or edge as closed ones).
 bool certainly_apart(const Corners& a, const Corners& b, int shared);
+
+/// The same of two triangles of a mesh, by numbers of its points; false if they have all corners in common.
+bool certainly_apart(Triangle a, Triangle b, const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace hermesh
