@@ -55,10 +55,10 @@ Json json_of(const LabelledFracture& fracture) {
                       {"name", sliver.name},
                       {"into_code", sliver.into_code},
                       {"into", sliver.into_name}});
-  return {{"cut_edges", fracture.cut_edges},         {"made_up_crossings", fracture.made_up_crossings},
-          {"repaired_cells", fracture.repair.cells}, {"changed_samples", fracture.repair.changed_samples},
-          {"split_off", fracture.split_off},         {"small_pieces_kept", fracture.small_kept},
-          {"merged_slivers", std::move(merged)}};
+  return {{"cut_edges", fracture.cut_edges},          {"made_up_crossings", fracture.made_up_crossings},
+          {"repaired_cells", fracture.repair.cells},  {"changed_samples", fracture.repair.changed_samples},
+          {"met_joints", fracture.met_joints},        {"split_off", fracture.split_off},
+          {"small_pieces_kept", fracture.small_kept}, {"merged_slivers", std::move(merged)}};
 }
 
 /// Points moved to the middles of cubes of that size, triangles that lose their area left out.

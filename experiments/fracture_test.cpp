@@ -149,6 +149,75 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"rock", "voronoi", 8}, Case{"rock", "voronoi", 20}, Case{"rock", "planes", 4},
                     Case{"rock", "chunks", 8}, Case{"rock", "chunks", 20}));
 
+/// Codes at random for cubes of two samples, and crossings anywhere on their edges: joints of all patterns
+/// and shapes.
+class RandomCodes : public Cutters {
+ public:
+  explicit RandomCodes(CutCode kinds) : kinds_(kinds) {}
+  void codes(const At& lower, std::span<CutCode, 512> codes) const override {
+    for (int i = 0; i < 512; ++i) {
+      const At cube = {(lower[0] + (i >> 6)) >> 1, (lower[1] + ((i >> 3) & 7)) >> 1,
+                       (lower[2] + (i & 7)) >> 1};
+      codes[static_cast<std::size_t>(i)] = number(cube) % kinds_;
+    }
+  }
+  std::optional<CutCrossing> crossing(const At& at, int axis, CutCode, CutCode) const override {
+    CutCrossing result{{static_cast<float>(number(at) >> 40) * 0x1p-24f, {}}, 0};
+    const Vector3d normal = Random(number(at) + std::uint64_t(axis)).direction();
+    for (int a = 0; a < 3; ++a) result.crossing.normal[a] = float(normal[a]);
+    return result;
+  }
+  std::size_t count() const override { return 1; }
+  std::string name(std::size_t) const override { return ""; }
+  std::string name_of(CutCode) const override { return ""; }
+  std::optional<Vector3d> plane_between(CutCode, CutCode) const override { return std::nullopt; }
+
+ private:
+  static std::uint64_t number(const At& at) {
+    return hashed(std::uint64_t(at[0] + 1000) * 1000003 + std::uint64_t(at[1] + 1000) * 1009 +
+                  std::uint64_t(at[2] + 1000));
+  }
+
+  CutCode kinds_;
+};
+
+TEST(Fracture, OfRandomLabelsBalances) {
+  const FloatHermite object = rock();
+  for (const CutCode kinds : {2u, 6u}) {
+    RunContext context;
+    FractureOptions options;
+    options.split = kinds > 2;
+    options.least_samples = options.split ? 27 : 0;
+    const LabelledFracture fracture = labelled_fracture(object, RandomCodes(kinds), options, context);
+    EXPECT_GE(fracture.piece_count(), 2u);
+    EXPECT_GT(fracture.mesh.several_sheets, 0u);
+    const validation::FractureLedger ledger = judged(pieces_of(fracture));
+    EXPECT_TRUE(ledger.balances()) << kinds << ": " << text(ledger);
+  }
+}
+
+TEST(FractureTags, OfAWallNearlyTangentToTheObjectKeepWithinAVoxel) {
+  // Beside its rim, cells have a sheet of the wall and one of the ball. Labels that changed there moved the
+  // wall by more than a voxel.
+  const FloatHermite object = sphere();
+  for (const double height : {12.4, 11.6, 10.9}) {
+    RunContext context;
+    const Vector3d normal = Vector3d(0.21, 0.13, 1).normalized();
+    const auto cutters = plane_cutters({{normal, height}}, object.placement);
+    const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
+    ASSERT_EQ(fracture.piece_count(), 2u);
+    EXPECT_EQ(fracture.repair.changed_samples, 0u) << height;
+    EXPECT_EQ(fracture.made_up_crossings, 0u) << height;
+    EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+    for (const PolygonMesh& piece : pieces_of(fracture))
+      for (std::size_t t = 0; t < piece.triangles.size(); ++t)
+        for (const std::uint32_t p : piece.triangles[t]) {
+          const bool is_cut = std::get<1>(piece.attributes[0].values)[t] != 0;
+          ASSERT_TRUE(!is_cut || std::abs(normal.dot(piece.world(p)) - height) < 1.0);
+        }
+  }
+}
+
 /// Of radius kHalf.
 PolygonMesh ball_of_polygons(const Vector3d& centre) {
   RunContext context;

@@ -8,26 +8,27 @@
 namespace hermesh {
 namespace {
 
-/// Until no sliver is left that can be merged: a repair may leave new ones, and a merge may call for a
-/// repair. Should that not end soon, the last slivers stay pieces.
+/// Until a repair finds nothing to do: what it changes may leave new slivers and new pieces that fall apart,
+/// and giving slivers away or parting pieces may call for a repair. Should that not end soon, the last
+/// slivers stay pieces, and should that not do, the last pieces that fall apart stay one.
 void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions& options,
             LabelledFracture& result, RunContext& context) {
   constexpr int kPasses = 5;
   const auto value = [&](std::uint32_t code) { return solid.code_values[code - 1]; };
-  for (int pass = 0; pass < kPasses; ++pass) {
-    const ComponentReport found = settle_components(solid, {options.split, options.least_samples}, context);
+  for (int pass = 0;; ++pass) {
+    const ComponentReport found = settle_components(
+        solid, {options.split && pass < 2 * kPasses, pass < kPasses ? options.least_samples : 0}, context);
     for (const MergedSliver& sliver : found.merged)
       result.merged.push_back({value(sliver.code), value(sliver.into_code),
                                cutters.name_of(value(sliver.code)), cutters.name_of(value(sliver.into_code)),
                                sliver.samples});
     result.split_off += found.split_off;
-    if (pass > 0 && found.merged.empty()) return;
     const RepairReport repaired = repair_labels(solid, context);
     result.repair.cells += repaired.cells;
     result.repair.changed_samples += repaired.changed_samples;
     result.repair.forced_changes += repaired.forced_changes;
+    if (repaired.cells == 0) return;
   }
-  result.split_off += settle_components(solid, {options.split, 0}, context).split_off;
 }
 
 std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const LabelField& field,
@@ -155,14 +156,21 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
   LabelledFracture result;
   label_by_codes(solid, cutters, context);
-  settle(solid, cutters, options, result, context);
-  const LabelledGrid grid(solid, object, cutters, context);
-  result.made_up_crossings = grid.made_up();
-  result.grid_bytes = grid.memory_bytes();
-  for (std::size_t e = 0; e < grid.edge_count(); ++e) result.cut_edges += grid.sides(e).front > 0;
-  result.cutters = records_of(solid, grid, cutters, result.merged);
-  result.mesh = joint_mesh(grid, options.placement, context);
+  // Every further round has more joints of one sheet, so they end; hardly ever is there a second one.
+  do {
+    for (const LabelledSolid::Place& cell : result.mesh.meeting_joints)
+      solid.one_sheet.insert(LabelledSolid::key(cell));
+    settle(solid, cutters, options, result, context);
+    const LabelledGrid grid(solid, object, cutters, context);
+    result.made_up_crossings = grid.made_up();
+    result.grid_bytes = grid.memory_bytes();
+    result.cut_edges = 0;
+    for (std::size_t e = 0; e < grid.edge_count(); ++e) result.cut_edges += grid.sides(e).front > 0;
+    result.cutters = records_of(solid, grid, cutters, result.merged);
+    result.mesh = joint_mesh(grid, options.placement, context);
+  } while (!result.mesh.meeting_joints.empty());
   decimate_joint_mesh(result.mesh, options.tolerance, context);
+  result.met_joints = solid.one_sheet.size();
   result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());
   result.samples = count_samples(solid, solid.labels, solid.piece_count() + 1);
   result.small_kept = static_cast<std::uint64_t>(

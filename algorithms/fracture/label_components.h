@@ -33,9 +33,9 @@ struct ComponentReport {
 
 /// Numbers the pieces anew, 1 to n without a gap, by their code and then by their first sample.
 ///
-/// **Splitting keeps every cell simple** (label_repair.h). In a simple joint the corners of a piece hang
-/// together by the cell's own edges, so they stay one piece; in a cell without a cut no cut appears, for two
-/// corners of one edge hang together. Merging may not, so the labels are to be repaired after it.
+/// What is simple (label_repair.h) stays so where pieces only get other numbers. Splitting and merging may
+/// leave cells that are not: corners of one piece that hang together across an ambiguous face only may come
+/// to lie in two. So the labels are to be repaired after it.
 ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& options, RunContext& context);
 
 }  // namespace hermesh

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
+#include "algorithms/fracture/label_sheets.h"
 
 namespace hermesh {
 namespace {
@@ -69,15 +69,12 @@ class Repair {
     return std::pair(a.block, a.sample) < std::pair(b.block, b.sample);
   }
 
-  CornerLabels labels(const Place& cell) const {
-    CornerLabels result;
-    for (int c = 0; c < 8; ++c) result[c] = solid_.label(corner(cell, c));
-    return result;
+  CornerLabels labels(const Place& cell) const { return corner_labels(solid_, cell); }
+  Place corner(const Place& cell, int c) const { return moved(cell, c & 1, (c >> 1) & 1, c >> 2); }
+  Place moved(const Place& at, int x, int y, int z) const {
+    return solid_.locate(at.block, (at.sample >> 6) + x, ((at.sample >> 3) & 7) + y, (at.sample & 7) + z);
   }
-  Place corner(const Place& cell, int c) const {
-    return solid_.locate(cell.block, (cell.sample >> 6) + (c & 1), ((cell.sample >> 3) & 7) + ((c >> 1) & 1),
-                         (cell.sample & 7) + (c >> 2));
-  }
+  bool simple(const Place& cell) const { return is_simple(solid_, cell); }
 
   Cells find_cells() {
     std::vector<Cells> found(solid_.blocks.size());
@@ -85,11 +82,8 @@ class Repair {
       LabelCube cube;
       if (!gather_labels(solid_, solid_.labels, static_cast<std::int32_t>(b), cube)) return;
       for (int cell = 0; cell < 512; ++cell) {
-        const int at = 81 * (cell >> 6) + 9 * ((cell >> 3) & 7) + (cell & 7);
-        CornerLabels corners;
-        for (int c = 0; c < 8; ++c)
-          corners[c] = cube[static_cast<std::size_t>(at + 81 * (c & 1) + 9 * ((c >> 1) & 1) + (c >> 2))];
-        if (!is_simple(corners)) found[b].push_back({static_cast<std::int32_t>(b), cell});
+        const Place at = {static_cast<std::int32_t>(b), cell};
+        if (has_cut(labels_in(cube, cell)) && !simple(at)) found[b].push_back(at);
       }
     });
     Cells all;
@@ -105,11 +99,11 @@ class Repair {
       context_.check();
       changed_.clear();
       for (const Place& cell : cells)
-        if (!is_simple(labels(cell)) && !visit(cell)) left.push_back(cell);
+        if (!simple(cell) && !visit(cell)) left.push_back(cell);
       cells = around(changed_);
-      std::erase_if(cells, [&](const Place& cell) { return is_simple(labels(cell)); });
+      std::erase_if(cells, [&](const Place& cell) { return simple(cell); });
     }
-    std::erase_if(left, [&](const Place& cell) { return is_simple(labels(cell)); });
+    std::erase_if(left, [&](const Place& cell) { return simple(cell); });
     sort(left);
     return left;
   }
@@ -123,25 +117,34 @@ class Repair {
                 cells.end());
   }
 
-  /// The cells that have one of these samples at a corner; an inside sample has all eight of them.
+  /// The cells that have one of these samples at a corner, an inside sample having all eight of them; and
+  /// those beside, which share faces with them.
   Cells around(const Cells& samples) const {
     Cells cells;
     for (const Place& s : samples)
-      for (int c = 0; c < 8; ++c)
-        cells.push_back(solid_.locate(s.block, (s.sample >> 6) - (c & 1),
-                                      ((s.sample >> 3) & 7) - ((c >> 1) & 1), (s.sample & 7) - (c >> 2)));
+      for (int x = -2; x <= 1; ++x)
+        for (int y = -2; y <= 1; ++y)
+          for (int z = -2; z <= 1; ++z) {
+            const auto is_beside = [](int d) { return d == -2 || d == 1; };
+            if (is_beside(x) + is_beside(y) + is_beside(z) > 1) continue;
+            if (const Place cell = moved(s, x, y, z); cell.block >= 0) cells.push_back(cell);
+          }
     sort(cells);
     return cells;
   }
 
   int count_bad(const Cells& cells) const {
     int bad = 0;
-    for (const Place& cell : cells) bad += !is_simple(labels(cell));
+    for (const Place& cell : cells) bad += !simple(cell);
     return bad;
   }
 
-  /// How many more cells would not be simple; leaves the labels as they are.
-  int effect(const Place& cell, const Change& change) {
+  struct Effect {
+    int more;    ///< cells that are not simple
+    bool mends;  ///< the cell itself
+  };
+  /// Leaves the labels as they are.
+  Effect effect(const Place& cell, const Change& change) {
     Cells samples;
     std::array<std::uint32_t, 8> old{};
     for (int c = 0; c < 8; ++c)
@@ -152,10 +155,10 @@ class Repair {
       old[i] = solid_.label(samples[i]);
       solid_.labels.set(samples[i].block, samples[i].sample, change.label);
     }
-    const int then = count_bad(cells);
+    const Effect result{count_bad(cells) - bad, simple(cell)};
     for (std::size_t i = 0; i < samples.size(); ++i)
       solid_.labels.set(samples[i].block, samples[i].sample, old[i]);
-    return then - bad;
+    return result;
   }
 
   void apply(const Place& cell, const Change& change) {
@@ -164,8 +167,7 @@ class Repair {
       const Place at = corner(cell, c);
       const std::uint32_t label = solid_.label(at);
       if (label == change.label) continue;
-      before_.emplace(static_cast<std::uint64_t>(at.block) << 9 | static_cast<std::uint64_t>(at.sample),
-                      label);
+      before_.emplace(solid_.key(at), label);
       solid_.labels.set(at.block, at.sample, change.label);
       changed_.push_back(at);
     }
@@ -197,7 +199,7 @@ class Repair {
     std::optional<Change> best;
     int least = 0;
     for (const Change& change : changes(labels(cell)))
-      if (const int more = effect(cell, change); more < least) least = more, best = change;
+      if (const int more = effect(cell, change).more; more < least) least = more, best = change;
     if (best) apply(cell, *best);
     return best.has_value();
   }
@@ -209,12 +211,12 @@ class Repair {
     std::optional<Change> best;
     int least = std::numeric_limits<int>::max();
     for (const Change& change : changes(corners)) {
-      CornerLabels then = corners;
       bool lowers = true;
       for (int c = 0; c < 8; ++c)
-        if ((change.corners >> c) & 1) lowers = lowers && change.label <= corners[c], then[c] = change.label;
-      if (!lowers || !is_simple(then)) continue;
-      if (const int more = effect(cell, change); more < least) least = more, best = change;
+        if ((change.corners >> c) & 1) lowers = lowers && change.label <= corners[c];
+      if (!lowers) continue;
+      if (const Effect then = effect(cell, change); then.mends && then.more < least)
+        least = then.more, best = change;
     }
     ++report_.forced_changes;
     if (best) {
@@ -241,22 +243,25 @@ class Repair {
 
 }  // namespace
 
-bool has_cut(const CornerLabels& labels) {
+CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Place& cell) {
+  CornerLabels labels;
   for (int c = 0; c < 8; ++c)
-    for (const int d : kBeside[c])
-      if (d > c && labels[c] != labels[d] && labels[c] != 0 && labels[d] != 0) return true;
-  return false;
+    labels[c] = solid.label(cell.block, (cell.sample >> 6) + (c & 1),
+                            ((cell.sample >> 3) & 7) + ((c >> 1) & 1), (cell.sample & 7) + (c >> 2));
+  return labels;
 }
 
-bool is_simple(const CornerLabels& labels) {
+bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell) {
+  const CornerLabels labels = corner_labels(solid, cell);
   if (!has_cut(labels)) return true;
-  int done = 0;
-  for (int c = 0; c < 8; ++c) {
-    if ((done >> c) & 1) continue;
-    const int signs = signs_of(labels, labels[c]);
-    done |= signs;
-    const CellSheets& cell = kCellSheets[static_cast<std::size_t>(signs)];
-    if (cell.sheets != 1 || cell.ambiguous_faces != 0) return false;
+  const JointSheets own = joint_sheets(labels);
+  if (!own.single_loops || (own.sheets.sheets > 1 && solid.one_sheet.contains(solid.key(cell)))) return false;
+  for (int face = 0; face < 6; ++face) {
+    if (!((own.pinched >> face) & 1)) continue;
+    int at[3] = {cell.sample >> 6, (cell.sample >> 3) & 7, cell.sample & 7};
+    at[face >> 1] += face & 1 ? 1 : -1;
+    const CornerLabels beside = corner_labels(solid, solid.locate(cell.block, at[0], at[1], at[2]));
+    if (has_cut(beside) && ((joint_sheets(beside).pinched >> (face ^ 1)) & 1)) return false;
   }
   return true;
 }

@@ -1,18 +1,24 @@
 // Changes few labels so that the joint mesh of all pieces is manifold piece by piece.
 //
-// A lattice edge whose ends are in two different pieces is a *cut*; a cell with a cut is a *joint* and gets
-// one point. A cell is **simple** if it has no cut (then the sheets of cell_sheets.h serve it), or if for
-// each label at its corners, the outside included, the corners of that label and the others are separated by
-// a single loop and no face is ambiguous between them, that is, alternates around its four corners.
+// A lattice edge whose ends are in two different pieces is a *cut*; a cell with a cut is a *joint* and gets a
+// point for each of its sheets (label_sheets.h). A cell is **simple** if it has no cut (then the sheets of
+// cell_sheets.h serve it), or if
+//   - each sheet bounds each label, the outside included, in a single loop;
+//   - it shares no face with another joint that is pinched in both, that is, ambiguous with both segments
+//     in one sheet on either side;
+//   - it has one sheet, if that is asked of it (LabelledSolid::one_sheet).
 //
 // **Why this makes each piece closed and manifold.** A piece is bounded by the polygons of the lattice edges
 // of which one end is in it. Two of its polygons share the segment between the points of two cells if they
-// belong to two such edges of the cells' common face. A face has none, two or four of them. Four is
-// ambiguous: that does not happen at a joint, and between two cells without a cut the polygons are held to
-// two separate segments or end in different points (uniform_mesh.h, sheet_trials.h). So every segment has two polygons of the piece. The polygons around a
-// joint's point are those of the piece's loop, of which there is one: a single fan. Those around another
-// point belong to the one loop of its sheet, all of whose inside corners hang together by edges of the cell,
-// and so are of one piece.
+// belong to two such edges of the cells' common face. A face has none, two or four of them. If four, the face
+// is ambiguous, and its two segments end in different points of one of the two cells, or the polygons are
+// held to them (uniform_mesh.h, sheet_trials.h): one of the two cells has no cut then. So every segment has
+// two polygons of the piece. The polygons around a joint's point are those of the piece's loop in that sheet,
+// of which there is one: a single fan. Those around another point belong to the one loop of its sheet, all of
+// whose inside corners hang together by edges of the cell, and so are of one piece.
+//
+// A wall that meets the original surface at a small angle passes, beside it, through cells that the surface
+// passes through, too, without meeting it there. Such a cell has two sheets, and no label needs to change.
 //
 // **Why it ends.** Only inside samples change, so the surface of the whole stays what it is. First, a change
 // is made only if it leaves fewer cells that are not simple, a number that cannot fall for ever. What is
@@ -22,19 +28,17 @@
 // all labels cannot fall for ever either.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "algorithms/core/run_context.h"
+#include "algorithms/fracture/label_sheets.h"
 #include "algorithms/fracture/labelled_solid.h"
 
 namespace hermesh {
 
-/// By corner as in cell_sheets.h.
-using CornerLabels = std::array<std::uint32_t, 8>;
-
-bool has_cut(const CornerLabels& labels);
-bool is_simple(const CornerLabels& labels);
+/// Of a cell that begins in one of the solid's blocks.
+CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Place& cell);
+bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell);
 
 struct RepairReport {
   std::uint64_t cells = 0;  ///< that were not simple

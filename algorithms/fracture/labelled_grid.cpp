@@ -6,7 +6,10 @@ namespace hermesh {
 
 LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                            RunContext& context)
-    : solid_(solid), cuts_(solid.blocks.size()), first_(solid.blocks.size()) {
+    : solid_(solid),
+      cuts_(solid.blocks.size()),
+      joint_sheets_(solid.blocks.size()),
+      first_(solid.blocks.size()) {
   const Stage stage(context, "crossings of the cuts");
   find_edges(context);
   std::vector<std::uint64_t> made_up(solid.blocks.size());
@@ -34,6 +37,12 @@ void LabelledGrid::find_edges(RunContext& context) {
         crossing[axis][sample >> 6] |= bit;
         if (label > 0 && next > 0) cuts_[b][axis][sample >> 6] |= bit;
       }
+    }
+    for (int cell = 0; cell < 512; ++cell) {
+      const CornerLabels labels = labels_in(cube, cell);
+      if (!has_cut(labels)) continue;
+      if (const JointSheets joint = hermesh::joint_sheets(labels); !joint.is_plain())
+        joint_sheets_[b].emplace_back(static_cast<std::uint16_t>(cell), joint.sheets);
     }
     for (const BlockMask& edges : crossing) counts[b] += static_cast<std::uint64_t>(count(edges));
   });
@@ -99,7 +108,8 @@ EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) co
 std::size_t LabelledGrid::memory_bytes() const {
   return crossings_.capacity() * sizeof(EdgeCrossing) + sides_.capacity() * sizeof(EdgeSides) +
          cuts_.capacity() * sizeof(cuts_[0]) + solid_.blocks.capacity() * sizeof(solid_.blocks[0]) +
-         solid_.labels.memory_bytes() + solid_.codes.memory_bytes();
+         joint_sheets_.capacity() * sizeof(joint_sheets_[0]) + solid_.labels.memory_bytes() +
+         solid_.codes.memory_bytes();
 }
 
 }  // namespace hermesh

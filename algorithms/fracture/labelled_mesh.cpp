@@ -18,6 +18,7 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
   mesh.several_sheets = uniform.several_sheets;
   mesh.fanned_edges = uniform.fanned_edges;
   mesh.escaped = uniform.escaped;
+  for (const auto& [block, cell] : uniform.meeting_joints) mesh.meeting_joints.push_back({block, cell});
   const std::size_t fanned = uniform.triangles.size(), quads = uniform.quads.size();
   mesh.triangles = std::move(uniform.triangles);
   mesh.triangles.resize(fanned + 2 * quads);

@@ -12,13 +12,13 @@
 
 namespace hermesh {
 
-/// One point for each joint and for each sheet of another cell, and triangles for each crossing edge.
+/// One point for each sheet of a cell, and triangles for each crossing edge.
 ///
-/// **Guarantees**, if every cell of the grid is simple (label_repair.h): the triangles with a piece on one
-/// side, turned so that it is behind them, are a closed oriented manifold; the triangles of all pieces meet
-/// in nothing but the edges and points that they share (uniform_mesh.h). So each piece is free of
-/// self-intersections, no two of them overlap, and what lies between two pieces is the same triangles in
-/// both. All of it holds for points as a file has them.
+/// **Guarantees**, if every cell of the grid is simple (label_repair.h) and no joints meet: the triangles
+/// with a piece on one side, turned so that it is behind them, are a closed oriented manifold; the triangles
+/// of all pieces meet in nothing but the edges and points that they share (uniform_mesh.h). So each piece is
+/// free of self-intersections, no two of them overlap, and what lies between two pieces is the same triangles
+/// in both. All of it holds for points as a file has them.
 struct JointMesh {
   IndexToWorld placement;
   std::vector<Eigen::Vector3d>
@@ -30,6 +30,7 @@ struct JointMesh {
   std::uint64_t joints = 0;          ///< cells where pieces meet
   std::uint64_t several_sheets = 0;  ///< cells with them
   std::uint64_t fanned_edges = 0, escaped = 0;
+  std::vector<LabelledSolid::Place> meeting_joints;  ///< cells, as in UniformMesh
 };
 
 /// With placement by all of a joint's crossings, so that the rim of a cut is a sharp crease where the

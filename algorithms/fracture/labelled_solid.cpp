@@ -127,6 +127,14 @@ bool gather_labels(const LabelledSolid& solid, const LabelField& field, std::int
   return true;
 }
 
+CornerLabels labels_in(const LabelCube& cube, int cell) {
+  const int at = 81 * (cell >> 6) + 9 * ((cell >> 3) & 7) + (cell & 7);
+  CornerLabels labels;
+  for (int c = 0; c < 8; ++c)
+    labels[c] = cube[static_cast<std::size_t>(at + 81 * (c & 1) + 9 * ((c >> 1) & 1) + (c >> 2))];
+  return labels;
+}
+
 LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
   const Stage stage(context, "blocks of the solid");
   if (hermite.outermost_inside) throw Error("the solid has no end: everything far away is inside");

@@ -4,10 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <span>
 #include <vector>
 
 #include "algorithms/fracture/cutters.h"
+#include "algorithms/fracture/label_sheets.h"
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/sparse_hermite.h"
 
@@ -59,6 +61,14 @@ struct LabelledSolid {
     std::int32_t block;  ///< −1: outside
     int sample;
   };
+  /// Of a place in a block: one number for it.
+  static std::uint64_t key(const Place& at) {
+    return static_cast<std::uint64_t>(at.block) << 9 | static_cast<std::uint64_t>(at.sample);
+  }
+  /// Keys of cells that are to have one sheet if they are joints (label_repair.h), because polygons met where
+  /// they had several.
+  std::set<std::uint64_t> one_sheet;
+
   /// Local coordinates from −8 to 15.
   Place locate(std::int32_t block, int x, int y, int z) const {
     const std::int32_t there =
@@ -77,6 +87,8 @@ struct LabelledSolid {
 using LabelCube = std::array<std::uint32_t, 729>;
 /// False, and the cube not filled, if all of these are one value.
 bool gather_labels(const LabelledSolid& solid, const LabelField& field, std::int32_t block, LabelCube& cube);
+/// Of the corners of one of the block's cells.
+CornerLabels labels_in(const LabelCube& cube, int cell);
 
 /// The blocks of a solid, all its samples of one piece. @throws Error if the solid has no end.
 LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context);

@@ -8,7 +8,11 @@
 namespace hermesh {
 
 CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
-    : grid_(grid), margin_(margin_for_rounding()), cuts_(grid.cuts()), blocks_(grid.blocks().size()) {
+    : grid_(grid),
+      margin_(margin_for_rounding()),
+      cuts_(grid.cuts()),
+      told_(grid.joint_sheets()),
+      blocks_(grid.blocks().size()) {
   Stage stage(context, "find cells");
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
@@ -36,7 +40,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
       found[b].push_back(static_cast<std::uint8_t>(code));
-      const int sheets = test(block.joints, cell) ? 1 : kCellSheets[code].sheets;
+      const int sheets = test(block.joints, cell) ? joint_points(static_cast<std::int32_t>(b), cell)
+                                                  : kCellSheets[code].sheets;
       if (sheets > 1) {
         block.several.emplace_back(static_cast<std::uint16_t>(cell), later);
         later = static_cast<std::uint16_t>(later + sheets - 1);
@@ -121,6 +126,13 @@ double CellBlocks::margin_for_rounding() const {
   return std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
 }
 
+const CellSheets* CellBlocks::find_told(std::int32_t block, int cell) const {
+  const JointSheetsOfBlock& list = told_[static_cast<std::size_t>(block)];
+  const auto at =
+      std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); });
+  return at != list.end() && at->first == cell ? &at->second : nullptr;
+}
+
 std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const {
   const Block& block = blocks_[number];
   if (sheet == 0)
@@ -161,8 +173,9 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
     const Cell cell = locate(edge.block, at[0], at[1], at[2]);
     result.cells[i] = cell;
     result.sheets[i] = &sheets(cell.block, cell.cell);
-    const bool joint = is_joint(cell.block, cell.cell);
-    result.points[i] = point(cell.block, cell.cell, joint ? 0 : result.sheets[i]->sheet_of[edge_in(edge.axis, i)]);
+    const CellSheets& loops = *result.sheets[i];  // of a joint of one point they do not tell of its cuts
+    result.points[i] =
+        point(cell.block, cell.cell, loops.sheets > 1 ? loops.sheet_of[edge_in(edge.axis, i)] : 0);
   }
   return result;
 }

@@ -1,10 +1,11 @@
 // The cells of a lattice by block, with their sheets, points and edges by number.
 //
-// The lattice is that of Hermite data, or one whose inside is divided among several pieces (algorithms/fracture/): then
-// an edge is crossed, too, whose ends are both inside, but in different pieces. Such an edge is a *cut*. A cell without
-// a cut is as in Hermite data: kCellSheets tells its sheets from the inside bits of its corners. A cell with a cut is a
-// *joint*: it has one point, which all its crossing edges share. Who makes such a lattice sees to it that the corners of
-// a joint that are in one piece, and those outside, are each cut off by a single loop (fracture/label_repair.h).
+// The lattice is that of Hermite data, or one whose inside is divided among several pieces
+// (algorithms/fracture/): then an edge is crossed, too, whose ends are both inside, but in different pieces.
+// Such an edge is a *cut*. A cell without a cut is as in Hermite data: kCellSheets tells its sheets from the
+// inside bits of its corners. A cell with a cut is a *joint*. Most have one point, which all their crossing
+// edges share; for the others the lattice tells the sheets. Who makes such a lattice sees to it that the
+// pieces become manifold (fracture/label_repair.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +27,9 @@ inline std::uint32_t rank_in(const BlockMask& mask, int sample) {
          static_cast<std::uint32_t>(std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1)));
 }
 
+/// The joints of a block that have several sheets or an ambiguous face, by cell, ascending.
+using JointSheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
+
 /// What the cells are made from.
 class CellGrid {
  public:
@@ -37,6 +41,8 @@ class CellGrid {
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
   /// By block and axis those crossing edges that are cuts; empty where there are none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
+  /// By block; empty where there are none.
+  virtual std::span<const JointSheetsOfBlock> joint_sheets() const { return {}; }
 };
 
 class CellBlocks {
@@ -79,13 +85,17 @@ class CellBlocks {
   const CellGrid& grid() const { return grid_; }
   std::size_t point_count() const { return points_; }
 
-  /// By the inside bits of the corners: of a joint it tells the segments on faces without a cut, and that no face is
-  /// explicit for the joint's own sake, for it has one sheet (or none, all corners being inside) and no ambiguous face.
-  const CellSheets& sheets(std::int32_t block, int cell) const { return kCellSheets[codes_[code_at(block, cell)]]; }
+  /// By the inside bits of the corners, but for those joints of which the lattice tells them. Of other joints
+  /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
+  /// it has one sheet (or none, all corners being inside) and no ambiguous face.
+  const CellSheets& sheets(std::int32_t block, int cell) const {
+    if (const CellSheets* told = told_sheets(block, cell)) return *told;
+    return kCellSheets[codes_[code_at(block, cell)]];
+  }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
   /// Points of an active cell.
   int point_count(std::int32_t block, int cell) const {
-    return is_joint(block, cell) ? 1 : sheets(block, cell).sheets;
+    return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
   }
   std::uint32_t point(std::int32_t block, int cell, int sheet) const;
   /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
@@ -144,6 +154,14 @@ class CellBlocks {
     const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
     return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
   }
+  const CellSheets* told_sheets(std::int32_t block, int cell) const {
+    return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;
+  }
+  const CellSheets* find_told(std::int32_t block, int cell) const;
+  int joint_points(std::int32_t block, int cell) const {
+    const CellSheets* told = told_sheets(block, cell);
+    return told ? told->sheets : 1;
+  }
   bool sign_of_added(const HermiteView::Block& block) const;
   std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
   BlockMask cells_with_cuts(std::int32_t block) const;
@@ -153,6 +171,7 @@ class CellBlocks {
   const CellGrid& grid_;
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
+  const std::span<const JointSheetsOfBlock> told_;
   std::vector<Block> blocks_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;

@@ -1,7 +1,10 @@
 #include "algorithms/extraction/manifold_dual_contouring/sheet_trials.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
+#include <utility>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/polygon_neighbourhood.h"
@@ -19,13 +22,15 @@ class Trials {
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       for_each_bit(cells_[block].active, [&](int cell) {
-        if (polygons_.can_be_held({block, cell})) candidates_[b].push_back({block, cell});
+        if (polygons_.can_be_held({block, cell}) || is_joint_of_several({block, cell}))
+          candidates_[b].push_back({block, cell});
       });
     });
   }
 
   Cells not_worth_a_trial(RunContext& context) const {
     return gathered(context, [&](const CellBlocks::Cell& cell, Cells& found) {
+      if (!polygons_.can_be_held(cell)) return;
       if (polygons_.is_crowded(cell) || would_be_pinched(cell.block, cell.cell)) found.push_back(cell);
     });
   }
@@ -82,7 +87,12 @@ class Trials {
     return false;
   }
 
-  bool is_tried(const CellBlocks::Cell& cell) const { return polygons_.can_be_held(cell) && !polygons_.is_held(cell); }
+  bool is_joint_of_several(const CellBlocks::Cell& cell) const {
+    return cells_.is_joint(cell.block, cell.cell) && cells_.point_count(cell.block, cell.cell) > 1;
+  }
+  bool is_tried(const CellBlocks::Cell& cell) const {
+    return is_joint_of_several(cell) || (polygons_.can_be_held(cell) && !polygons_.is_held(cell));
+  }
   /// With those beside them, so that few rounds do.
   void add_tried(const CellBlocks::Edge& edge, Cells& found) const {
     cells_.for_each_about({edge.block, edge.sample}, 2, [&](const CellBlocks::Cell& cell) {
@@ -112,21 +122,33 @@ class Trials {
   EdgePolygons& polygons_;
   const PolygonNeighbourhood mesh_;
   std::vector<Vector3d>& points_;
-  std::vector<Cells> candidates_;  ///< by block: all that can be held
+  std::vector<Cells> candidates_;  ///< by block: all that can be held, and joints of several sheets
 };
+
+Cells without_repeats(Cells cells) {
+  const auto place = [](const CellBlocks::Cell& cell) { return std::pair(cell.block, cell.cell); };
+  std::ranges::sort(cells, {}, place);
+  const auto repeats = std::ranges::unique(cells, {}, place);
+  cells.erase(repeats.begin(), repeats.end());
+  return cells;
+}
 
 }  // namespace
 
-void hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
-                          std::vector<Vector3d>& points, RunContext& context) {
+Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
+                           std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "try sheets");
   Trials trials(cells, polygons, points, context);
   Cells held = trials.not_worth_a_trial(context);
-  do {
+  for (;;) {
     if (!held.empty()) polygons.hold(held, points, context);
     trials.place_crossings(file, context);
-    held = trials.that_meet(context);
-  } while (!held.empty());
+    const Cells meeting = trials.that_meet(context);
+    held.clear();
+    std::ranges::copy_if(meeting, std::back_inserter(held),
+                         [&](const CellBlocks::Cell& cell) { return polygons.can_be_held(cell); });
+    if (held.empty()) return without_repeats(meeting);
+  }
 }
 
 }  // namespace hermesh

@@ -15,8 +15,12 @@ namespace hermesh {
 ///
 /// Afterwards no two polygons meet: where no cell of an edge is tried, its polygons are those of uniform_mesh.h and its
 /// proof holds of any two; a polygon of another edge has been tested against all polygons nearby, as they are at the end.
+///
+/// Joints of several sheets are tried, too, but cannot be held. Returns those near polygons that still meet when
+/// nothing is left to be held, each once; nearly always none.
 /// @throws Cancelled
-void hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
-                          std::vector<Eigen::Vector3d>& points, RunContext& context);
+std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons,
+                                                   const FilePoints& file,
+                                                   std::vector<Eigen::Vector3d>& points, RunContext& context);
 
 }  // namespace hermesh

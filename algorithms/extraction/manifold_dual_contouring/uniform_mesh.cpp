@@ -68,15 +68,14 @@ class Contourer {
   /// in their hull.
   Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
     const CellSheets& loops = cells_.sheets(block, cell);
-    const bool joint = cells_.is_joint(block, cell);
     const Vector3d corner = cells_.corner(block, cell);
     Qef qef(corner + Vector3d::Constant(0.5));
     Vector3d sum = Vector3d::Zero();
     int crossings = 0;
     for (int edge = 0; edge < 12; ++edge) {
-      if (!joint && loops.sheet_of[edge] != sheet) continue;
+      if (sheets > 1 && loops.sheet_of[edge] != sheet) continue;
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
-      if (joint && !cells_.is_crossed(at)) continue;
+      if (sheets == 1 && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
       const Vector3d point = cells_.crossing_point(at);
       const auto& n = crossing.normal;
@@ -180,7 +179,8 @@ class Contourer {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, mesh.points, context);
     }();
-    hold_cells_that_meet(cells_, polygons, file_, mesh.points, context);
+    for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, context))
+      mesh.meeting_joints.emplace_back(cell.block, cell.cell);
     mesh.held = polygons.held_cells();
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);

@@ -22,15 +22,18 @@
 // Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
 // only where the mesh as it is then shows that nothing meets (late_moves.h).
 //
-// None of this asks what lies on the two sides of a crossing edge, so it holds, too, for a lattice whose inside is
-// divided among pieces (cell_blocks.h): the polygons of all pieces together, each seam between two pieces once, meet at
-// most in shared edges and points. A joint has one point strictly inside it and no explicit face of its own; a face
-// between a joint and a cell of several sheets is without a cut, so it holds one segment, and the joint's part of the
-// surface beside that segment is the triangle of it and the joint's point, within the joint's tetrahedra at that face.
+// None of this asks what lies on the two sides of a crossing edge, so it holds, too, for a lattice whose inside
+// is divided among pieces (cell_blocks.h): the polygons of all pieces together, each seam between two pieces
+// once, meet at most in shared edges and points. A joint is never held itself; a face between a joint and a cell
+// that can be is without a cut, and the joint's part of the surface beside a segment on it is the triangle of it
+// and the joint's point, within the joint's tetrahedra at that face if it has one point. The polygons of joints
+// of several sheets are tested, and what meets others even when all else is held is named, so that the lattice
+// can be made anew with one sheet there.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
@@ -52,6 +55,9 @@ struct UniformMesh {
   std::uint64_t held = 0;            ///< of all: coned over explicit segments, the last resort
   std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
   std::uint64_t escaped = 0;         ///< points outside their cells
+  /// Joints of several sheets, by block and cell, whose polygons may meet others: no promise of the above holds
+  /// unless there are none.
+  std::vector<std::pair<std::int32_t, int>> meeting_joints;
 };
 
 /// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its

@@ -1,0 +1,40 @@
+// How the surfaces between pieces, and that of the whole, pass through one cell, by the labels of its
+// corners: the generalisation of extraction/manifold_dual_contouring/cell_sheets.h to more than two sides.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
+
+namespace hermesh {
+
+/// By corner as in cell_sheets.h; 0 is the outside.
+using CornerLabels = std::array<std::uint32_t, 8>;
+
+/// Whether an edge joins two pieces: the cell is a joint then.
+bool has_cut(const CornerLabels& labels);
+
+/// A *sheet* of a joint is what hangs together of the crossings of its edges by the lines that the surfaces
+/// draw on the cell's faces:
+///   two crossings    the segment between them
+///   three            three labels that meet: a star, which joins all of them
+///   four             a star if all labels differ. Else two opposite corners are alike and the face is
+///                    *ambiguous*: they hang together and the other two corners are cut off one by one. If
+///                    those are alike, too, and one of the labels is the outside, the inside corners are cut
+///                    off (as in cell_sheets.h); if both are pieces, the corners 00 and 11 of the face.
+/// None of this depends on the order of the labels or on which of its two cells the face is seen from.
+struct JointSheets {
+  CellSheets sheets;  ///< `partner` tells of segments alone: kNone on stars
+  /// Whether the part of each sheet that bounds a label, the outside included, is a single loop on the cell's
+  /// boundary: then the polygons of a piece around the sheet's point are one fan.
+  bool single_loops = true;
+  /// A bit a face: ambiguous, and both segments belong to one sheet.
+  std::uint8_t pinched = 0;
+
+  /// One point does for the cell, as for most joints, and nobody needs to be told of its segments.
+  bool is_plain() const { return sheets.sheets <= 1 && sheets.ambiguous_faces == 0; }
+};
+JointSheets joint_sheets(const CornerLabels& labels);
+
+}  // namespace hermesh
