@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 #include <system_error>
+#include <thread>
 
 #include "algorithms/core/error.h"
 
@@ -25,12 +26,28 @@ namespace fs = std::filesystem;
 struct Unfinished {
   std::timed_mutex mutex;
   std::set<std::string> paths;
+  std::mutex ending;  ///< held for as long as it takes by the thread that removes all of them
 };
 
 /// Never destroyed: the thread that ends the process may run while static objects are being taken down.
 Unfinished& unfinished() {
   static Unfinished* const files = new Unfinished;
   return *files;
+}
+
+/// Whatever other threads do meanwhile. One may be filling a folder: that is moved aside first, so that no
+/// more files get into it. One may be removing it, and what it takes away first is an error to this one: so
+/// it tries until nothing is left.
+void remove_for_good(const fs::path& path) {
+  std::error_code ignored;
+  const fs::path aside = path.string() + "~";
+  constexpr int kTries = 1000;
+  for (int i = 0; i < kTries; ++i) {
+    fs::rename(path, aside, ignored);
+    fs::remove_all(aside, ignored);
+    if (!fs::exists(aside, ignored) && !fs::exists(path, ignored)) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
 }
 
 /// Hidden, in the same folder (a rename does not cross file systems), and with the same ending, which some
@@ -109,9 +126,11 @@ AtomicFolder::AtomicFolder(fs::path target) : target_(std::move(target)) {
 
 AtomicFolder::~AtomicFolder() {
   if (committed_) return;
+  // A thousand files take seconds on a busy disk, for which nobody is to wait who ends the process: so
+  // without the lock, and it is on the list until all of it is gone.
   std::error_code ignored;
-  const std::lock_guard lock(unfinished().mutex);
   fs::remove_all(temporary_, ignored);
+  const std::lock_guard lock(unfinished().mutex);
   unfinished().paths.erase(temporary_.string());
 }
 
@@ -147,12 +166,12 @@ void commit_together(AtomicFile& first, AtomicFile& second) {
 void remove_unfinished_files() noexcept {
   // The exceptions of a lock that cannot be had are of no use to a process that is ending.
   try {
+    // Of two threads that end the process the second one must not do so while the first one is still
+    // removing.
+    const std::lock_guard ending(unfinished().ending);
     const std::unique_lock lock(unfinished().mutex, std::chrono::seconds(1));
     if (!lock.owns_lock()) return;
-    for (const std::string& path : unfinished().paths) {
-      std::error_code ignored;
-      fs::remove_all(path, ignored);
-    }
+    for (const std::string& path : unfinished().paths) remove_for_good(path);
   } catch (...) {
   }
 }

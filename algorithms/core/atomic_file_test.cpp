@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <atomic>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <thread>
 
@@ -94,6 +96,29 @@ TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
   EXPECT_EQ(files().size(), 1u);
   EXPECT_EQ(files().count("c.txt"), 1u);
   EXPECT_THROW(one.commit(), Error);
+}
+
+/// A folder of a thousand files takes a while to remove, and the process is not to end before that, nor to
+/// leave what another thread still puts in.
+TEST_F(AtomicFileTest, UnfinishedFoldersAreRemovedWhileOthersFillOrRemoveThem) {
+  for (const bool fills : {true, false}) {
+    auto open = std::make_unique<AtomicFolder>(folder / "pieces");
+    const fs::path inside = open->path();
+    for (int i = 0; i < 1000; ++i) write(inside / std::to_string(i), "piece");
+    std::atomic<bool> begun = false, ended = false;
+    std::thread other([&] {
+      begun = true;
+      if (!fills) return open.reset();
+      for (int i = 1000; !ended; ++i) write(inside / std::to_string(i), "piece");
+    });
+    while (!begun) std::this_thread::yield();
+    remove_unfinished_files();
+    EXPECT_TRUE(fs::is_empty(folder));  // at once: here the process ends
+    ended = true;
+    other.join();
+    open.reset();
+    EXPECT_TRUE(fs::is_empty(folder));
+  }
 }
 
 TEST_F(AtomicFileTest, WritesThroughLinksAndNotOverDevices) {
