@@ -139,7 +139,8 @@ struct Overview {
   const Subject& subject;
   std::int64_t meshes = 0;
   Json values = Json::object();
-  double seconds = 0.0, excess = -1.0, held = 0.0;
+  double seconds = 0.0, held = 0.0;
+  std::optional<double> excess = {};  ///< none where no distance was bounded
   std::vector<std::string> broken = {};
 
   void add(const Json& mesh, double tolerance, const std::vector<std::string>& violations) {
@@ -149,7 +150,8 @@ struct Overview {
     if (mesh.contains("triangles") && tolerance == 0.0) values["uniform"] = mesh["triangles"];
     if (mesh.contains("triangles") && tolerance == 1.0) values["adaptive"] = mesh["triangles"];
     for (const char* way : {"from_upper", "to_upper"})
-      if (mesh.contains(way)) excess = std::max(excess, mesh[way].get<double>() - tolerance);
+      if (mesh.contains(way))
+        excess = std::max(excess.value_or(-tolerance), mesh[way].get<double>() - tolerance);
     for (const std::string& violation : violations)
       broken.push_back("tolerance " + readable(tolerance) + ": " + violation);
   }
@@ -165,7 +167,7 @@ struct Overview {
     MeasuredRow result{subject.kind, subject.label, {{"resolution", subject.resolution}, {"meshes", meshes}}};
     result.values["violations"] = broken.size();
     result.values.update(values);
-    if (excess > -1.0) result.values["excess"] = excess;
+    if (excess) result.values["excess"] = *excess;
     result.values["held_percent"] = held;
     result.values["seconds"] = seconds;
     result.broken = broken;
