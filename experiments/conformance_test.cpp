@@ -66,23 +66,9 @@ void expect_promises(const Extractor& extractor, const MeshFile& mesh) {
   }
 }
 
-/// Many small sign patterns in one volume, each with outside all around it: pattern(i) gives the bits of its
-/// samples.
 LevelSet patterns(int per_axis, int size, const std::function<std::uint32_t(int)>& pattern,
                   std::uint32_t seed) {
-  const int pitch = size + 1;
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> magnitude(0.05f, 1.0f);
-  std::vector<std::uint32_t> bits(static_cast<std::size_t>(per_axis) * per_axis * per_axis);
-  for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = pattern(static_cast<int>(i));
-  const int n = per_axis * pitch;
-  return make_volume({n, n, n}, 1.0f, [&, per_axis](int x, int y, int z) {
-    const int local[3] = {x % pitch, y % pitch, z % pitch};
-    const bool gap = local[0] == size || local[1] == size || local[2] == size;
-    const int which = ((x / pitch) * per_axis + y / pitch) * per_axis + z / pitch;
-    const bool inside = !gap && ((bits[which] >> ((local[0] * size + local[1]) * size + local[2])) & 1);
-    return inside ? -magnitude(random) : magnitude(random);
-  });
+  return make_patterns(per_axis, size, pattern, std::mt19937(seed));
 }
 
 class Conformance : public testing::TestWithParam<Extractor> {
@@ -96,9 +82,10 @@ class Conformance : public testing::TestWithParam<Extractor> {
     return std::any_of(extractor().options.begin(), extractor().options.end(),
                        [](const OptionSpec& option) { return option.name == "tolerance"; });
   }
-  /// A variant that proves its tolerance takes its time over noise, of which nothing can be merged: so `size` as its
-  /// uniform mesh, and `smaller` as it comes.
-  void expect_on_noise(int size, int smaller, const std::function<LevelSet(int)>& volume, double isovalue = 0.0) const {
+  /// A variant that proves its tolerance takes its time over noise, of which nothing can be merged: so `size`
+  /// as its uniform mesh, and `smaller` as it comes.
+  void expect_on_noise(int size, int smaller, const std::function<LevelSet(int)>& volume,
+                       double isovalue = 0.0) const {
     if (!proves()) return expect_on(volume(size), isovalue);
     expect_on(volume(size), isovalue, {{"tolerance", "0"}});
     expect_on(volume(smaller), isovalue);
@@ -113,15 +100,17 @@ TEST_P(Conformance, All256PatternsOfACell) {
 TEST_P(Conformance, RandomPatternsOfTwoCellsAnAxis) {
   std::mt19937 random(2);
   expect_on_noise(proves() ? 24 : 40, 5, [&](int per_axis) {
-    return patterns(per_axis, 3, [&](int) { return static_cast<std::uint32_t>(random()) & ((1u << 27) - 1); }, 3);
+    return patterns(
+        per_axis, 3, [&](int) { return static_cast<std::uint32_t>(random()) & ((1u << 27) - 1); }, 3);
   });
 }
 
 TEST_P(Conformance, WhiteNoise) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
-  expect_on_noise(64, 14,
-                  [&](int n) { return make_volume({n, n, n}, 1.0f, [&](int, int, int) { return value(random); }); });
+  expect_on_noise(64, 14, [&](int n) {
+    return make_volume({n, n, n}, 1.0f, [&](int, int, int) { return value(random); });
+  });
 }
 
 TEST_P(Conformance, WhiteNoiseOnAnInsideBackground) {
@@ -139,7 +128,8 @@ TEST_P(Conformance, IntegersWithAThirdOfTheSamplesAtTheIsovalue) {
     expect_on_noise(
         48, 12,
         [&](int n) {
-          return make_volume({n, n, n}, 3.0f, [&](int, int, int) { return static_cast<float>(value(random)); });
+          return make_volume({n, n, n}, 3.0f,
+                             [&](int, int, int) { return static_cast<float>(value(random)); });
         },
         isovalue);
 }

@@ -8,6 +8,7 @@
 namespace hermesh {
 
 std::vector<MeasuredColumn> guarantee_mesh_columns();
+std::vector<MeasuredColumn> guarantee_overview_columns();
 std::vector<MeasuredColumn> guarantee_summary_columns();
 
 }  // namespace hermesh

@@ -1,4 +1,5 @@
-// What manifold dual contouring promises, judged on the files that it writes: models, clean and dirty, and noise.
+// What manifold dual contouring promises, judged on the files that it writes: models, clean and dirty, noise,
+// and patterns of signs.
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,7 +24,8 @@ namespace {
 
 constexpr const char* kGuaranteed = "manifold-dual-contouring";
 
-/// What the bound may be exceeded by, in voxels: the slack of the extractor's own proof, and the gap of the judge's.
+/// What the bound may be exceeded by, in voxels: the slack of the extractor's own proof, and the gap of the
+/// judge's.
 constexpr double kSlack = 0.01, kGap = 0.001;
 
 /// Single precision in the file moves points by less than this, in voxels.
@@ -44,17 +46,24 @@ const std::vector<Contender>& others() {
   return table;
 }
 
-/// Open and self-intersecting models take part, because the promise is made for every input: whatever the polygons,
-/// there is a level set, and its surface is closed.
+/// Open and self-intersecting models take part, because the promise is made for every input: whatever the
+/// polygons, there is a level set, and its surface is closed.
 std::vector<std::string> models() {
   const std::vector<std::string> excluded = {
-      "thai-statue",       // its file is not in every data folder, and the stand-in has nine million triangles
+      "thai-statue",  // its file is not in every data folder, and the stand-in has nine million triangles
       "noise-sphere-10m",  // the surface of noise-sphere-1m, and at these resolutions the same level set
       "all-degenerate",    // seven triangles without area enclose nothing: there is no mesh to judge
   };
   std::vector<std::string> names = case_choices();
   std::erase_if(names, [&](const std::string& name) { return std::ranges::count(excluded, name) > 0; });
   return names;
+}
+
+/// Those that are made at 400 voxels, too: three scans, one of them open and in pieces, and three parts.
+bool is_made_finer(const std::string& name) {
+  static const std::vector<std::string> names = {"bunny-closed", "nefertiti",  "dragon",
+                                                 "fandisk",      "rocker-arm", "casting"};
+  return std::ranges::count(names, name) > 0;
 }
 
 std::vector<std::string> chosen_cases(const std::string& choice) {
@@ -73,7 +82,8 @@ std::vector<double> numbers(const std::string& text) {
 /// The mesh as its file holds it: rounding on the way is part of the promise.
 MeshFile as_written(const PolygonMesh& mesh, RunContext& context) {
   if (mesh.empty()) return {};
-  const auto path = std::filesystem::temp_directory_path() / ("hermesh-guarantee-" + std::to_string(getpid()) + ".ply");
+  const auto path =
+      std::filesystem::temp_directory_path() / ("hermesh-guarantee-" + std::to_string(getpid()) + ".ply");
   struct Removal {
     std::filesystem::path path;
     ~Removal() {
@@ -98,11 +108,10 @@ void set_counts(Json& values, const validation::MeshReport& report) {
 
 std::vector<std::string> violations_of(const Json& values, double tolerance) {
   std::vector<std::string> result;
-  for (const char* defect : {"boundary", "non_manifold_edges", "non_manifold_vertices", "inconsistent", "degenerate",
-                             "self_intersections"})
+  for (const char* defect : {"boundary", "non_manifold_edges", "non_manifold_vertices", "inconsistent",
+                             "degenerate", "self_intersections"})
     if (values[defect] > 0) result.push_back(std::string(defect) + " " + values[defect].dump());
-  if (values.value("same_topology", "yes") != "yes")
-    result.push_back("other topology than the uniform mesh");
+  if (values.value("same_topology", "yes") != "yes") result.push_back("other topology than the uniform mesh");
   for (const char* way : {"from_upper", "to_upper"})
     if (values.contains(way) && values[way] > tolerance + kSlack)
       result.push_back(std::string(way) + " " + values[way].dump() + " beyond the tolerance");
@@ -111,18 +120,59 @@ std::vector<std::string> violations_of(const Json& values, double tolerance) {
 
 /// A level set and what its meshes are called.
 struct Subject {
-  std::string table, label;
+  std::string kind, label;
   LevelSet level_set;
+  int resolution = 0;
   const PolygonMesh* source = nullptr;
   double voxel_size = 1.0;
-  Json values = Json::object();  ///< that its rows begin with
   bool certify = false;
 };
 
-/// What becomes of one extractor at one tolerance over all subjects of a table.
+/// What becomes of one extractor at one tolerance over all subjects of a kind.
 struct Sum {
   std::int64_t meshes = 0, triangles = 0, self_intersections = 0, violations = 0, beyond = 0;
   double seconds = 0.0, largest_share = 0.0;
+};
+
+/// What becomes of one subject at all tolerances, and of the others.
+struct Overview {
+  const Subject& subject;
+  std::int64_t meshes = 0;
+  Json values = Json::object();
+  double seconds = 0.0, held = 0.0;
+  std::optional<double> excess = {};  ///< none where no distance was bounded
+  std::vector<std::string> broken = {};
+
+  void add(const Json& mesh, double tolerance, const std::vector<std::string>& violations) {
+    ++meshes;
+    seconds += mesh.value("seconds", 0.0);
+    held = std::max(held, 100.0 * mesh.value("held_cells", 0.0) / std::max(1.0, mesh.value("cells", 0.0)));
+    if (mesh.contains("triangles") && tolerance == 0.0) values["uniform"] = mesh["triangles"];
+    if (mesh.contains("triangles") && tolerance == 1.0) values["adaptive"] = mesh["triangles"];
+    for (const char* way : {"from_upper", "to_upper"})
+      if (mesh.contains(way))
+        excess = std::max(excess.value_or(-tolerance), mesh[way].get<double>() - tolerance);
+    for (const std::string& violation : violations)
+      broken.push_back("tolerance " + readable(tolerance) + ": " + violation);
+  }
+  /// Of another extractor: edges and vertices that are not manifold, or open, and pairs of triangles that
+  /// intersect.
+  void add_other(const std::string& name, const Json& mesh) {
+    const auto count = [&](const char* defect) { return mesh.value(defect, std::int64_t(0)); };
+    const std::int64_t topology = count("boundary") + count("non_manifold_edges") +
+                                  count("non_manifold_vertices") + count("inconsistent");
+    values[name] = std::to_string(topology) + ", " + std::to_string(count("self_intersections"));
+  }
+  MeasuredRow row() const {
+    MeasuredRow result{subject.kind, subject.label, {{"resolution", subject.resolution}, {"meshes", meshes}}};
+    result.values["violations"] = broken.size();
+    result.values.update(values);
+    if (excess) result.values["excess"] = *excess;
+    result.values["held_percent"] = held;
+    result.values["seconds"] = seconds;
+    result.broken = broken;
+    return result;
+  }
 };
 
 class Guarantee {
@@ -133,23 +183,26 @@ class Guarantee {
   std::vector<MeasuredRow> run() {
     for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) measure_model(name);
     for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) measure_noise(i);
+    for (int i = 0; i < int(input_.parameters.number("pattern_fields")); ++i) measure_patterns(i);
     summarise();
     return std::move(rows_);
   }
 
  private:
-  /// The rows that the filter throws away need not be made: models are left out here and not after hours.
-  bool wanted(const std::string& table, const std::string& label) const {
-    return ("guarantee/" + table + "/" + label).find(input_.filter) != std::string::npos;
+  /// The rows that the filter throws away need not be made: subjects are left out here and not after hours.
+  bool wanted(const std::string& kind, const std::string& label) const {
+    return ("guarantee/" + kind + "/" + label).find(input_.filter) != std::string::npos;
   }
 
   void measure_model(const std::string& name) {
     if (!wanted("models", name)) return;
     const LoadedCase loaded = input_.tables.load(name, input_.context);
     const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, "hermesh");
-    const bool stand_in = loaded.origin.starts_with("stand-in");
+    const std::string label = name + (loaded.origin.starts_with("stand-in") ? ", stand-in" : "");
     const bool certify = input_.parameters.is("certify", "yes");
-    for (const double resolution : numbers(input_.parameters.text("resolutions"))) {
+    std::vector<double> resolutions = numbers(input_.parameters.text("resolutions"));
+    if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
+    for (const double resolution : resolutions) {
       input_.context.progress(name + " at " + readable(resolution), 0.0);
       const double size = bounds(loaded.mesh).size().maxCoeff() / resolution;
       RunContext child = child_context(input_.context, false);
@@ -159,40 +212,68 @@ class Guarantee {
                                       .options = Options(voxelizer.name, voxelizer.options, {})};
       std::optional<LevelSet> level_set;
       if (const auto failure = attempt([&] { level_set = voxelizer.voxelize(what); }))
-        rows_.push_back({"models", name, {{"resolution", int(resolution)}}, {*failure}});
+        rows_.push_back({"models", label, {{"resolution", int(resolution)}}, {*failure}});
       else
-        measure_all({"models", name, *level_set, &loaded.mesh, size,
-                     Json{{"resolution", int(resolution)}, {"stand_in", stand_in ? "yes" : "no"}},
+        measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, size,
                      certify && resolution <= kFinestCertified});
     }
   }
 
-  /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; outside all around.
+  /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; outside all
+  /// around. Every pair of them has the next one of the sizes.
   void measure_noise(int number) {
-    const std::string label = (number % 2 == 0 ? "uniform " : "whole ") + std::to_string(number);
+    const std::vector<double> sizes = numbers(input_.parameters.text("noise_sizes"));
+    const int n = int(sizes[std::size_t(number / 2) % sizes.size()]);
+    const std::string label = (number % 2 == 0 ? "uniform " : "whole ") + three_digits(number);
     if (!wanted("noise", label)) return;
     input_.context.progress("noise " + label, 0.0);
-    const int n = int(input_.parameters.number("noise_size"));
     // Of each field its own, so that a field that breaks a promise can be made again alone.
     std::mt19937_64 random(input_.seed + std::uint64_t(number));
     std::uniform_real_distribution<float> value(-1.0f, 1.0f);
     std::uniform_int_distribution<int> whole(-1, 1);
-    const LevelSet field = make_volume({n, n, n}, 1.0f, [&](int, int, int) {
-      return number % 2 == 0 ? value(random) : static_cast<float>(whole(random));
-    });
-    Subject subject = {"noise", label, field};
-    subject.certify = input_.parameters.is("certify", "yes");
-    measure_all(subject);
+    measure_all({"noise", label,
+                 make_volume({n, n, n}, 1.0f,
+                             [&](int, int, int) {
+                               return number % 2 == 0 ? value(random) : static_cast<float>(whole(random));
+                             }),
+                 n});
   }
 
-  void measure_all(const Subject& subject) {
+  /// The first field has the 256 patterns of one cell's corners, some twice; the others random ones of 2 × 2
+  /// × 2 cells.
+  void measure_patterns(int number) {
+    const std::string label = (number == 0 ? "cells " : "random ") + three_digits(number);
+    if (!wanted("patterns", label)) return;
+    input_.context.progress("patterns " + label, 0.0);
+    const int given = int(input_.parameters.number("patterns_per_axis"));
+    const int per_axis = number == 0 ? 7 : given;  // 7³ is the first cube above 256
+    std::mt19937 random(std::uint32_t(input_.seed) + std::uint32_t(number));
+    const auto pattern = [&](int i) {
+      return number == 0 ? std::uint32_t(i % 256) : std::uint32_t(random());
+    };
+    measure_all({"patterns", label, make_patterns(per_axis, number == 0 ? 2 : 3, pattern, random), per_axis});
+  }
+
+  static std::string three_digits(int number) {
+    const std::string digits = std::to_string(number);
+    return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+  }
+
+  void measure_all(Subject subject) {
+    subject.certify = subject.certify || (!subject.source && input_.parameters.is("certify", "yes"));
     reference_ = {};
     reference_report_.reset();
+    Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
-      add_row(subject, {kGuaranteed, {{"tolerance", readable_exactly(tolerance)}}}, tolerance);
+      const Contender ours = {kGuaranteed, {{"tolerance", readable_exactly(tolerance)}}};
+      const MeasuredRow& row = add_row(subject, ours, tolerance);
+      overview.add(row.values, tolerance, row.broken);
     }
-    for (const Contender& other : others()) add_row(subject, other, std::nullopt);
+    if (input_.parameters.is("others", "yes"))
+      for (const Contender& other : others())
+        overview.add_other(other.name, add_row(subject, other, std::nullopt).values);
+    rows_.push_back(overview.row());
   }
 
   static std::string readable_exactly(double number) {
@@ -201,8 +282,9 @@ class Guarantee {
     return text.str();
   }
 
-  void add_row(const Subject& subject, const Contender& contender, std::optional<double> tolerance) {
-    MeasuredRow row{subject.table, subject.label, subject.values};
+  const MeasuredRow& add_row(const Subject& subject, const Contender& contender,
+                             std::optional<double> tolerance) {
+    MeasuredRow row{"meshes", subject.label, {{"resolution", subject.resolution}}};
     row.values["extractor"] = contender.name;
     if (tolerance) row.values["tolerance"] = *tolerance;
     std::vector<std::string> violations;
@@ -210,13 +292,15 @@ class Guarantee {
       violations = {*failure};
     else
       violations = violations_of(row.values, tolerance.value_or(0.0));
-    add_to_sum(row, tolerance, !violations.empty());
+    add_to_sum(subject.kind, row, tolerance, !violations.empty());
     // The others promise less; their defects are figures.
     if (tolerance) row.broken = std::move(violations);
     rows_.push_back(std::move(row));
+    return rows_.back();
   }
 
-  void fill(Json& values, const Subject& subject, const Contender& contender, std::optional<double> tolerance) {
+  void fill(Json& values, const Subject& subject, const Contender& contender,
+            std::optional<double> tolerance) {
     RunContext child = child_context(input_.context, false);
     const Extractor& extractor = find_variant(input_.tables.extractors, contender.name);
     const Options options(extractor.name, extractor.options, contender.options);
@@ -236,14 +320,15 @@ class Guarantee {
              RunContext& context) {
     // The distances over samples, which come along with the certificate, are not wanted.
     validation::JudgeOptions options = {.self_intersections = true, .libraries = false, .samples = 1};
-    if (tolerance.value_or(0.0) > 0 && subject.certify && !written.points.empty() && !reference_.points.empty()) {
+    if (tolerance.value_or(0.0) > 0 && subject.certify && !written.points.empty() &&
+        !reference_.points.empty()) {
       options.reference = &reference_;
       options.certify = true;
       options.certify_gap = kGap * subject.voxel_size;
     }
     const validation::MeshReport report = validation::judge(written, options, context);
     set_counts(values, report);
-    if (const auto &from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
+    if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
       values["to_upper"] = to->upper / subject.voxel_size;
       values["lower"] = std::max(from->lower, to->lower) / subject.voxel_size;
@@ -258,8 +343,9 @@ class Guarantee {
     }
   }
 
-  void add_to_sum(const MeasuredRow& row, std::optional<double> tolerance, bool violates) {
-    Sum& sum = sums_[{row.table, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
+  void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
+                  bool violates) {
+    Sum& sum = sums_[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
     ++sum.meshes;
     sum.violations += violates;
     sum.triangles += row.values.value("triangles", std::int64_t(0));
@@ -274,10 +360,12 @@ class Guarantee {
   void summarise() {
     std::int64_t violations = 0, meshes = 0;
     for (const auto& [key, sum] : sums_) {
-      const auto& [table, extractor, tolerance] = key;
-      MeasuredRow row{"summary", table + ", " + extractor};
-      row.values = {{"meshes", sum.meshes},     {"triangles", sum.triangles},
-                    {"seconds", sum.seconds},   {"self_intersections", sum.self_intersections},
+      const auto& [kind, extractor, tolerance] = key;
+      MeasuredRow row{"summary", kind + ", " + extractor};
+      row.values = {{"meshes", sum.meshes},
+                    {"triangles", sum.triangles},
+                    {"seconds", sum.seconds},
+                    {"self_intersections", sum.self_intersections},
                     {"violations", sum.violations}};
       if (tolerance >= 0) row.values["tolerance"] = tolerance;
       if (sum.largest_share > 0) row.values["largest_share"] = sum.largest_share;
@@ -290,8 +378,8 @@ class Guarantee {
         {"summary", std::string("all of ") + kGuaranteed, {{"meshes", meshes}, {"violations", violations}}});
   }
 
-  static inline const std::vector<std::string> kFigures = {"cells", "several_sheets", "held_cells", "fanned_edges",
-                                                           "escaped"};
+  static inline const std::vector<std::string> kFigures = {"cells", "several_sheets", "held_cells",
+                                                           "fanned_edges", "escaped"};
 
   const MeasurementInput& input_;
   std::vector<double> tolerances_;
@@ -306,20 +394,35 @@ class Guarantee {
 Measurement guarantee_measurement() {
   std::vector<std::string> cases = case_choices();
   cases.insert(cases.begin(), {"few", "all"});
-  return {.name = "guarantee",
-          .summary = "what manifold dual contouring promises, on models and on noise",
-          .parameters = {{"cases", "few", "three small ones, all models, or one case", cases},
-                         {"resolutions", "50", "voxels along the longest side",
-                          {"30", "50", "100", "200", "50 100", "50 100 200"}},
-                         {"tolerances", "0.1 1", "of the adaptive meshes, in voxels",
-                          {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2"}},
-                         {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
-                         {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 100000},
-                         {"noise_size", "10", "samples along each side of them", {}, 2, 256}},
-          .tables = {{"models", "meshes of models, as their files hold them", "case", guarantee_mesh_columns()},
-                     {"noise", "meshes of noise", "field", guarantee_mesh_columns(), false},
-                     {"summary", "how many break a promise", "what", guarantee_summary_columns()}},
-          .measure = [](const MeasurementInput& input) { return Guarantee(input).run(); }};
+  return {
+      .name = "guarantee",
+      .summary = "what manifold dual contouring promises, on models and on noise",
+      .parameters =
+          {{"cases", "few", "three small ones, all models, or one case", cases},
+           {"resolutions",
+            "50",
+            "voxels along the longest side",
+            {"30", "50", "100", "200", "50 100", "50 100 200"}},
+           {"finer", "no", "whether six named models are made at 400, too", {"yes", "no"}},
+           {"tolerances",
+            "0.1 1",
+            "of the adaptive meshes, in voxels",
+            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2"}},
+           {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
+           {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
+           {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},
+           {"noise_sizes", "10", "samples along each side of them, in turn", {"8", "10", "32", "32 64"}},
+           {"pattern_fields", "2", "volumes of patterns of signs", {}, 0, 1000},
+           {"patterns_per_axis", "5", "of them along each side of a volume", {}, 1, 40}},
+      .tables = {{"models", "models, at all tolerances", "case", guarantee_overview_columns(), true, true},
+                 {"noise", "fields of noise, at all tolerances", "field", guarantee_overview_columns(), true,
+                  true},
+                 {"patterns", "patterns of signs, at all tolerances", "field", guarantee_overview_columns(),
+                  true, true},
+                 {"meshes", "single meshes, as their files hold them", "subject", guarantee_mesh_columns(),
+                  false, true},
+                 {"summary", "how many break a promise", "what", guarantee_summary_columns()}},
+      .measure = [](const MeasurementInput& input) { return Guarantee(input).run(); }};
 }
 
 }  // namespace hermesh

@@ -11,7 +11,8 @@
 namespace hermesh {
 namespace {
 
-std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters, const std::string& filter = "") {
+std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters,
+                          const std::string& filter = "") {
   Tables tables;
   tables.extractors = all_extractors();
   tables.voxelizers = all_voxelizers();
@@ -27,23 +28,26 @@ std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters, 
 }
 
 TEST(GuaranteeMeasurement, FindsNoViolation) {
-  const std::vector<Json> rows = rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_size", "8"}});
-  // Two tolerances and the uniform mesh, and four others, of a model and four fields; their sums; and the total.
-  ASSERT_EQ(rows.size(), 7u * (1 + 4) + 7u * 2 + 1);
+  const std::vector<Json> rows =
+      rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_sizes", "8"}});
+  // Two tolerances and the uniform mesh, and four others, and an overview, of a model, four fields of noise
+  // and two of patterns; the sums of the three kinds; and the total.
+  ASSERT_EQ(rows.size(), 8u * (1 + 4 + 2) + 7u * 3 + 1);
   std::size_t certified = 0;
   for (const Json& row : rows) {
     EXPECT_FALSE(row.contains("failed")) << row.dump();
     EXPECT_FALSE(row.contains("broken")) << row.dump();
     certified += row["values"].contains("from_upper") && row["values"].contains("to_upper");
   }
-  EXPECT_EQ(certified, 2u * (1 + 4)) << "every adaptive mesh has its bounds";
-  EXPECT_EQ(number_at(rows.back(), "/values/meshes"), 3 * (1 + 4));
+  EXPECT_EQ(certified, 2u * (1 + 4 + 2)) << "every adaptive mesh has its bounds";
+  EXPECT_EQ(number_at(rows.back(), "/values/meshes"), 3 * (1 + 4 + 2));
   EXPECT_EQ(rows.back()["values"]["violations"], 0);
 }
 
 TEST(GuaranteeMeasurement, SeesTheDefectsOfThoseThatPromiseLess) {
   std::int64_t defects = 0;
-  for (const Json& row : rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_size", "8"}}, "noise/"))
+  for (const Json& row :
+       rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_sizes", "8"}}, "uniform"))
     if (text_at(row, "/values/extractor") == "dual-contouring")
       defects += std::int64_t(number_at(row, "/values/non_manifold_edges")) +
                  std::int64_t(number_at(row, "/values/self_intersections"));

@@ -132,6 +132,8 @@ class Measurer {
     expect(extractor.promises.closed && !is_cut, report.boundary_edges, " boundary edges");
     expect(extractor.promises.oriented, report.inconsistent_edges, " flipped edges");
     expect(extractor.promises.manifold, report.non_manifold_edges, " non-manifold edges");
+    if (const auto& pairs = report.self_intersections)
+      expect(extractor.promises.no_self_intersection, pairs->pairs, " self-intersecting pairs");
     // Where the surface only touches the plane of the cut, its boundary touches itself.
     expect(extractor.promises.manifold && !is_cut, report.non_manifold_vertices, " non-manifold vertices");
   }

@@ -35,10 +35,12 @@ Json to_json(const MeasuredTable& table) {
   Json columns = Json::array();
   for (const MeasuredColumn& column : table.columns)
     columns.push_back({{"name", column.name}, {"header", column.header}, {"meaning", column.meaning}});
-  return {{"title", table.title},
-          {"first_column", table.first_column},
-          {"columns", columns},
-          {"printed", table.printed}};
+  Json result = {{"title", table.title},
+                 {"first_column", table.first_column},
+                 {"columns", columns},
+                 {"printed", table.printed}};
+  if (table.additive) result["additive"] = true;
+  return result;
 }
 
 Json row_json(const Json& head, const std::string& table, const std::string& label) {

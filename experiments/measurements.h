@@ -60,6 +60,9 @@ struct MeasuredTable {
   std::string first_column;  ///< header of the labels
   std::vector<MeasuredColumn> columns;
   bool printed = true;  ///< false for rows that are only there to be plotted
+  /// Whether rows of a later run under other labels, with another filter, join those of earlier runs: of
+  /// tables that take hours, and whose rows need not be of one run because their times are not compared.
+  bool additive = false;
 };
 
 struct Measurement {

@@ -119,6 +119,22 @@ TEST(Groups, TheLatestRunIsShownAndTheOthersAreCounted) {
   EXPECT_EQ(groups[1].earlier_runs, 0);
 }
 
+TEST(Groups, RunsOfAnAdditiveTableAddUp) {
+  const auto row = [](const char* run, const char* label) {
+    Json result = row_of(run, label, 1.0);
+    result["table"]["additive"] = true;
+    return result;
+  };
+  const std::vector<RowGroup> groups =
+      latest_groups({row("1", "a"), row("1", "b"), row("2", "b"), row("3", "c")});
+  ASSERT_EQ(groups.size(), 1u);
+  ASSERT_EQ(groups[0].rows.size(), 3u);
+  EXPECT_EQ(groups[0].rows[0]["run"], "1");
+  EXPECT_EQ(groups[0].rows[1]["run"], "2");
+  EXPECT_EQ(groups[0].rows[2]["run"], "3");
+  EXPECT_EQ(groups[0].earlier_runs, 0);
+}
+
 TEST(Latex, EscapesWhatLatexWouldRead) {
   std::ostringstream out;
   write_latex({{row_of("1", "50 % of a_b & {c}", 1.0)}, 0}, out);

@@ -214,14 +214,18 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
     auto& groups = runs[key];
     const std::string run = text_at(row, "/run");
     auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == run; });
-    if (group == groups.end()) group = groups.insert(groups.end(), {run, {}});
+    if (group == groups.end()) {
+      RowGroup before{{}, static_cast<int>(groups.size())};
+      if (find(row, "/table/additive") && !groups.empty()) before = groups.back().second;
+      group = groups.insert(groups.end(), {run, std::move(before)});
+    }
+    std::erase_if(group->second.rows, [&](const Json& old) {
+      return text_at(old, "/run") != run && text_at(old, "/variant/label") == text_at(row, "/variant/label");
+    });
     group->second.rows.push_back(row);
   }
   std::vector<RowGroup> result;
-  for (const std::string& key : order) {
-    result.push_back(std::move(runs[key].back().second));
-    result.back().earlier_runs = static_cast<int>(runs[key].size()) - 1;
-  }
+  for (const std::string& key : order) result.push_back(std::move(runs[key].back().second));
   return result;
 }
 

@@ -14,10 +14,12 @@ namespace hermesh {
 /// variants. The values of a sweep, and voxel sizes that are given as such, share a table.
 struct RowGroup {
   std::vector<Json> rows;
-  int earlier_runs = 0;  ///< how many other groups differ from this one in the run alone
+  int earlier_runs = 0;  ///< how many other groups differ from this one in the run alone, and are not in it
 };
 
-/// Groups in the order in which they first appear; of groups that differ in the run alone, the last one.
+/// Groups in the order in which they first appear; of groups that differ in the run alone, the last one. In
+/// an additive table (measurements.h) a run replaces the rows of the labels that it has, and adds to the
+/// others of the run before it.
 std::vector<RowGroup> latest_groups(const std::vector<Json>& rows);
 
 /// One Markdown table with what it was measured on above, and below it, in capitals, every broken promise,

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
+#include <random>
 
 #include "algorithms/core/level_set.h"
 
@@ -12,6 +14,11 @@ namespace hermesh {
 /// background around it. The grid is marked as a level set, so that less than the isovalue is inside.
 LevelSet make_volume(const std::array<int, 3>& size, float background,
                      const std::function<float(int, int, int)>& value);
+
+/// Many small sign patterns in one volume, each with outside all around it: the lowest bits of pattern(i) say
+/// which of its size³ samples are inside; the values are random.
+LevelSet make_patterns(int per_axis, int size, const std::function<std::uint32_t(int)>& pattern,
+                       std::mt19937 random);
 
 /// A narrow-band level set of a sphere about a point, band of three voxels, inside filled with tiles.
 /// `translation` places index zero in the world.

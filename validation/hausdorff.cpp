@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "validation/triangle_cover.h"
+
 namespace hermesh::validation {
 namespace {
 
@@ -64,9 +66,11 @@ class BranchAndBound {
     const Probe middle = probe(centre, piece[0].slot);
     double radius = 0.0;
     for (const Probe& p : piece) radius = std::max(radius, (p.point - centre).norm());
-    double bound = std::min(middle.distance + radius, bound_by(middle.slot, piece));
+    const double reach = middle.distance + radius, limit = lower_ + gap_;
+    double bound = std::min(reach, bound_by(middle.slot, piece));
     for (const Probe& p : piece) bound = std::min(bound, bound_by(p.slot, piece));
-    return bound;
+    if (bound <= limit) return bound;
+    return std::min(bound, cover_bound({piece[0].point, piece[1].point, piece[2].point}, to_, reach, limit));
   }
 
   // Of the points that no triangle uses the distance is 0.

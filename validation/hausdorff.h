@@ -12,9 +12,10 @@ namespace hermesh::validation {
 /// Lower bound: the distance of points of `from` that were looked at. Upper bound of a triangle: for any
 /// triangle R of `to`, the largest of its corners' distances to R, because the distance to a convex set is a
 /// convex function; R runs over the triangles closest to its corners and its centre. The distance at its
-/// centre plus the radius about it holds, too. A triangle whose upper bound exceeds the lower bound by more
-/// than `gap` (world units) is cut into four, level by level. (Compare Tang, Lee and Kim, Interactive
-/// Hausdorff Distance Computation for General Polygonal Models, 2009.)
+/// centre plus the radius about it holds, too. Where neither is within `gap` (world units) of the lower
+/// bound, parts of the triangle may each be near another R (triangle_cover.h). Where that fails, too, it is
+/// cut into four, level by level. (Compare Tang, Lee and Kim, Interactive Hausdorff Distance Computation for
+/// General Polygonal Models, 2009.)
 ///
 /// The bracket holds always; it is wider than `gap` only where 65536 triangles of the mesh came to more than
 /// four million pieces, or a piece to more than forty levels. For rounding it is widened on both sides by

@@ -34,6 +34,10 @@ struct Box {
   double squared_distance(const Eigen::Vector3d& point) const {
     return (lower - point).cwiseMax(point - upper).cwiseMax(0.0).squaredNorm();
   }
+  /// Zero where they overlap.
+  double squared_distance(const Box& other) const {
+    return (lower - other.upper).cwiseMax(other.lower - upper).cwiseMax(0.0).squaredNorm();
+  }
   bool empty() const { return !(lower.x() <= upper.x()); }
   /// The origin if the box is empty.
   Eigen::Vector3d centre() const {

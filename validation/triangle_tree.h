@@ -41,6 +41,30 @@ class TriangleTree {
   std::uint32_t triangle(std::size_t slot) const { return order_[slot]; }  ///< its number in the soup
   const Corners& corners(std::size_t slot) const { return corners_[slot]; }
 
+  /// Calls visit(slot) for each triangle whose box is within `reach` of a box, until it says no. Whether it
+  /// never did.
+  template <class Visit>
+  bool for_each_near(const Box& box, double reach, const Visit& visit) const {
+    const double squared = reach * reach;
+    std::size_t stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::size_t node = stack[--top];
+      if (boxes_[node].squared_distance(box) > squared) continue;
+      if (node < leaves() - 1) {
+        stack[top++] = 2 * node + 2;
+        stack[top++] = 2 * node + 1;
+        continue;
+      }
+      const std::size_t leaf = node - (leaves() - 1);
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
+        if (box_of(corners_[slot]).squared_distance(box) <= squared && !visit(std::uint32_t(slot)))
+          return false;
+    }
+    return true;
+  }
+
   /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.
   template <class Visit>
   void for_each_overlapping_leaf(std::size_t leaf, const Visit& visit) const {

@@ -66,7 +66,7 @@ bool EdgePolygons::can_be_held(const CellBlocks::Cell& cell) const {
 bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
   int sum = 0;
   cells_.for_each_about(cell, 1, [&](const CellBlocks::Cell& at) { sum += can_be_held(at); });
-  return sum > 2;
+  return sum > 4;
 }
 
 void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Vector3d>& points,

@@ -22,7 +22,7 @@ class EdgePolygons {
 
   /// Whether the cell would have explicit faces of its own if it were held to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
-  /// Whether more than two such cells are among the 27 about this one. There, as nearly everywhere in noise, tests of single
+  /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, tests of single
   /// polygons cost much and rarely end well.
   bool is_crowded(const CellBlocks::Cell& cell) const;
   bool is_held(const CellBlocks::Cell& cell) const { return test(edges_[cell.block].held, cell.cell); }
