@@ -1,5 +1,8 @@
 #include "algorithms/voxelization/pockets.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "algorithms/core/parallel.h"
 #include "algorithms/voxelization/segment.h"
 
@@ -27,18 +30,28 @@ class PocketOpener {
       : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
 
   void run() {
-    const std::vector<Pocket> pockets = find_pockets();
-    std::vector<char> open(pockets.size(), 0);
-    tbb::parallel_for(std::size_t(0), pockets.size(), [&](std::size_t i) {
-      context_.check();
-      for (const Voxel& voxel : pockets[i].voxels)
-        if (sees_outside(voxel)) {
-          open[i] = 1;
-          break;
-        }
-    });
+    std::vector<Pocket> closed = find_pockets();
+    goals_.assign(regions_.count, 0);
+    goals_[Regions::kOutside] = 1;
     std::vector<char> opened(regions_.count, 0);
-    for (std::size_t i = 0; i < pockets.size(); ++i) opened[pockets[i].region] = open[i];
+    // A crevice may hold several pockets, one behind the other.
+    while (true) {
+      std::vector<char> open(closed.size(), 0);
+      tbb::parallel_for(std::size_t(0), closed.size(), [&](std::size_t i) {
+        context_.check();
+        open[i] = std::any_of(closed[i].voxels.begin(), closed[i].voxels.end(),
+                              [&](const Voxel& voxel) { return sees_goal(voxel); });
+      });
+      std::vector<Pocket> left;
+      goals_.assign(regions_.count, 0);
+      for (std::size_t i = 0; i < closed.size(); ++i)
+        if (open[i])
+          opened[closed[i].region] = goals_[closed[i].region] = 1;
+        else
+          left.push_back(std::move(closed[i]));
+      if (left.size() == closed.size() || left.empty()) break;
+      closed = std::move(left);
+    }
     for (BlockComponent& component : regions_.components)
       if (opened[component.region]) component.region = Regions::kOutside;
   }
@@ -72,18 +85,19 @@ class PocketOpener {
       }
   }
 
-  bool is_outside(const Voxel& voxel) const {
+  bool is_goal(const Voxel& voxel) const {
     const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
     if (i == BlockTable::kNone) return false;
     const unsigned place = place_in_tile(voxel);
     for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
       if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)
-        return regions_.components[c].region == Regions::kOutside;
+        return goals_[regions_.components[c].region];
     return false;
   }
 
-  bool sees_outside(const Voxel& voxel) const {
-    std::vector<Obstacle> obstacles = obstacles_near(voxel);
+  bool sees_goal(const Voxel& voxel) const {
+    std::vector<Obstacle> obstacles;
+    bool looked = false;
     const Vector3d from = position(voxel);
     // Near ones first.
     for (std::int32_t far = 1; far <= kFar; ++far)
@@ -92,7 +106,9 @@ class PocketOpener {
           for (std::int32_t z = -far; z <= far; ++z) {
             if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
             const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (is_outside(other) && free(from, position(other), obstacles)) return true;
+            if (!is_goal(other)) continue;
+            if (!std::exchange(looked, true)) obstacles = obstacles_near(voxel);
+            if (free(from, position(other), obstacles)) return true;
           }
     return false;
   }
@@ -142,6 +158,7 @@ class PocketOpener {
   const std::vector<BlockAt>& blocks_;
   Regions& regions_;
   const RunContext& context_;
+  std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };
 
 }  // namespace
