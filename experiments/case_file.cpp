@@ -55,11 +55,12 @@ class CaseFileReader {
           result.parameters[std::string(key.str())] = number(value);
       result.sha256 = text(entry, "sha256");
     } else {
-      check_keys(entry, {"name", "summary", "close_holes_of", "sha256"});
-      result.close_holes_of = text(entry, "close_holes_of");
-      const auto base = std::ranges::find(cases_, result.close_holes_of, &CaseRecipe::name);
-      if (base == cases_.end() || !base->close_holes_of.empty())
-        fail(entry.source(), "close_holes_of must name a case that stands above and is of another kind");
+      result.change = entry.contains("agree_faces_of") ? "agree_faces_of" : "close_holes_of";
+      check_keys(entry, {"name", "summary", result.change, "sha256"});
+      result.changed_case = text(entry, result.change);
+      const auto base = std::ranges::find(cases_, result.changed_case, &CaseRecipe::name);
+      if (base == cases_.end() || !base->change.empty())
+        fail(entry.source(), result.change + " must name a case that stands above and is of another kind");
       result.sha256 = text(entry, "sha256");
     }
     cases_.push_back(std::move(result));

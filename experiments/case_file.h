@@ -28,7 +28,7 @@ struct RawSamples {
 };
 
 /// A case is either files, the first that is to be had wins, with a stand-in (a recipe that takes a number of
-/// triangles) for when none is; or a recipe; or another case with its holes closed.
+/// triangles) for when none is; or a recipe; or another case, changed.
 struct CaseRecipe {
   std::string name, summary;
   std::vector<CaseFile> files;
@@ -36,7 +36,8 @@ struct CaseRecipe {
   std::string stand_in;
   std::string recipe;
   RecipeParameters parameters;
-  std::string close_holes_of;
+  std::string changed_case;  ///< the other case
+  std::string change;        ///< "close_holes_of" it, or "agree_faces_of"
   bool is_volume = false;         ///< samples instead of polygons; its stand-in is one of volume_cases.h
   std::optional<RawSamples> raw;  ///< of a volume whose file does not say
   std::string sha256;  ///< of a generated mesh's arrays

@@ -12,6 +12,7 @@
 #include "algorithms/voxelization/quad_diagonals.h"
 #include "experiments/case_file.h"
 #include "experiments/sha256.h"
+#include "reference/agreed_faces.h"
 
 namespace hermesh {
 
@@ -73,7 +74,8 @@ PolygonMesh read_polygons(const fs::path& path, RunContext& context) {
 }
 
 /// @throws Error if the file is another one.
-LocatedFile checked(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path, const std::string& origin) {
+LocatedFile checked(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path,
+                    const std::string& origin) {
   const std::string sha256 = sha256_of_file(path);
   if (sha256 != file.sha256)
     throw Error(path.string() + " is not the file of case " + recipe.name + ": its SHA-256 is " + sha256 +
@@ -82,7 +84,8 @@ LocatedFile checked(const CaseRecipe& recipe, const CaseFile& file, const fs::pa
 }
 
 /// The first of the case's files that is in the folder.
-std::optional<LocatedFile> find_in(const fs::path& folder, const CaseRecipe& recipe, const std::string& origin) {
+std::optional<LocatedFile> find_in(const fs::path& folder, const CaseRecipe& recipe,
+                                   const std::string& origin) {
   for (const CaseFile& file : recipe.files)
     if (fs::exists(folder / file.name)) return checked(recipe, file, folder / file.name, origin);
   return std::nullopt;
@@ -116,14 +119,15 @@ LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& rec
   if (recipe.is_volume) throw Error("the case " + recipe.name + " is a volume and has no polygons");
   if (!recipe.files.empty()) return load_files(recipe, context);
   LoadedCase result;
-  if (recipe.close_holes_of.empty()) {
+  if (recipe.change.empty()) {
     result.mesh = make_recipe(recipe.recipe, recipe.parameters, context);
     result.origin = "generated";
     if (const auto seed = recipe.parameters.find("seed"); seed != recipe.parameters.end())
       result.seed = static_cast<std::uint64_t>(seed->second);
   } else {
-    result = load_recipe(all, *std::ranges::find(all, recipe.close_holes_of, &CaseRecipe::name), context);
-    result.mesh = close_holes(result.mesh);
+    result = load_recipe(all, *std::ranges::find(all, recipe.changed_case, &CaseRecipe::name), context);
+    result.mesh =
+        recipe.change == "close_holes_of" ? close_holes(result.mesh) : with_agreeing_faces(result.mesh);
   }
   result.name = recipe.name;
   result.sha256 = sha256_of_mesh(result.mesh);
@@ -157,8 +161,10 @@ std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& r
 std::vector<CaseInfo> list_cases() {
   std::vector<CaseInfo> cases;
   for (const CaseRecipe& recipe : recipes_of_project())
-    cases.push_back(
-        {recipe.name, recipe.summary, recipe.is_volume ? "volume" : recipe.files.empty() ? "generated" : "file"});
+    cases.push_back({recipe.name, recipe.summary,
+                     recipe.is_volume       ? "volume"
+                     : recipe.files.empty() ? "generated"
+                                            : "file"});
   return cases;
 }
 

@@ -366,6 +366,12 @@ TEST_F(CasesTest, HolesAreClosedInWhateverMeshThereIs) {
             std::string::npos);
 }
 
+TEST_F(CasesTest, FacesAgreeInWhateverMeshThereIs) {
+  use_recipes(one_case(file_entry("part.obj", triangle_sha256)) +
+              "[[case]]\nname = \"agreed\"\nsummary = \"x\"\nagree_faces_of = \"part\"\nsha256 = \"0\"\n");
+  EXPECT_TRUE(load_case("agreed", context).origin.starts_with("stand-in: "));
+}
+
 TEST_F(CasesTest, APathIsReadAsAFile) {
   write(folder / "mine.obj", triangle);
   const LoadedCase loaded = load_case((folder / "mine.obj").string(), context);

@@ -1,6 +1,5 @@
 #include "algorithms/voxelization/orientation.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <Eigen/Geometry>
@@ -11,6 +10,9 @@
 #include <tuple>
 #include <utility>
 
+#include "algorithms/core/groups.h"
+#include "algorithms/voxelization/duplicate_faces.h"
+
 namespace hermesh {
 namespace {
 
@@ -19,15 +21,6 @@ constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 constexpr double kMost = 0.5;
 /// A flat sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
 constexpr double kNoVolume = 1e-6;
-
-/// Calls f for each range of equal items in a sorted sequence.
-template <class T, class Equal, class F>
-void for_groups(std::span<const T> items, Equal&& equal, F&& f) {
-  for (std::size_t begin = 0, end; begin < items.size(); begin = end) {
-    for (end = begin + 1; end < items.size() && equal(items[begin], items[end]);) ++end;
-    f(items.subspan(begin, end - begin));
-  }
-}
 
 /// The triangles with each point replaced by the lowest number of a point at the same position.
 std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
@@ -55,8 +48,6 @@ std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
   return merged;
 }
 
-bool is_degenerate(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
 class Orienter {
  public:
   Orienter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
@@ -66,7 +57,6 @@ class Orienter {
 
   Orientation run() {
     drop_duplicates();
-    measure();
     if (area_ > 0) {
       link_neighbours();
       agree();
@@ -107,34 +97,14 @@ class Orienter {
     return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
   }
 
+  /// Faces that are there with both windings count for the area, so that it is known how much of it cancels.
   void drop_duplicates() {
-    struct Face {
-      Triangle points;  ///< sorted
-      std::uint32_t number;
-    };
-    std::vector<Face> faces(triangles_.size());
-    tbb::parallel_for(std::size_t{0}, faces.size(), [&](std::size_t i) {
-      faces[i] = {triangles_[i], static_cast<std::uint32_t>(i)};
-      std::sort(faces[i].points.begin(), faces[i].points.end());
-    });
-    tbb::parallel_sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) {
-      return std::tie(a.points, a.number) < std::tie(b.points, b.number);
-    });
-    for_groups(
-        std::span<const Face>(faces), [](const Face& a, const Face& b) { return a.points == b.points; },
-        [&](std::span<const Face> same) {
-          if (same.size() == 1 || is_degenerate(same[0].points)) return;
-          std::ptrdiff_t net = 0;
-          for (const Face& face : same) net += same_winding(triangles_[face.number], face.points) ? 1 : -1;
-          if (net == 0) cancelling_area_ += area_vector(same[0].number).norm();
-          for (const Face& face : same.subspan(1)) result_.turns[face.number] = 0;
-          result_.duplicates += same.size() - 1;
-        });
-  }
-
-  static bool same_winding(const Triangle& t, const Triangle& sorted) {
-    const std::size_t start = std::find(t.begin(), t.end(), sorted[0]) - t.begin();
-    return t[(start + 1) % 3] == sorted[1];
+    const DuplicateFaces duplicates = find_duplicates(triangles_);
+    result_.duplicates = duplicates.dropped.size();
+    for (const std::uint32_t face : duplicates.dropped) result_.turns[face] = 0;
+    for (const std::uint32_t face : duplicates.cancelling) cancelling_area_ += area_vector(face).norm();
+    measure();
+    for (const std::uint32_t face : find_double_walls(triangles_, duplicates)) result_.turns[face] = 0;
   }
 
   /// The area, its centre, about which volumes are taken, and its box.
@@ -171,8 +141,13 @@ class Orienter {
         [&](std::span<const Edge> same) {
           if (same.size() == 1) ++result_.boundary_edges;
           if (same.size() > 2) ++result_.non_manifold_edges;
-          if (same.size() == 2) link(same[0].face_and_way, same[1].face_and_way);
+          if (same.size() != 2) return;
+          ++two_face_edges_;
+          link(same[0].face_and_way, same[1].face_and_way);
         });
+    // Faces that most often meet by threes or more form no surface over which a winding could spread.
+    if (result_.non_manifold_edges > two_face_edges_)
+      neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   }
 
   /// Two faces agree if they run along their edge in opposite ways.
@@ -269,6 +244,7 @@ class Orienter {
   std::vector<std::uint32_t> queue_;  ///< faces patch by patch
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   Bounds box_;
+  std::size_t two_face_edges_ = 0;
   double area_ = 0.0, cancelling_area_ = 0.0, one_sided_area_ = 0.0;
   Orientation result_;
 };

@@ -164,6 +164,51 @@ TEST(Orientation, TellsFacesThatCancel) {
   EXPECT_STRNE(explanation(found.verdict), "");
 }
 
+/// Two cubes face on face: the side between them is there with both windings, and bounds nothing.
+Soup two_cubes_face_on_face() {
+  Soup boxes = cube(1);
+  boxes.add(cube(1, {2, 0, 0}));
+  return boxes;
+}
+
+TEST(Orientation, LeavesOutTheWallBetweenTwoParts) {
+  const Soup boxes = two_cubes_face_on_face();
+  const Orientation found = boxes.orient();
+  EXPECT_EQ(found.duplicates, 2u);
+  EXPECT_EQ(found.flipped, 0u);
+  EXPECT_EQ(std::count(found.turns.begin(), found.turns.end(), 0), 4);
+  EXPECT_EQ(found.boundary_edges + found.non_manifold_edges, 0u);
+  EXPECT_NEAR(volume(boxes, found.turns), 16, 1e-12);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+}
+
+TEST(Orientation, LeavesOutAFinOfNoThickness) {
+  Soup box = cube(1);
+  box.points.push_back({0, 0, 3});
+  box.triangles.push_back({4, 7, 8});  // on the diagonal of the top
+  box.triangles.push_back({7, 4, 8});
+  const Orientation found = box.orient();
+  EXPECT_EQ(std::count(found.turns.begin(), found.turns.end(), 0), 2);
+  EXPECT_EQ(found.boundary_edges + found.non_manifold_edges, 0u);
+  EXPECT_NEAR(volume(box, found.turns), 8, 1e-12);
+}
+
+TEST(Orientation, TakesOneOfTwoFacesThatAreTheOnlyOnesThere) {
+  // Every face twice and wound at random, so that some cancel: no part of a wall, for the surface needs them.
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    Soup box = cube(1);
+    box.add(cube(1));
+    for (std::size_t face = 0; face < box.triangles.size(); ++face)
+      if (random() % 2) box.flip(face);
+    const Orientation found = box.orient();
+    if (found.verdict == Verdict::cancelling) continue;  // most of them do
+    EXPECT_EQ(found.duplicates, 12u);
+    EXPECT_EQ(found.boundary_edges + found.non_manifold_edges, 0u);
+    EXPECT_NEAR(std::abs(volume(box, found.turns)), 8, 1e-12);
+  }
+}
+
 TEST(Orientation, TakesAMeshThatIsThereTwiceOnce) {
   Soup box = cube(1);
   box.add(cube(1));
@@ -245,6 +290,24 @@ TEST(Orientation, DoesNotJoinFacesOverEdgesOfMoreThanTwo) {
   EXPECT_EQ(found.non_manifold_edges, 1u);
   EXPECT_EQ(found.boundary_edges, 6u);
   EXPECT_EQ(found.non_orientable_patches, 0u);
+}
+
+TEST(Orientation, LetsFacesThatFormNoSurfaceKeepTheirWinding) {
+  // Half of all faces over twelve points: an edge has five, wound at random.
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 5; ++trial) {
+    Soup soup;
+    for (int i = 0; i < 12; ++i)
+      soup.points.push_back(
+          Eigen::Vector3f(float(random() % 100), float(random() % 100), float(random() % 100)));
+    for (std::uint32_t a = 0; a < 12; ++a)
+      for (std::uint32_t b = a + 1; b < 12; ++b)
+        for (std::uint32_t c = b + 1; c < 12; ++c)
+          if (random() % 2) soup.triangles.push_back(random() % 2 ? Triangle{a, b, c} : Triangle{a, c, b});
+    const Orientation found = soup.orient();
+    EXPECT_GT(found.non_manifold_edges, 50u);
+    EXPECT_TRUE(found.flipped == 0 || found.flipped == soup.triangles.size()) << found.flipped;
+  }
 }
 
 TEST(Orientation, IsTheSameForEveryNumberOfThreads) {

@@ -1,5 +1,8 @@
 #include "algorithms/voxelization/pockets.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "algorithms/core/parallel.h"
 #include "algorithms/voxelization/segment.h"
 
@@ -11,7 +14,10 @@ using Voxel = std::array<std::int32_t, 3>;
 
 /// More voxels than this are no pocket.
 constexpr std::size_t kMost = 64;
-constexpr std::int32_t kFar = 2;
+/// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
+/// than a voxel the next voxel in it may be some away. What is filed around a block holds all that is as
+/// near.
+constexpr std::int32_t kFar[] = {2, 6};
 
 struct Pocket {
   std::uint32_t region = 0;
@@ -27,23 +33,43 @@ class PocketOpener {
       : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
 
   void run() {
-    const std::vector<Pocket> pockets = find_pockets();
-    std::vector<char> open(pockets.size(), 0);
-    tbb::parallel_for(std::size_t(0), pockets.size(), [&](std::size_t i) {
-      context_.check();
-      for (const Voxel& voxel : pockets[i].voxels)
-        if (sees_outside(voxel)) {
-          open[i] = 1;
-          break;
-        }
-    });
-    std::vector<char> opened(regions_.count, 0);
-    for (std::size_t i = 0; i < pockets.size(); ++i) opened[pockets[i].region] = open[i];
+    std::vector<Pocket> closed = find_pockets();
+    std::vector<char> open(regions_.count, 0);
+    open[Regions::kOutside] = 1;
+    for (const std::int32_t far : kFar) {
+      far_ = far;
+      goals_ = open;
+      // A crevice may hold several pockets, one behind the other.
+      while (!closed.empty()) {
+        const std::vector<char> sees = look(closed);
+        goals_.assign(regions_.count, 0);
+        std::vector<Pocket> left;
+        for (std::size_t i = 0; i < closed.size(); ++i)
+          if (sees[i])
+            open[closed[i].region] = goals_[closed[i].region] = 1;
+          else
+            left.push_back(std::move(closed[i]));
+        const bool none = left.size() == closed.size();
+        closed = std::move(left);
+        if (none) break;
+      }
+    }
     for (BlockComponent& component : regions_.components)
-      if (opened[component.region]) component.region = Regions::kOutside;
+      if (open[component.region]) component.region = Regions::kOutside;
   }
 
  private:
+  /// Which pockets see a goal.
+  std::vector<char> look(const std::vector<Pocket>& pockets) const {
+    std::vector<char> sees(pockets.size(), 0);
+    tbb::parallel_for(std::size_t(0), pockets.size(), [&](std::size_t i) {
+      context_.check();
+      sees[i] = std::any_of(pockets[i].voxels.begin(), pockets[i].voxels.end(),
+                            [&](const Voxel& voxel) { return sees_goal(voxel); });
+    });
+    return sees;
+  }
+
   std::vector<Pocket> find_pockets() const {
     std::vector<std::size_t> size(regions_.count, 0);
     for (const BlockComponent& component : regions_.components)
@@ -72,27 +98,30 @@ class PocketOpener {
       }
   }
 
-  bool is_outside(const Voxel& voxel) const {
+  bool is_goal(const Voxel& voxel) const {
     const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
     if (i == BlockTable::kNone) return false;
     const unsigned place = place_in_tile(voxel);
     for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
       if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)
-        return regions_.components[c].region == Regions::kOutside;
+        return goals_[regions_.components[c].region];
     return false;
   }
 
-  bool sees_outside(const Voxel& voxel) const {
-    std::vector<Obstacle> obstacles = obstacles_near(voxel);
+  bool sees_goal(const Voxel& voxel) const {
+    std::vector<Obstacle> obstacles;
+    bool looked = false;
     const Vector3d from = position(voxel);
     // Near ones first.
-    for (std::int32_t far = 1; far <= kFar; ++far)
+    for (std::int32_t far = 1; far <= far_; ++far)
       for (std::int32_t x = -far; x <= far; ++x)
         for (std::int32_t y = -far; y <= far; ++y)
           for (std::int32_t z = -far; z <= far; ++z) {
             if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
             const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (is_outside(other) && free(from, position(other), obstacles)) return true;
+            if (!is_goal(other)) continue;
+            if (!std::exchange(looked, true)) obstacles = obstacles_near(voxel);
+            if (free(from, position(other), obstacles)) return true;
           }
     return false;
   }
@@ -110,7 +139,7 @@ class PocketOpener {
   }
 
   std::vector<Obstacle> obstacles_near(const Voxel& voxel) const {
-    const Vector3d at = position(voxel), reach = Vector3d::Constant(kFar + 0.01);
+    const Vector3d at = position(voxel), reach = Vector3d::Constant(far_ + 0.01);
     std::vector<Obstacle> obstacles;
     const auto add = [&](std::uint32_t t) {
       const Facet facet(soup_.corners(t));
@@ -127,7 +156,7 @@ class PocketOpener {
     bins_.for_each_cluster(block, near, [&](const TriangleBins::Cluster& cluster) {
       for (const std::uint32_t t : cluster.triangles) add(t);
     });
-    // A large triangle two voxels away may be filed under the blocks around only.
+    // A large triangle some voxels away may be filed under the blocks around only.
     for (std::int32_t x = -1; x <= 1; ++x)
       for (std::int32_t y = -1; y <= 1; ++y)
         for (std::int32_t z = -1; z <= 1; ++z)
@@ -142,6 +171,8 @@ class PocketOpener {
   const std::vector<BlockAt>& blocks_;
   Regions& regions_;
   const RunContext& context_;
+  std::int32_t far_ = 0;
+  std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };
 
 }  // namespace

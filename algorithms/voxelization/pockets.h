@@ -7,8 +7,9 @@
 namespace hermesh {
 
 /// Joins a region of few voxels to the outside where a straight way leads from one of them to a voxel
-/// outside, at most two voxels off on each axis, without meeting a triangle. Large regions are left as they
-/// are: a hole narrower than a voxel must not empty a solid. @throws Cancelled.
+/// outside, at most six voxels off on each axis, without meeting a triangle, or to another such region that
+/// is joined. Large regions are left as they are: a hole narrower than a voxel must not empty a solid.
+/// @throws Cancelled.
 void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
                   Regions& regions, const RunContext& context);
 

@@ -297,6 +297,33 @@ TEST(Voxelize, AVoxelAtTheBottomOfACreviceIsOutside) {
   EXPECT_LT(at(v, -2, 4, 0), 0.0);
 }
 
+TEST(Voxelize, VoxelsOneBehindTheOtherInASlitAreOutside) {
+  // Between two boxes 0.2 to 0.4 voxel apart, which no grid edge goes along: a voxel deep in the slit sees
+  // others in it, and only those at its mouth see what is around the boxes.
+  for (int turn = 0; turn < 3; ++turn) {
+    const Eigen::Matrix3d rotation =
+        (Eigen::AngleAxisd(0.5 + 0.13 * turn, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY()))
+            .toRotationMatrix();
+    const double half = 0.1 + 0.05 * turn;
+    PolygonMesh mesh;
+    for (const double side : {-1.0, 1.0}) {
+      PolygonMesh plate = box({-15, -15, side > 0 ? half : -8}, {15, 15, side > 0 ? 8 : -half});
+      for (Vector3f& p : plate.points) p = (rotation * p.cast<double>()).cast<float>();
+      append(mesh, plate);
+    }
+    const Voxelization v = run(mesh);
+    int in_slit = 0;
+    for (auto value = v.distance->cbeginValueOn(); value; ++value) {
+      const openvdb::Coord c = value.getCoord();
+      const Vector3d p = rotation.transpose() * Vector3d(c.x(), c.y(), c.z());
+      if (std::abs(p.z()) > half - 1e-3 || std::max(std::abs(p.x()), std::abs(p.y())) > 15) continue;
+      ++in_slit;
+      EXPECT_GT(*value, 0.0) << p.transpose();
+    }
+    EXPECT_GT(in_slit, 100);
+  }
+}
+
 TEST(Voxelize, WindingNumbersOnVoxelsOfTheSurfaceMakeNoCaps) {
   const PolygonMesh mesh = box({-10, -10, -10}, {10, 10, 10});
   const Voxelization v = run(mesh, {.signs = SignRule::winding_number});
