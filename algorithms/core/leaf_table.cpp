@@ -47,13 +47,6 @@ std::uint64_t signs_of_64(const float* values, const InsideRule& rule, bool& not
   return bits;
 }
 
-/// As std::popcount(), which is a call of a function where the processor's instruction may not be used.
-constexpr int bits_in(std::uint64_t word) {
-  word -= (word >> 1) & 0x5555555555555555u;
-  word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
-  return static_cast<int>((((word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u) >> 56);
-}
-
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
 }  // namespace

@@ -52,10 +52,7 @@ class SparseView : public HermiteView {
     const Block& block = blocks()[number];
     std::uint32_t rank = hermite_.leaves[block.leaf].first;
     for (int a = 0; a < axis; ++a) rank += static_cast<std::uint32_t>(count(block.crossing[a]));
-    const BlockMask& mask = block.crossing[axis];
-    for (int word = 0; word < sample >> 6; ++word) rank += static_cast<std::uint32_t>(std::popcount(mask[word]));
-    const std::uint64_t before = (std::uint64_t{1} << (sample & 63)) - 1;
-    rank += static_cast<std::uint32_t>(std::popcount(mask[sample >> 6] & before));
+    rank += rank_in(block.crossing[axis], sample);
     return read_(hermite_.crossings[rank]);
   }
 

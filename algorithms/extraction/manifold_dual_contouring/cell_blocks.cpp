@@ -32,7 +32,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
       block.rank[word] = before;
-      before += static_cast<std::uint32_t>(std::popcount(block.active[word]));
+      before += static_cast<std::uint32_t>(bits_in(block.active[word]));
     }
     found[b].reserve(before);
     std::uint16_t later = 0;
@@ -139,7 +139,7 @@ std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const 
     return block.first_point + static_cast<std::uint32_t>(code_at(number, cell) - block.first_code);
   const auto at = std::lower_bound(block.several.begin(), block.several.end(), cell,
                                    [](const auto& entry, int wanted) { return entry.first < wanted; });
-  const std::uint32_t cells = block.rank[7] + static_cast<std::uint32_t>(std::popcount(block.active[7]));
+  const std::uint32_t cells = block.rank[7] + static_cast<std::uint32_t>(bits_in(block.active[7]));
   return block.first_point + cells + at->second + static_cast<std::uint32_t>(sheet - 1);
 }
 
@@ -156,10 +156,9 @@ CellBlocks::Edge CellBlocks::edge_of_cell(std::int32_t block, int cell, int edge
   return {there.block, there.cell, edge_axis(edge)};
 }
 
-Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge) const {
+Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge, const EdgeCrossing& crossing) const {
   Eigen::Vector3d point = corner(edge.block, edge.sample);
-  const double offset = grid_.crossing(edge.block, edge.sample, edge.axis).offset;
-  point[edge.axis] += std::clamp(offset, margin_, 1.0 - margin_);
+  point[edge.axis] += std::clamp(double(crossing.offset), margin_, 1.0 - margin_);
   return point;
 }
 

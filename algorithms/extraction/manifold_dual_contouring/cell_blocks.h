@@ -19,14 +19,6 @@
 
 namespace hermesh {
 
-/// Set bits before `sample`.
-inline std::uint32_t rank_in(const BlockMask& mask, int sample) {
-  std::uint32_t before = 0;
-  for (int word = 0; word < sample >> 6; ++word) before += static_cast<std::uint32_t>(std::popcount(mask[word]));
-  return before +
-         static_cast<std::uint32_t>(std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1)));
-}
-
 /// The joints of a block that have several sheets or an ambiguous face, by cell, ascending.
 using JointSheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 
@@ -118,7 +110,10 @@ class CellBlocks {
   bool is_crossed(const Edge& edge) const {
     return edge.block >= 0 && test(grid_.blocks()[edge.block].crossing[edge.axis], edge.sample);
   }
-  Eigen::Vector3d crossing_point(const Edge& edge) const;
+  Eigen::Vector3d crossing_point(const Edge& edge) const {
+    return crossing_point(edge, grid_.crossing(edge.block, edge.sample, edge.axis));
+  }
+  Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
   Around around(const Edge& edge) const;
 
   /// Whether the surface is held to the segments of the face between cells i and i+1 around an edge.
@@ -152,7 +147,7 @@ class CellBlocks {
   std::size_t code_at(std::int32_t block, int cell) const {
     const Block& b = blocks_[block];
     const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
-    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
+    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(bits_in(before));
   }
   const CellSheets* told_sheets(std::int32_t block, int cell) const {
     return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;

@@ -34,12 +34,23 @@ class DistanceCertificate {
     start = mesh_.walk(start, middle);
     if (overlay_.is_near(triangle, mesh_, start, bound, covered)) return true;
     pieces_left_ = kMostPieces;
-    return holds_in_pieces(triangle, start, bound);
+    return holds_in_pieces(triangle, start, bound, nullptr);
   }
 
  private:
+  /// A triangle of the mesh, and how near to it one has to be.
+  struct Face {
+    TriangleReach reach;
+    double within;
+    bool is_near(const Corners& piece) const {
+      return reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within);
+    }
+  };
+
+  /// @param last the one that was nearest to what the piece is cut from
   template <class Bound>
-  bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound) {
+  bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound, const Face* last) {
+    if (last && last->is_near(piece)) return true;
     if (--pieces_left_ < 0) return false;
     const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0;
     double squared;
@@ -49,18 +60,16 @@ class DistanceCertificate {
     double radius = 0;
     for (const Eigen::Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
     if (distance + radius <= within + kDistanceSlack) return true;
-    const TriangleReach reach(mesh_.corners(found));
-    if ((reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within)) ||
-        overlay_.is_near(piece, mesh_, found, bound))
-      return true;
+    const Face face{TriangleReach(mesh_.corners(found)), within};
+    if (face.is_near(piece) || overlay_.is_near(piece, mesh_, found, bound)) return true;
 
     int i = 0;
     for (int side = 1; side < 3; ++side)
       if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm()) i = side;
     const int j = (i + 1) % 3, k = (i + 2) % 3;
     const Eigen::Vector3d half = 0.5 * (piece[i] + piece[j]);
-    return holds_in_pieces({piece[i], half, piece[k]}, found, bound) &&
-           holds_in_pieces({half, piece[j], piece[k]}, found, bound);
+    return holds_in_pieces({piece[i], half, piece[k]}, found, bound, &face) &&
+           holds_in_pieces({half, piece[j], piece[k]}, found, bound, &face);
   }
 
   static constexpr int kMostPieces = 5000;

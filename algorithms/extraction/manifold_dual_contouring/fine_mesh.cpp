@@ -1,6 +1,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <string>
 
 #include "algorithms/core/error.h"
@@ -56,20 +57,22 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
 }
 
 std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const {
-  const auto squared_to = [&](std::uint32_t t) {
-    const Corners c = corners(t);
-    return squared_distance(p, c[0], c[1], c[2]);
-  };
   constexpr int kMostSteps = 16;
-  squared = squared_to(triangle);
+  squared = std::numeric_limits<double>::infinity();
+  const auto ask = [&](std::uint32_t t) {
+    const Corners c = corners(t);
+    // Most are ruled out by their boxes.
+    const Eigen::Vector3d below = c[0].cwiseMin(c[1]).cwiseMin(c[2]) - p, above = p - c[0].cwiseMax(c[1]).cwiseMax(c[2]);
+    if (below.cwiseMax(above).cwiseMax(0.0).squaredNorm() >= squared) return;
+    const double there = squared_distance(p, c[0], c[1], c[2]);
+    if (there < squared) squared = there, triangle = t;
+  };
+  ask(triangle);
   for (int step = 0; step < kMostSteps; ++step) {
     const std::uint32_t from = triangle;
     for (const std::uint32_t corner : triangles_[from])
       for (const std::uint32_t t : around(corner))
-        if (const double there = squared_to(t); there < squared) {
-          squared = there;
-          triangle = t;
-        }
+        if (t != from) ask(t);
     if (triangle == from) break;
   }
   return triangle;

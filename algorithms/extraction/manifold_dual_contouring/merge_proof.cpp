@@ -30,6 +30,9 @@ enum Proof : std::uint8_t {
   kOpen = 32     ///< it waits for that proof
 };
 
+/// One in so many merged triangles.
+constexpr std::size_t kFew = 512;
+
 /// After so many splits all sets of what fails are split, and not only the worst.
 constexpr int kPatience = 8;
 
@@ -55,13 +58,13 @@ class MergeProof {
     build();
   }
 
-  /// The tests that cost least come first, and the next ones once these are content.
+  /// The tests that cost least come first, and the next ones once these have little left to say.
   MergedMesh run(bool geometry) {
     do {
       look_at_topology();
       if (geometry) look_at_merged();
-      if (geometry && bold_sets().empty()) look_at_fine();
-      if (geometry && bold_sets().empty()) look_at_contacts();
+      if (geometry && few_are_bold()) look_at_fine();
+      if (geometry && few_are_bold()) look_at_contacts();
     } while (split());
     return std::move(merged_);
   }
@@ -239,6 +242,9 @@ class MergeProof {
     });
     for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
   }
+
+  /// So few that the other tests can be had in the same round, and not one after a split for every handful.
+  bool few_are_bold() const { return kFew * bold_sets().size() <= merged_.origin.size(); }
 
   std::vector<std::uint32_t> bold_sets() const {
     std::vector<std::uint32_t> sets;

@@ -56,10 +56,9 @@ bool TriangleOverlay::overlaps(const std::array<Place, 3>& places) {
   return std::abs(twice_area) > kNoArea;
 }
 
-bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Corners& corners,
+bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
                                               const std::array<Place, 3>& places, double within) {
-  const Eigen::Vector3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-  if (!(n.dot(over.normal()) > kFacing * n.norm())) return false;
+  if (!(normal.cast<double>().dot(over.normal()) > kFacing)) return false;
   const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
   if (highest <= within) return true;
   const ClippedTriangle part(places);

@@ -67,7 +67,7 @@ class TriangleOverlay {
   /// is closed, too, for no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are
   /// largest at the part's corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
   ///
-  /// `Mesh` has corners(face) and across(face, side). `covered(face)` is told of faces that lie over t as a whole, no
+  /// `Mesh` has corners(face), normal(face) and across(face, side). `covered(face)` is told of faces that lie over t as a whole, no
   /// farther away than within(face), whatever the answer is.
   template <class Mesh, class Within, class Covered>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Covered&& covered) {
@@ -83,7 +83,7 @@ class TriangleOverlay {
       const std::array<OverTriangle::Place, 3> places = {over(corners[0]), over(corners[1]), over(corners[2])};
       // All faces but the first were come to over the inside of t.
       if (face == start && !overlaps(places)) return false;
-      if (!is_near_and_faces_alike(over, corners, places, within(face))) return false;
+      if (!is_near_and_faces_alike(over, mesh.normal(face), places, within(face))) return false;
       if (places[0].head<3>().maxCoeff() <= 0 && places[1].head<3>().maxCoeff() <= 0 && places[2].head<3>().maxCoeff() <= 0)
         covered(face);
       for (int i = 0; i < 3; ++i) {
@@ -105,7 +105,7 @@ class TriangleOverlay {
 
  private:
   static bool overlaps(const std::array<OverTriangle::Place, 3>& places);
-  static bool is_near_and_faces_alike(const OverTriangle& over, const Corners& corners,
+  static bool is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
                                       const std::array<OverTriangle::Place, 3>& places, double within);
 
   std::vector<std::uint32_t> seen_, faces_;

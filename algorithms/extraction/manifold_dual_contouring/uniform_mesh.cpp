@@ -77,7 +77,7 @@ class Contourer {
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
       if (sheets == 1 && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
-      const Vector3d point = cells_.crossing_point(at);
+      const Vector3d point = cells_.crossing_point(at, crossing);
       const auto& n = crossing.normal;
       qef.add_plane(point, Vector3d(n[0], n[1], n[2]));
       sum += point;
