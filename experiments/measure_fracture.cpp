@@ -8,48 +8,20 @@
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 #include "algorithms/fracture/scatter.h"
-#include "algorithms/hermite/samplers.h"
 #include "experiments/cell.h"
 #include "experiments/fracture_folder.h"
+#include "experiments/fracture_subjects.h"
 #include "experiments/fracture_tags.h"
-#include "experiments/measure.h"
 #include "experiments/measurements.h"
-#include "experiments/run_cells.h"
 
 namespace hermesh {
 namespace {
-
-/// A model at the size of the thesis's figures, or of the case.
-struct Subject {
-  std::string label;
-  std::string source;               ///< case that it is made from
-  std::array<double, 3> size = {};  ///< voxels along each axis; 0: the case's own proportions
-  double longest = 0.0;             ///< voxels
-};
-
-/// Neither object of the figures is at hand: a rough ball and the Armadillo take their places, stretched to
-/// their boxes.
-const std::vector<Subject>& subjects() {
-  static const std::vector<Subject> all = {{"dragon", "dragon", {}, 400},
-                                           {"fandisk", "fandisk", {}, 200},
-                                           {"rock (9.15)", "noise-sphere-1m", {404, 200, 357}, 404},
-                                           {"statue stand-in (9.16)", "armadillo", {506, 563, 465}, 563}};
-  return all;
-}
 
 std::vector<double> numbers(const std::string& text) {
   std::istringstream words(text);
   std::vector<double> result;
   for (double number; words >> number;) result.push_back(number);
   return result;
-}
-
-void stretch(PolygonMesh& mesh, const std::array<double, 3>& size) {
-  if (size[0] == 0) return;
-  const Bounds box = bounds(mesh);
-  for (auto& p : mesh.points)
-    for (int a = 0; a < 3; ++a) p[a] = static_cast<float>(double(p[a]) * size[a] / box.size()[a]);
-  mesh.origin.setZero();
 }
 
 struct Range {
@@ -74,9 +46,9 @@ class FractureBooks {
 
   std::vector<MeasuredRow> run() {
     const double scale = input_.parameters.number("scale");
-    for (const Subject& subject : subjects()) {
+    for (const FractureSubject& subject : fracture_subjects()) {
       if (!input_.parameters.is("cases", "all") && !input_.parameters.is("cases", subject.source)) continue;
-      PolygonMesh mesh = load(subject);
+      const PolygonMesh mesh = load_subject(subject, input_);
       const FractureObject object = sampled(mesh, scale * subject.longest);
       tag_oracle_.emplace(triangles_in_voxels(mesh, object.level_set.voxel_size()));
       tag_origin_ = mesh.origin;
@@ -96,21 +68,11 @@ class FractureBooks {
     return method == "labelled" ? numbers(input_.parameters.text("tolerances")) : std::vector{0.0};
   }
 
-  PolygonMesh load(const Subject& subject) {
-    PolygonMesh mesh = input_.tables.load(subject.source, input_.context).mesh;
-    stretch(mesh, subject.size);
-    return mesh;
-  }
-
   FractureObject sampled(const PolygonMesh& mesh, double longest) {
     RunContext child = child_context(input_.context, false);
-    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, "hermesh");
-    FractureObject object;
-    object.level_set = voxelizer.voxelize({.mesh = mesh,
-                                           .voxel_size = bounds(mesh).size().maxCoeff() / longest,
-                                           .context = child,
-                                           .options = Options(voxelizer.name, voxelizer.options, {})});
-    conversion_ = timed([&] { object.hermite = sample_polygons(object.level_set, 0.0, mesh, child); });
+    SampledSubject made = sample_subject(mesh, longest, input_);
+    conversion_ = made.hermite_seconds;
+    FractureObject object = std::move(made.object);
     const PolygonMesh uncut = manifold_dual_contouring(view_of(object.hermite, child),
                                                        {.tolerance = 0.0, .uniform = {}}, nullptr, child);
     uncut_volume_ = mass_properties(uncut).volume;
@@ -121,7 +83,7 @@ class FractureBooks {
     return parse_cutters(input_.parameters.text("cutters") + ":" + std::to_string(count));
   }
 
-  void add_row(const Subject& subject, const FractureObject& object, std::size_t count,
+  void add_row(const FractureSubject& subject, const FractureObject& object, std::size_t count,
                const std::string& method, double tolerance) {
     std::string label = subject.label + ", " + std::to_string(count) + ", " + method;
     if (tolerance > 0) label += " " + readable(tolerance);
@@ -133,7 +95,7 @@ class FractureBooks {
     rows_.push_back(std::move(row));
   }
 
-  void fill(MeasuredRow& row, const Subject& subject, const FractureObject& object, std::size_t count,
+  void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object, std::size_t count,
             const std::string& method, double tolerance) {
     RunContext child = child_context(input_.context, false);
     CutterChoices choices;
@@ -216,8 +178,8 @@ class FractureBooks {
 
   /// How fast what the cuts take from the uncut volume falls with the size of voxels.
   void measure_order() {
-    const Subject& subject = subjects()[1];
-    const PolygonMesh mesh = load(subject);
+    const FractureSubject& subject = fracture_subjects()[1];
+    const PolygonMesh mesh = load_subject(subject, input_);
     std::optional<double> before;
     for (const double resolution : {50.0, 100.0, 200.0}) {
       RunContext child = child_context(input_.context, false);

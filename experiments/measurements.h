@@ -98,5 +98,6 @@ Measurement tables_9_3_and_9_4_measurement();
 Measurement volumes_measurement();
 Measurement guarantee_measurement();
 Measurement fracture_measurement();
+Measurement fracture_speed_measurement();
 
 }  // namespace hermesh
