@@ -42,7 +42,7 @@ template <class Entry>
 VariantEntry read_variant(const Section& file, const toml::node& node, const std::string& kind,
                           std::span<const Entry> table) {
   const Section section(file.file(), file.table(node, "a " + kind), "a " + kind,
-                        {"name", "label", "options"});
+                        {"name", "label", "options", "uniform"});
   VariantEntry entry;
   entry.name = section.text("name");
   const auto known =
@@ -51,6 +51,7 @@ VariantEntry read_variant(const Section& file, const toml::node& node, const std
     section.fail_at("name",
                     "there is no " + kind + " \"" + entry.name + "\"; there are " + joined(names_of(table)));
   entry.label = section.text_or("label", entry.name);
+  entry.uniform = section.text_or("uniform", "");
   const toml::table* options = section.optional_table("options");
   if (!options) return entry;
   for (const auto& [key, value] : *options) {
@@ -72,6 +73,9 @@ std::vector<VariantEntry> read_variants(const Section& file, const std::string& 
   std::set<std::string> labels;
   for (const toml::node& node : file.list(kind + "s")) {
     variants.push_back(read_variant(file, node, kind, table));
+    if (const std::string& uniform = variants.back().uniform; !uniform.empty() && !labels.contains(uniform))
+      file.fail(node.source().begin.line,
+                "there is no " + kind + " with the label \"" + uniform + "\" above, as uniform has it");
     if (!labels.insert(variants.back().label).second)
       file.fail(node.source().begin.line,
                 "the label \"" + variants.back().label + "\" is used twice; a row is known by it");
@@ -213,7 +217,8 @@ Tier read_tier(const Section& file, const std::string& name, const toml::table& 
 Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vocabulary) {
   const Section section(
       file.file(), file.table(node, "a plot"), "a plot",
-      {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent", "by_variant"});
+      {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent", "by_variant",
+       "resolution"});
   const auto known = [&](const std::string& key, const std::string& name,
                          const std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), name) == names.end())
@@ -233,6 +238,7 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
   plot.log_y = section.flag_or("log_y", false);
   plot.percent = section.flag_or("percent", false);
   plot.by_variant = section.flag_or("by_variant", false);
+  plot.resolution = static_cast<int>(section.integer_or("resolution", 0, 0, 1 << 20));
   return plot;
 }
 

@@ -61,6 +61,7 @@ struct VariantEntry {
   std::string name;                            ///< of an entry in a table of extractors or voxelizers
   std::string label;                           ///< unique in the file; the name when the file gives none
   std::map<std::string, std::string> options;  ///< as given
+  std::string uniform = {};  ///< label of an extractor above, whose mesh this one's is compared with; or empty
 };
 
 /// How much work a run is.

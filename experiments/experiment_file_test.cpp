@@ -61,7 +61,7 @@ TEST_F(ExperimentFile, ReadsEveryKey) {
   const Experiment e = read(
       "question = \"why?\"\nvoxelizers = [\"plain\"]\ncolumns = [\"seconds\", \"points\"]\nfeatures = 25\n"
       "[[variants]]\nname = \"toy\"\nlabel = \"toy, fast\"\noptions = { size = 2, mode = \"fast\" }\n"
-      "[[variants]]\nname = \"toy\"\n"
+      "[[variants]]\nname = \"toy\"\nuniform = \"toy, fast\"\n"
       "[full]\nrepetitions = 4\nseconds_per_variant = 2\nsamples = 77\npixels = 0\nself_intersections = "
       "false\n"
       "cases = [{ name = \"cube\", resolutions = [8, 16], closeup = [0.1, 0.2, 0.3, 0.5], view = [10, -20] "
@@ -74,6 +74,8 @@ TEST_F(ExperimentFile, ReadsEveryKey) {
   EXPECT_EQ(e.variants[0].label, "toy, fast");
   EXPECT_EQ(e.variants[0].options, (std::map<std::string, std::string>{{"size", "2"}, {"mode", "fast"}}));
   EXPECT_EQ(e.variants[1].label, "toy");
+  EXPECT_EQ(e.variants[0].uniform, "");
+  EXPECT_EQ(e.variants[1].uniform, "toy, fast");
   ASSERT_EQ(e.tiers.size(), 1u);
   const Tier& tier = e.tiers.at("full");
   EXPECT_EQ(tier.repetitions, 4);
@@ -94,6 +96,10 @@ TEST_F(ExperimentFile, OptionNumbersKeepTheirValue) {
   const std::string third =
       read(valid(6, "options = { size = 0.33333333333333331 }")).variants[0].options.at("size");
   EXPECT_EQ(std::stod(third), 0.33333333333333331);
+}
+
+TEST_F(ExperimentFile, TheUniformMeshIsThatOfAVariantAbove) {
+  EXPECT_NE(complaint(valid(6, "uniform = \"fast\"")).find("no variant with the label \"fast\" above"), std::string::npos);
 }
 
 TEST_F(ExperimentFile, EveryMistakeNamesFileAndLine) {

@@ -52,6 +52,11 @@ PolygonMesh leaky(const ExtractionInput& input) {
   mesh.triangles.pop_back();
   return mesh;
 }
+PolygonMesh swollen(const ExtractionInput& input) {
+  PolygonMesh mesh = *input.source;
+  for (Eigen::Vector3f& p : mesh.points) p *= 1.25f;
+  return mesh;
+}
 PolygonMesh failing(const ExtractionInput&) { throw Error("the toy fell apart"); }
 PolygonMesh empty(const ExtractionInput&) { return {}; }
 PolygonMesh fickle(const ExtractionInput& input) {
@@ -70,6 +75,7 @@ class Harness : public testing::Test {
     tables_.extractors = {{"copier", "", all, {{"size", "1", "", {}, 0, 9}}, copier},
                           {"leaky", "", all, {}, leaky},
                           {"modest", "", {}, {}, leaky},
+                          {"swollen", "", all, {}, swollen},
                           {"failing", "", all, {}, failing},
                           {"empty", "", all, {}, empty},
                           {"fickle", "", all, {}, fickle},
@@ -156,6 +162,20 @@ TEST_F(Harness, ARowHoldsEverythingThatTheCellIs) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "ball-12.png"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "meshes" / "toy-ball-12" / "1-good.ply"));
   EXPECT_NE(table_.str().find("| good "), std::string::npos);
+}
+
+TEST_F(Harness, DistancesToTheUniformMeshOfTheMethod) {
+  run("{ name = \"copier\" }, { name = \"swollen\", uniform = \"copier\" }", "ball/12");
+  ASSERT_EQ(rows().size(), 2u);
+  EXPECT_FALSE(rows()[0].contains("to_uniform"));
+  // Its points lie straight above those of the ball, by a quarter of the radius; the ball's own are nearer to its faces.
+  EXPECT_NEAR(rows()[1]["to_uniform"]["max"].get<double>(), 0.25, 1e-6);
+  EXPECT_LT(rows()[1]["to_uniform"]["rms"].get<double>(), 0.25);
+  EXPECT_LT(rows()[1]["from_uniform"]["max"].get<double>(), 0.25);
+  EXPECT_GT(rows()[1]["from_uniform"]["max"].get<double>(), 0.2);
+  // Without the other one there is nothing to compare with.
+  run("{ name = \"copier\" }, { name = \"swollen\", uniform = \"copier\" }", "12/swollen");
+  EXPECT_FALSE(rows().back().contains("to_uniform"));
 }
 
 TEST_F(Harness, ABrokenPromiseIsLoudAndEndsWithThree) {

@@ -48,6 +48,7 @@ std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
   };
   for (const Json& row : rows) {
     if (!plot.case_name.empty() && text_at(row, "/case/name") != plot.case_name) continue;
+    if (plot.resolution != 0 && row.value("resolution", 0) != plot.resolution) continue;
     const auto x = number_in(plot.x, row);
     if (!x || (plot.log_x && *x <= 0.0)) continue;
     for (std::size_t i = 0; i < plot.y.size(); ++i) {
@@ -153,13 +154,14 @@ bool run_gnuplot(const std::filesystem::path& script) {
 Json to_json(const Plot& plot) {
   return {{"name", plot.name},   {"title", plot.title},     {"case", plot.case_name},  {"x", plot.x},
           {"y", plot.y},         {"x_label", plot.x_label}, {"y_label", plot.y_label}, {"log_x", plot.log_x},
-          {"log_y", plot.log_y}, {"percent", plot.percent}, {"by_variant", plot.by_variant}};
+          {"log_y", plot.log_y}, {"percent", plot.percent}, {"by_variant", plot.by_variant},
+          {"resolution", plot.resolution}};
 }
 
 Plot plot_from_json(const Json& json) {
   return {json.at("name"),    json.at("title"),   json.at("case"),  json.at("x"),     json.at("y"),
           json.at("x_label"), json.at("y_label"), json.at("log_x"), json.at("log_y"), json.at("percent"),
-          json.value("by_variant", false)};
+          json.value("by_variant", false), json.value("resolution", 0)};
 }
 
 void write_plots(const std::vector<Json>& rows, const std::filesystem::path& folder, std::ostream& out) {

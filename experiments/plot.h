@@ -23,6 +23,7 @@ struct Plot {
   bool log_x = false, log_y = false;
   bool percent = false;     ///< y is a share and shown in percent
   bool by_variant = false;  ///< a curve through all labels of a variant
+  int resolution = 0;       ///< only rows of this one; 0: all
 
   bool operator==(const Plot&) const = default;
 };

@@ -84,6 +84,15 @@ TEST_F(PlotFiles, LogarithmsLeaveOutWhatHasNone) {
   EXPECT_EQ(text("toy-p.dat"), "# a\n2 50\n\n\n");
 }
 
+TEST_F(PlotFiles, OfAnotherResolutionAreLeftOut) {
+  plot_.resolution = 200;
+  plot_.y = {"wrong_share"};
+  Json kept = row("a", 1, 0.5), other = row("a", 2, 0.25);
+  kept["resolution"] = 200, other["resolution"] = 400;
+  draw({kept, other});
+  EXPECT_EQ(text("toy-p.dat"), "# a\n1 50\n\n\n");
+}
+
 TEST_F(PlotFiles, OfAnotherCaseAreLeftOut) {
   plot_.case_name = "cube";
   EXPECT_EQ(draw({row("a", 1, 0.1)}), "");

@@ -9,6 +9,7 @@
 #include "algorithms/core/mesh_file.h"
 #include "experiments/cell.h"
 #include "experiments/provenance.h"
+#include "validation/distance.h"
 #include "validation/report_json.h"
 
 namespace hermesh {
@@ -36,6 +37,7 @@ struct Cell {
   const Extractor* extractor = nullptr;
   Options options;
   Json row;
+  std::string uniform;              ///< as in VariantEntry
   std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
   std::uint64_t mesh_fingerprint = 0;
   std::optional<Timing> timing;  ///< absent when the variant failed
@@ -80,6 +82,7 @@ class Group {
     cell.row["voxel_size"] = voxel_size_;
     cell.row["samples"] = in_.tier.samples;
     cell.row["variant"] = variant_json(variant, cell.options);
+    cell.uniform = variant.uniform;
     cell.row["variant"]["promises"] = promise_words(cell.extractor->promises);
     return cell;
   }
@@ -165,8 +168,11 @@ class Group {
       options.dihedral_degrees = *in_.experiment.features;
     }
     validation::MeshReport report;
-    cell.row["judge_seconds"] =
-        timed([&] { report = validation::judge(read_mesh_file(cell.mesh_file, child), options, child); });
+    cell.row["judge_seconds"] = timed([&] {
+      const MeshFile mesh = read_mesh_file(cell.mesh_file, child);
+      report = validation::judge(mesh, options, child);
+      if (!cell.uniform.empty()) compare_with_uniform(mesh, cell, child);
+    });
     cell.row["report"] = validation::to_json(report);
 
     const Promises& promises = cell.extractor->promises;
@@ -180,6 +186,21 @@ class Group {
       for (const std::string& sentence : library.disagreements)
         disagreements.push_back(library.library + ": " + sentence);
     cell.row["disagreements"] = std::move(disagreements);
+  }
+
+  /// Both ways; nothing where that mesh failed or was not asked for.
+  void compare_with_uniform(const MeshFile& mesh, Cell& cell, RunContext& child) const {
+    const auto other = std::ranges::find_if(
+        cells_, [&](const Cell& each) { return each.row["variant"]["label"] == cell.uniform; });
+    if (other == cells_.end() || other->mesh_file.empty()) return;
+    const MeshFile uniform = read_mesh_file(other->mesh_file, child);
+    const validation::TriangleSoup ours(mesh), theirs(uniform);
+    const auto add = [&](const char* key, const validation::TriangleSoup& from, const validation::TriangleSoup& to) {
+      const auto found = validation::sampled_distances(from, validation::TriangleTree(to), in_.tier.samples, child);
+      cell.row[key] = {{"rms", found.rms}, {"max", found.max}};
+    };
+    add("to_uniform", ours, theirs);
+    add("from_uniform", theirs, ours);
   }
 
   double repeat(Cell& cell) {
