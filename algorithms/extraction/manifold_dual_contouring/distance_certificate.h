@@ -72,7 +72,7 @@ class DistanceCertificate {
            holds_in_pieces({half, piece[j], piece[k]}, found, bound, &face);
   }
 
-  static constexpr int kMostPieces = 5000;
+  static constexpr int kMostPieces = 512;
 
   const FineMesh& mesh_;
   TriangleOverlay& overlay_;
