@@ -187,6 +187,25 @@ TEST(Hausdorff, BracketsDenseSampling) {
   EXPECT_LE(certified.upper - certified.lower, 3e-3 + 1e-7);
 }
 
+// A needle a hundred million times as long as it is high, whose computed plane is tilted by that much. The truth is from
+// quadruple precision: the foot is within the needle.
+TEST(Hausdorff, ToANeedle) {
+  MeshFile needle;
+  needle.points = {{-0.19135289940533243, 0.25855359820650692, 0.166432725163458},
+                   {-0.75100411165972891, -0.29349765187174526, -0.45165297917633951},
+                   {-0.24687742030814802, 0.20378307162904363, 0.10511074898065616}};
+  needle.triangles = {{0, 1, 2}};
+  const Eigen::Vector3d p(-0.43707430461282631, 0.016201436042990278, -0.09994044621478157);
+  MeshFile from;
+  from.points = {p, p + Eigen::Vector3d(1e-9, 0, 0), p + Eigen::Vector3d(0, 1e-9, 0)};
+  from.triangles = {{0, 1, 2}};
+  const HausdorffBound b = bound(from, needle, 1e-12);
+  const double truth = 0.0039201627952987232;
+  EXPECT_LE(b.lower, truth);
+  EXPECT_GE(b.upper, truth);
+  EXPECT_NEAR(b.upper, truth, 1e-6);
+}
+
 TEST(Hausdorff, FarFromTheOrigin) {
   const Eigen::Vector3d far(3e6, -2e6, 1e6);
   const MeshFile outer = cube_of_triangles(far - Eigen::Vector3d::Ones(), 2.0);

@@ -176,7 +176,7 @@ HausdorffBound certified_distance(const TriangleSoup& from, const TriangleTree& 
   const double diagonal = std::max(box.diagonal(), to.bounds().diagonal());
   box.add(to.bounds());
   const double largest = std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
-  const double slack = 1e-9 * diagonal + 1e-15 * largest;
+  const double slack = 1e-7 * diagonal + 1e-15 * largest;
   return {std::max(0.0, bound.lower - slack), bound.upper + slack};
 }
 
