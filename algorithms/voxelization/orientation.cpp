@@ -62,7 +62,7 @@ class Orienter {
       agree();
     }
     for (const std::int8_t turn : result_.turns) result_.flipped += turn < 0;
-    if (!(area_ > 0))
+    if (!(area_ > 0) && !(cancelling_area_ > 0))
       result_.verdict = Orientation::Verdict::no_area;
     else if (cancelling_area_ > kMost * area_)
       result_.verdict = Orientation::Verdict::cancelling;
@@ -97,14 +97,16 @@ class Orienter {
     return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
   }
 
-  /// Faces that are there with both windings count for the area, so that it is known how much of it cancels.
+  /// Faces that are there with both windings count for the area, so that it is known how much of it cancels; those of
+  /// double walls do not, unless there are no others.
   void drop_duplicates() {
     const DuplicateFaces duplicates = find_duplicates(triangles_);
     result_.duplicates = duplicates.dropped.size();
     for (const std::uint32_t face : duplicates.dropped) result_.turns[face] = 0;
-    for (const std::uint32_t face : duplicates.cancelling) cancelling_area_ += area_vector(face).norm();
-    measure();
     for (const std::uint32_t face : find_double_walls(triangles_, duplicates)) result_.turns[face] = 0;
+    measure();
+    for (const std::uint32_t face : duplicates.cancelling)
+      if (result_.turns[face] != 0 || !(area_ > 0)) cancelling_area_ += area_vector(face).norm();
   }
 
   /// The area, its centre, about which volumes are taken, and its box.

@@ -182,6 +182,16 @@ TEST(Orientation, LeavesOutTheWallBetweenTwoParts) {
   EXPECT_EQ(found.verdict, Verdict::usable);
 }
 
+TEST(Orientation, WallsDoNotCancelTheSurface) {
+  // 144 walls between 64 cubes, and 96 outer sides.
+  Soup boxes;
+  for (int i = 0; i < 64; ++i) boxes.add(cube(1, 2 * Eigen::Vector3f(float(i % 4), float(i / 4 % 4), float(i / 16))));
+  const Orientation found = boxes.orient();
+  EXPECT_EQ(found.duplicates, 2u * 144);
+  EXPECT_NEAR(volume(boxes, found.turns), 8 * 64, 1e-9);
+  EXPECT_EQ(found.verdict, Verdict::usable);
+}
+
 TEST(Orientation, LeavesOutAFinOfNoThickness) {
   Soup box = cube(1);
   box.points.push_back({0, 0, 3});
