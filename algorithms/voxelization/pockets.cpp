@@ -22,6 +22,7 @@ constexpr std::int32_t kFar[] = {2, 6};
 struct Pocket {
   std::uint32_t region = 0;
   std::vector<Voxel> voxels;
+  std::vector<std::uint32_t> blocks;  ///< numbers of those that hold them
 };
 
 Vector3d position(const Voxel& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
@@ -33,61 +34,97 @@ class PocketOpener {
       : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
 
   void run() {
-    std::vector<Pocket> closed = find_pockets();
+    find_pockets();
     std::vector<char> open(regions_.count, 0);
     open[Regions::kOutside] = 1;
     for (const std::int32_t far : kFar) {
       far_ = far;
       goals_ = open;
+      std::vector<std::uint32_t> asked = closed_ones(open);
       // A crevice may hold several pockets, one behind the other.
-      while (!closed.empty()) {
-        const std::vector<char> sees = look(closed);
-        goals_.assign(regions_.count, 0);
-        std::vector<Pocket> left;
-        for (std::size_t i = 0; i < closed.size(); ++i)
-          if (sees[i])
-            open[closed[i].region] = goals_[closed[i].region] = 1;
-          else
-            left.push_back(std::move(closed[i]));
-        const bool none = left.size() == closed.size();
-        closed = std::move(left);
-        if (none) break;
+      for (bool first = true; !asked.empty(); first = false) {
+        const std::vector<char> sees = look(asked);
+        if (first) goals_.assign(regions_.count, 0);
+        for (const std::uint32_t pocket : opened_) goals_[pockets_[pocket].region] = 0;
+        opened_.clear();
+        for (std::size_t i = 0; i < asked.size(); ++i) {
+          if (!sees[i]) continue;
+          opened_.push_back(asked[i]);
+          open[pockets_[asked[i]].region] = goals_[pockets_[asked[i]].region] = 1;
+        }
+        asked = closed_ones_near_opened(open);
       }
+      opened_.clear();
     }
     for (BlockComponent& component : regions_.components)
       if (open[component.region]) component.region = Regions::kOutside;
   }
 
  private:
-  /// Which pockets see a goal.
-  std::vector<char> look(const std::vector<Pocket>& pockets) const {
-    std::vector<char> sees(pockets.size(), 0);
-    tbb::parallel_for(std::size_t(0), pockets.size(), [&](std::size_t i) {
+  std::vector<std::uint32_t> closed_ones(const std::vector<char>& open) const {
+    std::vector<std::uint32_t> closed;
+    for (std::uint32_t i = 0; i < pockets_.size(); ++i)
+      if (!open[pockets_[i].region]) closed.push_back(i);
+    return closed;
+  }
+
+  /// Only these can see what has just been opened. To ask all would take as many looks as a slit has voxels for each
+  /// of the rounds that lead through it.
+  std::vector<std::uint32_t> closed_ones_near_opened(const std::vector<char>& open) const {
+    std::vector<std::uint32_t> near;
+    for (const std::uint32_t pocket : opened_)
+      for (const std::uint32_t block : pockets_[pocket].blocks)
+        for (std::int32_t x = -1; x <= 1; ++x)
+          for (std::int32_t y = -1; y <= 1; ++y)
+            for (std::int32_t z = -1; z <= 1; ++z) {
+              const BlockAt& at = blocks_[block];
+              const std::uint32_t there = bins_.blocks().find({at[0] + x, at[1] + y, at[2] + z});
+              if (there != BlockTable::kNone) near.push_back(there);
+            }
+    sort_and_unify(near);
+    std::vector<std::uint32_t> closed;
+    for (const std::uint32_t block : near)
+      for (const std::uint32_t pocket : pockets_in_[block])
+        if (!open[pockets_[pocket].region]) closed.push_back(pocket);
+    sort_and_unify(closed);
+    return closed;
+  }
+  static void sort_and_unify(std::vector<std::uint32_t>& numbers) {
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  }
+
+  /// Which of these pockets see a goal.
+  std::vector<char> look(const std::vector<std::uint32_t>& asked) const {
+    std::vector<char> sees(asked.size(), 0);
+    tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
       context_.check();
-      sees[i] = std::any_of(pockets[i].voxels.begin(), pockets[i].voxels.end(),
-                            [&](const Voxel& voxel) { return sees_goal(voxel); });
+      const std::vector<Voxel>& voxels = pockets_[asked[i]].voxels;
+      sees[i] = std::any_of(voxels.begin(), voxels.end(), [&](const Voxel& voxel) { return sees_goal(voxel); });
     });
     return sees;
   }
 
-  std::vector<Pocket> find_pockets() const {
+  void find_pockets() {
     std::vector<std::size_t> size(regions_.count, 0);
     for (const BlockComponent& component : regions_.components)
       for (const std::uint64_t word : component.voxels)
         size[component.region] += std::size_t(__builtin_popcountll(word));
-    std::vector<Pocket> pockets;
     std::vector<std::uint32_t> number(regions_.count, BlockTable::kNone);
+    pockets_in_.resize(blocks_.size());
     for (std::size_t i = 0; i < blocks_.size(); ++i)
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
         const BlockComponent& component = regions_.components[c];
         if (component.region == Regions::kOutside || size[component.region] > kMost) continue;
         if (number[component.region] == BlockTable::kNone) {
-          number[component.region] = std::uint32_t(pockets.size());
-          pockets.push_back({component.region, {}});
+          number[component.region] = std::uint32_t(pockets_.size());
+          pockets_.push_back({component.region, {}, {}});
         }
-        add_voxels(blocks_[i], component.voxels, pockets[number[component.region]].voxels);
+        Pocket& pocket = pockets_[number[component.region]];
+        pocket.blocks.push_back(std::uint32_t(i));
+        pockets_in_[i].push_back(number[component.region]);
+        add_voxels(blocks_[i], component.voxels, pocket.voxels);
       }
-    return pockets;
   }
 
   static void add_voxels(const BlockAt& block, const VoxelBits& bits, std::vector<Voxel>& voxels) {
@@ -171,6 +208,9 @@ class PocketOpener {
   const std::vector<BlockAt>& blocks_;
   Regions& regions_;
   const RunContext& context_;
+  std::vector<Pocket> pockets_;
+  std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< by block
+  std::vector<std::uint32_t> opened_;                   ///< in the last round
   std::int32_t far_ = 0;
   std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };
