@@ -3,36 +3,15 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <numeric>
 #include <set>
 
+#include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/parallel.h"
 
 namespace hermesh {
 namespace {
 
 constexpr std::uint16_t kNoComponent = 0xffff;
-
-/// Sets that are joined; the lowest number stands for its set, so the result does not depend on the order.
-class Sets {
- public:
-  void resize(std::size_t n) {
-    parent_.resize(n);
-    std::iota(parent_.begin(), parent_.end(), 0u);
-  }
-  std::uint32_t find(std::uint32_t a) {
-    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-    return a;
-  }
-  /// The one that stands for both now.
-  std::uint32_t join(std::uint32_t a, std::uint32_t b) {
-    a = find(a), b = find(b);
-    return parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 class Components {
  public:
@@ -142,8 +121,7 @@ class Components {
       const std::uint32_t label = solid_.labels(block, 0);
       return label > 0 ? InBlock{{label}, {512}} : InBlock{};
     }
-    Sets sets;
-    sets.resize(512);
+    DisjointSets sets(512);
     const auto label = [&](int i) { return solid_.labels(block, i); };
     for (int i = 0; i < 512; ++i) {
       if (i & 7 && label(i) == label(i - 1))
@@ -181,7 +159,7 @@ class Components {
       label_.insert(label_.end(), found[b].labels.begin(), found[b].labels.end());
       size_.insert(size_.end(), found[b].sizes.begin(), found[b].sizes.end());
     }
-    sets_.resize(label_.size());
+    sets_ = DisjointSets(label_.size());
   }
 
   void join_blocks() {
@@ -251,7 +229,7 @@ class Components {
   std::vector<std::uint32_t> first_;             ///< by block its first component
   std::vector<std::uint32_t> label_, size_;      ///< by component
   std::vector<std::uint64_t> total_;             ///< by the component that stands for a set
-  Sets sets_;
+  DisjointSets sets_;
 };
 
 }  // namespace

@@ -4,9 +4,9 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
-#include <numeric>
 #include <tuple>
 
+#include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/groups.h"
 
 namespace hermesh {
@@ -16,33 +16,6 @@ bool same_winding(const Triangle& t, const Triangle& sorted) {
   const auto start = static_cast<std::size_t>(std::find(t.begin(), t.end(), sorted[0]) - t.begin());
   return t[(start + 1) % 3] == sorted[1];
 }
-
-/// Sets of cancelling faces that edges connect, by their first.
-class Walls {
- public:
-  explicit Walls(std::size_t count) : first_(count), balance_(count, 0) {
-    std::iota(first_.begin(), first_.end(), 0u);
-  }
-  std::uint32_t first(std::uint32_t wall) {
-    while (first_[wall] != wall) wall = first_[wall] = first_[first_[wall]];
-    return wall;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = first(a);
-    b = first(b);
-    if (a != b) first_[std::max(a, b)] = std::min(a, b);
-  }
-  /// Odd edges that are there with the faces and not without, less those that are there without and not with.
-  std::int64_t& balance(std::uint32_t wall) { return balance_[wall]; }
-  void add_up() {
-    for (std::uint32_t i = 0; i < first_.size(); ++i)
-      if (first(i) != i) balance_[first(i)] += balance_[i];
-  }
-
- private:
-  std::vector<std::uint32_t> first_;
-  std::vector<std::int64_t> balance_;
-};
 
 }  // namespace
 
@@ -108,7 +81,10 @@ std::vector<std::uint32_t> find_double_walls(std::span<const Triangle> triangles
     }
   }
   tbb::parallel_sort(edges.begin(), edges.end());
-  Walls walls(duplicates.cancelling.size());
+  DisjointSets walls(duplicates.cancelling.size());
+  // By wall, later by set: odd edges that are there with the faces and not without, less those that are there
+  // without and not with.
+  std::vector<std::int64_t> balance(walls.size());
   for_groups(
       std::span<const Edge>(edges),
       [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
@@ -117,12 +93,13 @@ std::vector<std::uint32_t> find_double_walls(std::span<const Triangle> triangles
         std::size_t count = 0;
         while (count < same.size() && same[count].wall != kSingle)
           walls.join(same[0].wall, same[count++].wall);
-        if (count % 2 == 1) walls.balance(same[0].wall) += (same.size() - count) % 2 == 0 ? 1 : -1;
+        if (count % 2 == 1) balance[same[0].wall] += (same.size() - count) % 2 == 0 ? 1 : -1;
       });
-  walls.add_up();
+  for (std::uint32_t i = 0; i < walls.size(); ++i)
+    if (walls.find(i) != i) balance[walls.find(i)] += balance[i];
   std::vector<std::uint32_t> result;
   for (std::uint32_t i = 0; i < duplicates.cancelling.size(); ++i)
-    if (walls.balance(walls.first(i)) > 0) result.push_back(duplicates.cancelling[i]);
+    if (balance[walls.find(i)] > 0) result.push_back(duplicates.cancelling[i]);
   return result;
 }
 

@@ -1,8 +1,8 @@
 #include "algorithms/voxelization/regions.h"
 
 #include <memory>
-#include <numeric>
 
+#include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/parallel.h"
 
 namespace hermesh {
@@ -83,24 +83,6 @@ void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& 
   }
 }
 
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  /// The smaller number stays the root, so that roots do not depend on the order of calls.
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
 /// Blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level
 /// below, and the components are those of the cells without a block.
 struct Level {
@@ -152,7 +134,7 @@ class Hierarchy {
       level.node = node;
       node += std::uint32_t(level.components.size());
     }
-    sets_ = UnionFind(node);
+    sets_ = DisjointSets(node);
     for (std::size_t l = 0; l < levels_.size(); ++l) connect(l);
   }
 
@@ -219,7 +201,7 @@ class Hierarchy {
   void connect_to_empty(std::size_t l, std::uint32_t block, int axis, int side, std::uint32_t node) {
     const Level& level = levels_[l];
     for (std::uint32_t c = level.first[block]; c < level.first[block + 1]; ++c)
-      if (face(level.components[c], axis, side)) sets_.unite(level.node + c, node);
+      if (face(level.components[c], axis, side)) sets_.join(level.node + c, node);
   }
 
   void connect_blocks(std::size_t l, std::uint32_t lower, std::uint32_t upper, int axis) {
@@ -234,7 +216,7 @@ class Hierarchy {
       const std::uint64_t side = face(level.components[a], axis, 1) & open;
       if (!side) continue;
       for (std::uint32_t b = level.first[upper]; b < level.first[upper + 1]; ++b)
-        if (side & face(level.components[b], axis, 0)) sets_.unite(level.node + a, level.node + b);
+        if (side & face(level.components[b], axis, 0)) sets_.join(level.node + a, level.node + b);
     }
   }
 
@@ -243,7 +225,7 @@ class Hierarchy {
   std::vector<const BlockTable*> tables_;  ///< tables_[l] numbers the blocks of level l
   std::vector<std::unique_ptr<BlockTable>> own_;
   std::vector<Level> levels_;
-  UnionFind sets_{0};
+  DisjointSets sets_;
 };
 
 }  // namespace
