@@ -1,6 +1,5 @@
 #include <Eigen/LU>
 #include <algorithm>
-#include <bit>
 
 #include "algorithms/core/variant.h"
 #include "algorithms/fracture/cutters.h"
@@ -65,10 +64,7 @@ class MeshCutters : public Cutters {
     if (!test(edges[axis], sample)) return std::nullopt;
     std::size_t rank = leaf->first;
     for (int a = 0; a < axis; ++a) rank += static_cast<std::size_t>(hermesh::count(edges[a]));
-    for (int word = 0; word < sample >> 6; ++word)
-      rank += static_cast<std::size_t>(std::popcount(edges[axis][word]));
-    rank += static_cast<std::size_t>(
-        std::popcount(edges[axis][sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+    rank += rank_in(edges[axis], sample);
     return CutCrossing{solids_[k]->crossings[rank], static_cast<std::int32_t>(k)};
   }
 

@@ -244,7 +244,9 @@ class MergeProof {
   }
 
   /// So few that the other tests can be had in the same round, and not one after a split for every handful.
-  bool few_are_bold() const { return kFew * bold_sets().size() <= merged_.origin.size(); }
+  bool few_are_bold() const {
+    return kFew * static_cast<std::size_t>(std::ranges::count(bold_, 1)) <= merged_.origin.size();
+  }
 
   std::vector<std::uint32_t> bold_sets() const {
     std::vector<std::uint32_t> sets;
