@@ -67,8 +67,8 @@ struct LabelledFracture {
   std::uint64_t split_off = 0;
   std::uint64_t small_kept = 0;  ///< pieces that stayed below the least number of samples
   RepairReport repair;
-  std::uint64_t met_joints =
-      0;  ///< of several sheets whose polygons met others, and which have one sheet instead
+  /// Cells that are to have one sheet because polygons at or beside them met others.
+  std::uint64_t met_joints = 0;
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
   std::size_t grid_bytes = 0;  ///< labels, codes and crossings
 

@@ -16,7 +16,7 @@ using Voxel = std::array<std::int32_t, 3>;
 constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away. What is filed around a block holds all that is as
-/// near.
+/// near: a bin farther on begins nine voxels away, and a small triangle reaches two beyond its bin (BinBox).
 constexpr std::int32_t kFar[] = {2, 6};
 
 struct Pocket {
