@@ -42,7 +42,8 @@ template <class Entry>
 VariantEntry read_variant(const Section& file, const toml::node& node, const std::string& kind,
                           std::span<const Entry> table) {
   const Section section(file.file(), file.table(node, "a " + kind), "a " + kind,
-                        {"name", "label", "options", "uniform"});
+                        kind == "variant" ? std::vector<std::string>{"name", "label", "options", "uniform"}
+                                          : std::vector<std::string>{"name", "label", "options"});
   VariantEntry entry;
   entry.name = section.text("name");
   const auto known =

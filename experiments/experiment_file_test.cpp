@@ -228,6 +228,7 @@ TEST_F(ExperimentFile, MistakesOfVoxelizationNameTheirLine) {
       {6, "name = \"plane\"", "no voxelizer \"plane\"; there are plain"},
       {9, "", ""},  // the label is used twice
       {10, "options = { mood = \"fast\" }", "mood"},
+      {10, "uniform = \"plain\"", "unknown key \"uniform\""},
       {14, "case = \"bell\"", "no case"},
       {15, "x = \"sweep\"", "no column"},
       {19, "logarithm = true", "unknown key"},

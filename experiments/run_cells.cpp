@@ -168,11 +168,12 @@ class Group {
       options.dihedral_degrees = *in_.experiment.features;
     }
     validation::MeshReport report;
+    MeshFile mesh;
     cell.row["judge_seconds"] = timed([&] {
-      const MeshFile mesh = read_mesh_file(cell.mesh_file, child);
+      mesh = read_mesh_file(cell.mesh_file, child);
       report = validation::judge(mesh, options, child);
-      if (!cell.uniform.empty()) compare_with_uniform(mesh, cell, child);
     });
+    if (!cell.uniform.empty()) compare_with_uniform(mesh, cell, child);
     cell.row["report"] = validation::to_json(report);
 
     const Promises& promises = cell.extractor->promises;
