@@ -14,6 +14,7 @@
 
 #include "algorithms/core/block_table.h"
 #include "algorithms/core/error.h"
+#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -53,30 +54,46 @@ Bounds joined(Bounds a, const Bounds& b) {
 /// What one pass over the polygons tells.
 struct Measured {
   Bounds box;       ///< of the corners, relative to the mesh's origin; not finite when a corner is not
-  double area = 0;  ///< world units
+  double area = 0;  ///< world units; no number when a corner is none
+};
+
+/// The corners of one polygon after the other, in single precision, as they come.
+class Measure {
+ public:
+  void add(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
+    low_ = low_.min(a.array()).min(b.array()).min(c.array());
+    high_ = high_.max(a.array()).max(b.array()).max(c.array());
+    const Eigen::Vector3d p = a.cast<double>();
+    area_ += 0.5 * (b.cast<double>() - p).cross(c.cast<double>() - p).norm();
+  }
+  Measured result() const {
+    // Comparisons pass over a coordinate that is no number, but every one of them goes into the area.
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const Eigen::Array3f high = std::isnan(area_) ? Eigen::Array3f::Constant(nan) : high_;
+    return {{low_.matrix().cast<double>(), high.matrix().cast<double>()}, area_};
+  }
+
+ private:
+  Eigen::Array3f low_ = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity()), high_ = -low_;
+  double area_ = 0;
 };
 
 Measured measure(const PolygonMesh& mesh) {
-  const std::size_t triangles = mesh.triangles.size(), n = mesh.triangle_count();
+  const std::size_t triangles = mesh.triangles.size(), n = triangles + mesh.quads.size();
   std::vector<Measured> parts((n + kChunk - 1) / kChunk);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
-    Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
-    bool finite = true;
-    for (std::size_t i = part * kChunk; i < std::min(n, (part + 1) * kChunk); ++i) {
-      const Quad* quad = i < triangles ? nullptr : &mesh.quads[(i - triangles) / 2];
-      const bool second = quad && (i - triangles) % 2 == 1;
-      const Eigen::Vector3f& a = mesh.points[quad ? (*quad)[0] : mesh.triangles[i][0]];
-      const Eigen::Vector3f& b = mesh.points[quad ? (*quad)[second ? 2 : 1] : mesh.triangles[i][1]];
-      const Eigen::Vector3f& c = mesh.points[quad ? (*quad)[second ? 3 : 2] : mesh.triangles[i][2]];
-      finite = finite && a.allFinite() && b.allFinite() && c.allFinite();
-      low = low.cwiseMin(a).cwiseMin(b).cwiseMin(c);
-      high = high.cwiseMax(a).cwiseMax(b).cwiseMax(c);
-      const Eigen::Vector3d p = a.cast<double>();
-      parts[part].area += 0.5 * (b.cast<double>() - p).cross(c.cast<double>() - p).norm();
+    const std::size_t begin = part * kChunk, end = std::min(n, begin + kChunk);
+    Measure measure;
+    for (std::size_t i = begin; i < std::min(end, triangles); ++i) {
+      const Triangle& t = mesh.triangles[i];
+      measure.add(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
     }
-    if (!finite) high.setConstant(std::numeric_limits<float>::quiet_NaN());
-    parts[part].box.lower = low.cast<double>();
-    parts[part].box.upper = high.cast<double>();
+    for (std::size_t i = std::max(begin, triangles); i < end; ++i) {
+      const Quad& q = mesh.quads[i - triangles];
+      measure.add(mesh.points[q[0]], mesh.points[q[1]], mesh.points[q[2]]);
+      measure.add(mesh.points[q[0]], mesh.points[q[2]], mesh.points[q[3]]);
+    }
+    parts[part] = measure.result();
   });
   Measured all;
   for (const Measured& part : parts) {
@@ -95,8 +112,8 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
     for (std::size_t i = part * kChunk; i < std::min(mesh.points.size(), (part + 1) * kChunk); ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
-        block[std::size_t(axis)] = std::int32_t(
-            std::floor(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex)));
+        block[std::size_t(axis)] =
+            floor_to_int(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex));
       parts[part].insert(block);
     }
   });
