@@ -1,10 +1,13 @@
 #include "algorithms/voxelization/pockets.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
-#include <utility>
+#include <unordered_set>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/voxelization/segment.h"
+#include "algorithms/core/rounding.h"
+#include "algorithms/voxelization/cell_obstacles.h"
 
 namespace hermesh {
 namespace {
@@ -15,9 +18,17 @@ using Voxel = std::array<std::int32_t, 3>;
 /// More voxels than this are no pocket.
 constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
-/// than a voxel the next voxel in it may be some away. What is filed around a block holds all that is as
-/// near: a bin farther on begins nine voxels away, and a small triangle reaches two beyond its bin (BinBox).
+/// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
+/// Steps to a voxel of the ways with bends, one after the other for those that found none, and how many places they may
+/// lead to, for all pockets together, so that this takes a second or two at most. Many thousands of pockets are no crevices, but what
+/// parts of a model enclose between them where they intersect.
+constexpr std::int32_t kSteps[] = {4, 8, 16};
+constexpr std::size_t kMostPlaces = 2'000'000;
+/// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
+const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
+/// Blocks whose triangles a thread keeps.
+constexpr std::size_t kKept = 27;
 
 struct Pocket {
   std::uint32_t region = 0;
@@ -31,7 +42,11 @@ class PocketOpener {
  public:
   PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
                Regions& regions, const RunContext& context)
-      : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context) {}
+      : bins_(bins),
+        blocks_(blocks),
+        regions_(regions),
+        context_(context),
+        obstacles_([&] { return CellObstacles(soup, bins, kKept); }) {}
 
   void run() {
     find_pockets();
@@ -56,6 +71,7 @@ class PocketOpener {
       }
       opened_.clear();
     }
+    for (const std::int32_t steps : kSteps) open_bent_ones(steps, open);
     for (BlockComponent& component : regions_.components)
       if (open[component.region]) component.region = Regions::kOutside;
   }
@@ -100,9 +116,70 @@ class PocketOpener {
     tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
       context_.check();
       const std::vector<Voxel>& voxels = pockets_[asked[i]].voxels;
-      sees[i] = std::any_of(voxels.begin(), voxels.end(), [&](const Voxel& voxel) { return sees_goal(voxel); });
+      CellObstacles& obstacles = obstacles_.local();
+      sees[i] = std::any_of(voxels.begin(), voxels.end(),
+                            [&](const Voxel& voxel) { return sees_goal(voxel, obstacles); });
     });
     return sees;
+  }
+
+  /// Opens those that a way with bends leads out of, in steps of a fraction of a voxel.
+  void open_bent_ones(std::int32_t steps, std::vector<char>& open) {
+    const std::vector<std::uint32_t> closed = closed_ones(open);
+    if (closed.empty()) return;
+    goals_ = open;
+    const std::size_t most = kMostPlaces / closed.size();
+    std::vector<char> leads_out(closed.size(), 0);
+    tbb::parallel_for(std::size_t(0), closed.size(), [&](std::size_t i) {
+      context_.check();
+      leads_out[i] = way_leads_out(pockets_[closed[i]], steps, most, obstacles_.local());
+    });
+    for (std::size_t i = 0; i < closed.size(); ++i)
+      if (leads_out[i]) open[pockets_[closed[i]].region] = 1;
+  }
+
+  /// Whether the first voxel of a large region that the ways from a pocket come to is a goal. Where it is not, there is
+  /// a hole in the solid, which must not be emptied.
+  bool way_leads_out(const Pocket& pocket, std::int32_t steps, std::size_t most, CellObstacles& obstacles) const {
+    using Place = std::array<std::int32_t, 3>;  // in steps from the pocket's first voxel
+    const Voxel& origin = pocket.voxels.front();
+    const auto code = [](const Place& p) {
+      std::uint64_t result = 0;
+      for (const std::int32_t at : p) result = result << 21 | (std::uint32_t(at) & 0x1fffff);
+      return result;
+    };
+    const auto voxel_below = [&](const Place& p) {
+      Voxel voxel;
+      for (std::size_t a = 0; a < 3; ++a) voxel[a] = origin[a] + floor_to_int(double(p[a]) / steps);
+      return voxel;
+    };
+    const auto is_free = [&](const Place& from, const Place& to) {
+      const Vector3d begin = position(origin) + position(from) / steps, end = position(origin) + position(to) / steps;
+      const Voxel cell = voxel_below(std::min(from, to));
+      return obstacles.is_free_in(cell, begin, end) && obstacles.is_free_in(cell, begin, end + kAside);
+    };
+    std::vector<Place> places;
+    std::unordered_set<std::uint64_t> known;
+    const auto add = [&](const Place& place) {
+      known.insert(code(place));
+      places.push_back(place);
+    };
+    for (const Voxel& v : pocket.voxels)
+      add({(v[0] - origin[0]) * steps, (v[1] - origin[1]) * steps, (v[2] - origin[2]) * steps});
+    for (std::size_t next = 0; next < places.size() && places.size() < most; ++next) {
+      const Place from = places[next];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        for (const std::int32_t step : {-1, 1}) {
+          Place to = from;
+          to[axis] += step;
+          if (known.contains(code(to)) || !is_free(from, to)) continue;
+          add(to);
+          if ((to[0] | to[1] | to[2]) & (steps - 1)) continue;
+          const std::uint32_t region = region_of(voxel_below(to));
+          if (region == Regions::kOutside || !is_pocket_[region]) return goals_[region];
+        }
+    }
+    return false;
   }
 
   void find_pockets() {
@@ -112,12 +189,14 @@ class PocketOpener {
         size[component.region] += std::size_t(__builtin_popcountll(word));
     std::vector<std::uint32_t> number(regions_.count, BlockTable::kNone);
     pockets_in_.resize(blocks_.size());
+    is_pocket_.assign(regions_.count, 0);
     for (std::size_t i = 0; i < blocks_.size(); ++i)
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
         const BlockComponent& component = regions_.components[c];
         if (component.region == Regions::kOutside || size[component.region] > kMost) continue;
         if (number[component.region] == BlockTable::kNone) {
           number[component.region] = std::uint32_t(pockets_.size());
+          is_pocket_[component.region] = 1;
           pockets_.push_back({component.region, {}, {}});
         }
         Pocket& pocket = pockets_[number[component.region]];
@@ -135,19 +214,21 @@ class PocketOpener {
       }
   }
 
-  bool is_goal(const Voxel& voxel) const {
+  /// The region without blocks is the outside; large solids have such space, too, but no pocket is as far away.
+  std::uint32_t region_of(const Voxel& voxel) const {
     const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
-    if (i == BlockTable::kNone) return false;
+    if (i == BlockTable::kNone) return Regions::kOutside;
     const unsigned place = place_in_tile(voxel);
     for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-      if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)
-        return goals_[regions_.components[c].region];
-    return false;
+      if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1) return regions_.components[c].region;
+    return Regions::kOutside;
+  }
+  bool is_goal(const Voxel& voxel) const {
+    if (bins_.blocks().find(tile_of(voxel)) == BlockTable::kNone) return false;
+    return goals_[region_of(voxel)];
   }
 
-  bool sees_goal(const Voxel& voxel) const {
-    std::vector<Obstacle> obstacles;
-    bool looked = false;
+  bool sees_goal(const Voxel& voxel, CellObstacles& obstacles) const {
     const Vector3d from = position(voxel);
     // Near ones first.
     for (std::int32_t far = 1; far <= far_; ++far)
@@ -156,59 +237,22 @@ class PocketOpener {
           for (std::int32_t z = -far; z <= far; ++z) {
             if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
             const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (!is_goal(other)) continue;
-            if (!std::exchange(looked, true)) obstacles = obstacles_near(voxel);
-            if (free(from, position(other), obstacles)) return true;
+            if (is_goal(other) && is_free(from, position(other), obstacles)) return true;
           }
     return false;
   }
 
-  /// Leaves what is in the way in front, since it is often in the way to the next voxel, too.
-  static bool free(const Vector3d& from, const Vector3d& to, std::vector<Obstacle>& obstacles) {
-    // A triangle in whose plane the way lies is met by no test, so the way is taken a little to one side.
-    const Vector3d aside = to + Vector3d(1.1e-5, 1.7e-5, 2.3e-5);
-    const auto met = std::find_if(obstacles.begin(), obstacles.end(), [&](const Obstacle& o) {
-      return o.meeting(from, to) >= 0 || o.meeting(from, aside) >= 0;
-    });
-    if (met == obstacles.end()) return true;
-    std::iter_swap(obstacles.begin(), met);
-    return false;
+  static bool is_free(const Vector3d& from, const Vector3d& to, CellObstacles& obstacles) {
+    return obstacles.is_free(from, to) && obstacles.is_free(from, to + kAside);
   }
 
-  std::vector<Obstacle> obstacles_near(const Voxel& voxel) const {
-    const Vector3d at = position(voxel), reach = Vector3d::Constant(far_ + 0.01);
-    std::vector<Obstacle> obstacles;
-    const auto add = [&](std::uint32_t t) {
-      const Facet facet(soup_.corners(t));
-      if ((facet.low().array() <= (at + reach).array()).all() &&
-          (facet.high().array() >= (at - reach).array()).all())
-        obstacles.emplace_back(facet);
-    };
-    const BlockAt block = tile_of(voxel);
-    VoxelBox near;
-    for (std::size_t a = 0; a < 3; ++a) {
-      near.low[a] = voxel[a] - reach[0];
-      near.high[a] = voxel[a] + reach[0];
-    }
-    bins_.for_each_cluster(block, near, [&](const TriangleBins::Cluster& cluster) {
-      for (const std::uint32_t t : cluster.triangles) add(t);
-    });
-    // A large triangle some voxels away may be filed under the blocks around only.
-    for (std::int32_t x = -1; x <= 1; ++x)
-      for (std::int32_t y = -1; y <= 1; ++y)
-        for (std::int32_t z = -1; z <= 1; ++z)
-          if (const std::uint32_t i = bins_.blocks().find({block[0] + x, block[1] + y, block[2] + z});
-              i != BlockTable::kNone)
-            for (const std::uint32_t t : bins_.large(i)) add(t);
-    return obstacles;
-  }
-
-  const IndexSoup& soup_;
   const TriangleBins& bins_;
   const std::vector<BlockAt>& blocks_;
   Regions& regions_;
   const RunContext& context_;
+  mutable tbb::enumerable_thread_specific<CellObstacles> obstacles_;
   std::vector<Pocket> pockets_;
+  std::vector<char> is_pocket_;  ///< by region
   std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< by block
   std::vector<std::uint32_t> opened_;                   ///< in the last round
   std::int32_t far_ = 0;

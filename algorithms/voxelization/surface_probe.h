@@ -1,13 +1,10 @@
 // What is on either side of a place of the surface, as far as straight ways that meet no triangle tell.
 #pragma once
 
-#include <map>
-#include <memory>
 #include <vector>
 
+#include "algorithms/voxelization/cell_obstacles.h"
 #include "algorithms/voxelization/regions.h"
-#include "algorithms/voxelization/segment.h"
-#include "algorithms/voxelization/triangle_bins.h"
 #include "algorithms/voxelization/winding_number.h"
 
 namespace hermesh {
@@ -23,33 +20,24 @@ class SurfaceProbe {
   /// spaces to where they are wider, and asks `winding`, unless that is null, about those that do not widen.
   SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
                bool thorough, const WindingNumber* winding);
-  ~SurfaceProbe();
-  SurfaceProbe(SurfaceProbe&&) noexcept;
 
   /// Whether the solid is on both sides of the surface at q with this unit normal.
   Side side(const Eigen::Vector3d& q, const Eigen::Vector3d& normal);
 
  private:
-  using Voxel = std::array<std::int32_t, 3>;
-  struct Neighbourhood;
+  using Voxel = CellObstacles::Voxel;
 
-  const Neighbourhood& neighbourhood_of(const Voxel& cell);
   int inside_at(const Voxel& voxel);
   Side seen_from(const Eigen::Vector3d& p);
-  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
   double centre(Eigen::Vector3d& p, const Eigen::Vector3d& normal);
   Side follow(Eigen::Vector3d p, const Eigen::Vector3d& normal);
   bool is_wound_about(const Eigen::Vector3d& p) const;
 
-  const IndexSoup& soup_;
-  const TriangleBins& bins_;
   const std::vector<VoxelBits>& inside_;
   bool thorough_;
   const WindingNumber* winding_;
   BlockFinder finder_;
-  std::map<BlockAt, std::unique_ptr<Neighbourhood>> blocks_;
-  const Neighbourhood* last_ = nullptr;
-  BlockAt last_block_{};
+  CellObstacles obstacles_;
 };
 
 }  // namespace hermesh

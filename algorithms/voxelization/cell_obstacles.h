@@ -1,0 +1,48 @@
+// Whether straight ways of some voxels are free of triangles.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "algorithms/voxelization/segment.h"
+#include "algorithms/voxelization/triangle_bins.h"
+
+namespace hermesh {
+
+/// The triangles by the cell up from each voxel that they touch, block by block as they are asked for. Each thread has
+/// its own.
+class CellObstacles {
+ public:
+  /// Coordinates of a voxel, and of the cell up from it.
+  using Voxel = std::array<std::int32_t, 3>;
+
+  /// Keeps references, and the cells of at most `kept` blocks.
+  CellObstacles(const IndexSoup& soup, const TriangleBins& bins, std::size_t kept);
+  ~CellObstacles();
+  CellObstacles(CellObstacles&&) noexcept;
+
+  /// Whether no triangle that touches the cell is in the way. Enough for ways that do not leave it.
+  bool is_free_in(const Voxel& cell, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+  /// Whether no triangle is in the way, which ends at once where one is.
+  bool is_free(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+  /// How much of the way, of no more than some voxels, no triangle is in: 1 if none is.
+  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
+ private:
+  struct Block;
+  const Block& block_of(const Voxel& cell);
+  void remember(const Obstacle& met);
+
+  const IndexSoup& soup_;
+  const TriangleBins& bins_;
+  std::size_t kept_;
+  std::map<BlockAt, std::unique_ptr<Block>> blocks_;
+  const Block* last_ = nullptr;
+  BlockAt last_at_{};
+  /// What was in the way lately is often in the way again.
+  std::vector<Obstacle> met_;
+  std::size_t oldest_ = 0;
+};
+
+}  // namespace hermesh
