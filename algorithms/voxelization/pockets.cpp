@@ -21,10 +21,10 @@ constexpr std::size_t kMost = 64;
 /// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
 /// Steps to a voxel of the ways with bends, one after the other for those that found none, and how many places they may
-/// lead to, for all pockets together, so that this takes a second or two at most. Many thousands of pockets are no crevices, but what
-/// parts of a model enclose between them where they intersect.
+/// lead to, for all pockets together: some tenths of a second. Many thousands of pockets are no crevices, but what parts
+/// of a model enclose between them where they intersect.
 constexpr std::int32_t kSteps[] = {4, 8, 16};
-constexpr std::size_t kMostPlaces = 2'000'000;
+constexpr std::size_t kMostPlaces = 500'000;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
@@ -125,22 +125,33 @@ class PocketOpener {
 
   /// Opens those that a way with bends leads out of, in steps of a fraction of a voxel.
   void open_bent_ones(std::int32_t steps, std::vector<char>& open) {
-    const std::vector<std::uint32_t> closed = closed_ones(open);
-    if (closed.empty()) return;
     goals_ = open;
-    const std::size_t most = kMostPlaces / closed.size();
-    std::vector<char> leads_out(closed.size(), 0);
-    tbb::parallel_for(std::size_t(0), closed.size(), [&](std::size_t i) {
+    std::vector<char> known(pockets_.size(), 0);
+    std::size_t left = kMostPlaces;
+    for (const std::uint32_t pocket : closed_ones(open)) {
+      if (known[pocket] || left == 0) continue;
       context_.check();
-      leads_out[i] = way_leads_out(pockets_[closed[i]], steps, most, obstacles_.local());
-    });
-    for (std::size_t i = 0; i < closed.size(); ++i)
-      if (leads_out[i]) open[pockets_[closed[i]].region] = 1;
+      const Ways ways = follow_ways(pockets_[pocket], steps, left);
+      left -= std::min(left, ways.places);
+      // What holds for a pocket holds for all that its ways lead to.
+      for (const std::uint32_t region : ways.regions) {
+        known[pocket_of_[region]] = 1;
+        if (ways.lead_out) open[region] = 1;
+      }
+    }
   }
 
-  /// Whether the first voxel of a large region that the ways from a pocket come to is a goal. Where it is not, there is
-  /// a hole in the solid, which must not be emptied.
-  bool way_leads_out(const Pocket& pocket, std::int32_t steps, std::size_t most, CellObstacles& obstacles) const {
+  struct Ways {
+    bool lead_out = false;
+    std::size_t places = 0;               ///< that they lead to
+    std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
+  };
+
+  /// They lead out if they come to a goal before any other large region. Where they do not, there is a hole in the
+  /// solid, which must not be emptied.
+  Ways follow_ways(const Pocket& pocket, std::int32_t steps, std::size_t most) {
+    CellObstacles& obstacles = obstacles_.local();
+    Ways ways{.lead_out = false, .places = 0, .regions = {pocket.region}};
     using Place = std::array<std::int32_t, 3>;  // in steps from the pocket's first voxel
     const Voxel& origin = pocket.voxels.front();
     const auto code = [](const Place& p) {
@@ -174,12 +185,17 @@ class PocketOpener {
           to[axis] += step;
           if (known.contains(code(to)) || !is_free(from, to)) continue;
           add(to);
+          ways.places = places.size();
           if ((to[0] | to[1] | to[2]) & (steps - 1)) continue;
           const std::uint32_t region = region_of(voxel_below(to));
-          if (region == Regions::kOutside || !is_pocket_[region]) return goals_[region];
+          if (goals_[region] || pocket_of_[region] == BlockTable::kNone) {
+            ways.lead_out = goals_[region];
+            return ways;
+          }
+          if (region != ways.regions.back()) ways.regions.push_back(region);
         }
     }
-    return false;
+    return ways;
   }
 
   void find_pockets() {
@@ -187,21 +203,19 @@ class PocketOpener {
     for (const BlockComponent& component : regions_.components)
       for (const std::uint64_t word : component.voxels)
         size[component.region] += std::size_t(__builtin_popcountll(word));
-    std::vector<std::uint32_t> number(regions_.count, BlockTable::kNone);
+    pocket_of_.assign(regions_.count, BlockTable::kNone);
     pockets_in_.resize(blocks_.size());
-    is_pocket_.assign(regions_.count, 0);
     for (std::size_t i = 0; i < blocks_.size(); ++i)
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
         const BlockComponent& component = regions_.components[c];
         if (component.region == Regions::kOutside || size[component.region] > kMost) continue;
-        if (number[component.region] == BlockTable::kNone) {
-          number[component.region] = std::uint32_t(pockets_.size());
-          is_pocket_[component.region] = 1;
+        if (pocket_of_[component.region] == BlockTable::kNone) {
+          pocket_of_[component.region] = std::uint32_t(pockets_.size());
           pockets_.push_back({component.region, {}, {}});
         }
-        Pocket& pocket = pockets_[number[component.region]];
+        Pocket& pocket = pockets_[pocket_of_[component.region]];
         pocket.blocks.push_back(std::uint32_t(i));
-        pockets_in_[i].push_back(number[component.region]);
+        pockets_in_[i].push_back(pocket_of_[component.region]);
         add_voxels(blocks_[i], component.voxels, pocket.voxels);
       }
   }
@@ -252,7 +266,7 @@ class PocketOpener {
   const RunContext& context_;
   mutable tbb::enumerable_thread_specific<CellObstacles> obstacles_;
   std::vector<Pocket> pockets_;
-  std::vector<char> is_pocket_;  ///< by region
+  std::vector<std::uint32_t> pocket_of_;  ///< by region, kNone for large ones
   std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< by block
   std::vector<std::uint32_t> opened_;                   ///< in the last round
   std::int32_t far_ = 0;
