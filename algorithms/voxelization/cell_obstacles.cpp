@@ -45,12 +45,11 @@ struct CellObstacles::Block {
     return nullptr;
   }
 
-  /// Where the first triangle of the cell is in the way; 1 if none is.
-  double free_part(unsigned cell, const Vector3d& from, const Vector3d& to) const {
-    double part = 1.0;
+  /// Makes a triangle of the cell the first one met if it is.
+  void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& first) const {
     for (const std::uint32_t i : cells[cell])
-      if (const double along = obstacles[i].meeting(from, to); along >= 0) part = std::min(part, along);
-    return part;
+      if (const double along = obstacles[i].meeting(from, to); along >= 0 && along < first.part)
+        first = {along, obstacles[i].faces(from)};
   }
 
  private:
@@ -121,13 +120,13 @@ void CellObstacles::remember(const Obstacle& met) {
   }
 }
 
-double CellObstacles::free_part(const Vector3d& from, const Vector3d& to) {
-  double part = 1.0;
+CellObstacles::Met CellObstacles::first_met(const Vector3d& from, const Vector3d& to) {
+  Met first;
   all_cells(from, to, [&](const Voxel& cell) {
-    part = std::min(part, block_of(cell).free_part(place_in_tile(cell), from, to));
+    block_of(cell).meet(place_in_tile(cell), from, to, first);
     return true;
   });
-  return part;
+  return first;
 }
 
 }  // namespace hermesh

@@ -27,7 +27,14 @@ class CellObstacles {
   /// Whether no triangle is in the way, which ends at once where one is.
   bool is_free(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
   /// How much of the way, of no more than some voxels, no triangle is in: 1 if none is.
-  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to) { return first_met(from, to).part; }
+
+  struct Met {
+    double part = 1.0;       ///< of the way, up to the triangle
+    bool faces_from = false;  ///< the triangle is wound counter-clockwise seen from where the way begins
+  };
+  /// The first triangle in the way.
+  Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
  private:
   struct Block;

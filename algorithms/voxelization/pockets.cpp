@@ -131,6 +131,7 @@ class PocketOpener {
     for (const std::uint32_t pocket : closed_ones(open)) {
       if (known[pocket] || left == 0) continue;
       context_.check();
+      if (!may_be_outside(pockets_[pocket])) continue;
       const Ways ways = follow_ways(pockets_[pocket], steps, left);
       left -= std::min(left, ways.places);
       // What holds for a pocket holds for all that its ways lead to.
@@ -139,6 +140,19 @@ class PocketOpener {
         if (ways.lead_out) open[region] = 1;
       }
     }
+  }
+
+  /// Whether the triangles around the first voxel face it more often than not. What is inside of a thin wall is many
+  /// pockets, and to follow all ways within it would take longer than all the rest.
+  bool may_be_outside(const Pocket& pocket) {
+    const Vector3d from = position(pocket.voxels.front());
+    int facing = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double step : {-1.0, 1.0}) {
+        const CellObstacles::Met met = obstacles_.local().first_met(from, from + step * Vector3d::Unit(axis));
+        if (met.part < 1.0) facing += met.faces_from ? 1 : -1;
+      }
+    return facing >= 0;
   }
 
   struct Ways {

@@ -61,6 +61,8 @@ class Obstacle {
     if (std::min(a, b) > slack_ || std::max(a, b) < -slack_) return -1.0;
     return hermesh::meeting(from, to, facet_);
   }
+  /// Whether p is on the side that the triangle is wound counter-clockwise on.
+  bool faces(const Eigen::Vector3d& p) const { return normal_.dot(p) > offset_; }
 
  private:
   static constexpr double kMargin = 1e-6;
