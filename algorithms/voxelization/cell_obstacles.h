@@ -30,7 +30,7 @@ class CellObstacles {
   double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to) { return first_met(from, to).part; }
 
   struct Met {
-    double part = 1.0;       ///< of the way, up to the triangle
+    double part = 1.0;        ///< of the way, up to the triangle
     bool faces_from = false;  ///< the triangle is wound counter-clockwise seen from where the way begins
   };
   /// The first triangle in the way.

@@ -157,7 +157,7 @@ class PocketOpener {
 
   struct Ways {
     bool lead_out = false;
-    std::size_t places = 0;               ///< that they lead to
+    std::size_t places = 0;              ///< that they lead to
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
