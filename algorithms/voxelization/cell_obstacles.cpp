@@ -26,16 +26,17 @@ bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
 
 struct CellObstacles::Block {
   std::vector<Obstacle> obstacles;
+  std::vector<std::uint32_t> triangles;  ///< their numbers in the soup
   std::array<std::vector<std::uint32_t>, 512> cells;  ///< numbers of the obstacles, by place_in_tile()
 
   Block(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& at) {
     bins.for_each_cluster(at, around(at, 1.1), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > at[a] * 8.0 + 8.1 || cluster.box.high[a] < at[a] * 8.0 - 0.1) return;
-      for (const std::uint32_t t : cluster.triangles) add(Facet(soup.corners(t)), at);
+      for (const std::uint32_t t : cluster.triangles) add(soup, t, at);
     });
     if (const std::uint32_t i = bins.blocks().find(at); i != BlockTable::kNone)
-      for (const std::uint32_t t : bins.large(i)) add(Facet(soup.corners(t)), at);
+      for (const std::uint32_t t : bins.large(i)) add(soup, t, at);
   }
 
   /// One that is in the way, or null.
@@ -49,11 +50,12 @@ struct CellObstacles::Block {
   void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& first) const {
     for (const std::uint32_t i : cells[cell])
       if (const double along = obstacles[i].meeting(from, to); along >= 0 && along < first.part)
-        first = {along, obstacles[i].faces(from)};
+        first = {along, obstacles[i].faces(from), triangles[i]};
   }
 
  private:
-  void add(const Facet& facet, const BlockAt& at) {
+  void add(const IndexSoup& soup, std::uint32_t triangle, const BlockAt& at) {
+    const Facet facet(soup.corners(triangle));
     const Vector3d lowest = facet.low(), highest = facet.high();
     int from[3], to[3];
     for (int a = 0; a < 3; ++a) {
@@ -64,6 +66,7 @@ struct CellObstacles::Block {
     }
     const std::uint32_t number = std::uint32_t(obstacles.size());
     obstacles.emplace_back(facet);
+    triangles.push_back(triangle);
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
         for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
@@ -127,6 +130,13 @@ CellObstacles::Met CellObstacles::first_met(const Vector3d& from, const Vector3d
     return true;
   });
   return first;
+}
+
+std::vector<std::uint32_t> CellObstacles::triangles_in(const Voxel& cell) {
+  const Block& block = block_of(cell);
+  std::vector<std::uint32_t> numbers;
+  for (const std::uint32_t i : block.cells[place_in_tile(cell)]) numbers.push_back(block.triangles[i]);
+  return numbers;
 }
 
 }  // namespace hermesh

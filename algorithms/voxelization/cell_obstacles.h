@@ -32,9 +32,13 @@ class CellObstacles {
   struct Met {
     double part = 1.0;        ///< of the way, up to the triangle
     bool faces_from = false;  ///< the triangle is wound counter-clockwise seen from where the way begins
+    std::uint32_t triangle = 0;
   };
   /// The first triangle in the way.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
+  /// Numbers of the triangles that may touch a cell.
+  std::vector<std::uint32_t> triangles_in(const Voxel& cell);
 
  private:
   struct Block;

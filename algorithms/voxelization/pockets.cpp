@@ -3,6 +3,9 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
 #include <unordered_set>
 
 #include "algorithms/core/parallel.h"
@@ -20,11 +23,11 @@ constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
-/// Steps to a voxel of the ways with bends, one after the other for those that found none, and how many places they may
-/// lead to, for all pockets together: some tenths of a second. Many thousands of pockets are no crevices, but what parts
-/// of a model enclose between them where they intersect.
-constexpr std::int32_t kSteps[] = {4, 8, 16};
-constexpr std::size_t kMostPlaces = 500'000;
+/// How far from the walls the ways along them keep, in voxels: a crevice that is narrower is closed.
+constexpr double kHair = 1e-5;
+/// How many triangles the ways along walls may lead over, for all pockets together: some tenths of a second. Many
+/// thousands of pockets are no crevices, but what parts of a model enclose between them where they intersect.
+constexpr std::size_t kMostPlaces = 50'000;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
@@ -42,7 +45,8 @@ class PocketOpener {
  public:
   PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
                Regions& regions, const RunContext& context)
-      : bins_(bins),
+      : soup_(soup),
+        bins_(bins),
         blocks_(blocks),
         regions_(regions),
         context_(context),
@@ -71,7 +75,7 @@ class PocketOpener {
       }
       opened_.clear();
     }
-    for (const std::int32_t steps : kSteps) open_bent_ones(steps, open);
+    open_along_walls(open);
     for (BlockComponent& component : regions_.components)
       if (open[component.region]) component.region = Regions::kOutside;
   }
@@ -123,8 +127,8 @@ class PocketOpener {
     return sees;
   }
 
-  /// Opens those that a way with bends leads out of, in steps of a fraction of a voxel.
-  void open_bent_ones(std::int32_t steps, std::vector<char>& open) {
+  /// Opens those that a way along their walls leads out of.
+  void open_along_walls(std::vector<char>& open) {
     goals_ = open;
     std::vector<char> known(pockets_.size(), 0);
     std::size_t left = kMostPlaces;
@@ -132,7 +136,7 @@ class PocketOpener {
       if (known[pocket] || left == 0) continue;
       context_.check();
       if (!may_be_outside(pockets_[pocket])) continue;
-      const Ways ways = follow_ways(pockets_[pocket], steps, left);
+      const Ways ways = follow_walls(pockets_[pocket], left);
       left -= std::min(left, ways.places);
       // What holds for a pocket holds for all that its ways lead to.
       for (const std::uint32_t region : ways.regions) {
@@ -157,59 +161,103 @@ class PocketOpener {
 
   struct Ways {
     bool lead_out = false;
-    std::size_t places = 0;              ///< that they lead to
+    std::size_t places = 0;              ///< that they lead over
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
-  /// They lead out if they come to a goal before any other large region. Where they do not, there is a hole in the
-  /// solid, which must not be emptied.
-  Ways follow_ways(const Pocket& pocket, std::int32_t steps, std::size_t most) {
+  /// A hair's breadth above one side of a triangle.
+  struct Place {
+    std::uint32_t triangle = 0;
+    Vector3d up;  ///< the triangle's unit normal on that side
+    Vector3d at;
+  };
+
+  /// From triangle to triangle over their common edges, so that a crevice may be as narrow as it likes and bend as it
+  /// likes, but no way leads around the border of a hole. They lead out if a goal is seen from them before any other
+  /// large region. Where that comes first, there is a hole in the solid, which must not be emptied.
+  Ways follow_walls(const Pocket& pocket, std::size_t most) {
     CellObstacles& obstacles = obstacles_.local();
     Ways ways{.lead_out = false, .places = 0, .regions = {pocket.region}};
-    using Place = std::array<std::int32_t, 3>;  // in steps from the pocket's first voxel
-    const Voxel& origin = pocket.voxels.front();
-    const auto code = [](const Place& p) {
-      std::uint64_t result = 0;
-      for (const std::int32_t at : p) result = result << 21 | (std::uint32_t(at) & 0x1fffff);
-      return result;
-    };
-    const auto voxel_below = [&](const Place& p) {
-      Voxel voxel;
-      for (std::size_t a = 0; a < 3; ++a) voxel[a] = origin[a] + floor_to_int(double(p[a]) / steps);
-      return voxel;
-    };
-    const auto is_free = [&](const Place& from, const Place& to) {
-      const Vector3d begin = position(origin) + position(from) / steps, end = position(origin) + position(to) / steps;
-      const Voxel cell = voxel_below(std::min(from, to));
-      return obstacles.is_free_in(cell, begin, end) && obstacles.is_free_in(cell, begin, end + kAside);
-    };
     std::vector<Place> places;
     std::unordered_set<std::uint64_t> known;
     const auto add = [&](const Place& place) {
-      known.insert(code(place));
-      places.push_back(place);
+      const bool front = normal_of(place.triangle).dot(place.up) > 0.0;
+      if (known.insert(std::uint64_t(place.triangle) * 2 + front).second) places.push_back(place);
     };
-    for (const Voxel& v : pocket.voxels)
-      add({(v[0] - origin[0]) * steps, (v[1] - origin[1]) * steps, (v[2] - origin[2]) * steps});
-    for (std::size_t next = 0; next < places.size() && places.size() < most; ++next) {
-      const Place from = places[next];
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        for (const std::int32_t step : {-1, 1}) {
-          Place to = from;
-          to[axis] += step;
-          if (known.contains(code(to)) || !is_free(from, to)) continue;
-          add(to);
-          ways.places = places.size();
-          if ((to[0] | to[1] | to[2]) & (steps - 1)) continue;
-          const std::uint32_t region = region_of(voxel_below(to));
-          if (goals_[region] || pocket_of_[region] == BlockTable::kNone) {
-            ways.lead_out = goals_[region];
-            return ways;
-          }
-          if (region != ways.regions.back()) ways.regions.push_back(region);
+    const auto add_met = [&](const Vector3d& from, const Vector3d& way) {
+      const CellObstacles::Met met = obstacles.first_met(from, from + way);
+      if (met.part >= 1.0) return;
+      const Vector3d up = (met.faces_from ? 1.0 : -1.0) * normal_of(met.triangle);
+      add({met.triangle, up, from + met.part * way + kHair * up});
+    };
+    const auto add_walls = [&](const Pocket& of) {
+      for (const Voxel& voxel : of.voxels)
+        for (int axis = 0; axis < 3; ++axis)
+          for (const double step : {-1.0, 1.0}) add_met(position(voxel), step * Vector3d::Unit(axis));
+    };
+    add_walls(pocket);
+    for (; ways.places < std::min(places.size(), most); ++ways.places) {
+      const Place from = places[ways.places];
+      const Voxel cell{floor_to_int(from.at[0]), floor_to_int(from.at[1]), floor_to_int(from.at[2])};
+      for (int corner = 0; corner < 8; ++corner) {
+        const Voxel voxel{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)};
+        const std::uint32_t region = region_of(voxel);
+        if (std::find(ways.regions.begin(), ways.regions.end(), region) != ways.regions.end()) continue;
+        if (!is_free(from.at, position(voxel), obstacles)) continue;
+        if (goals_[region] || pocket_of_[region] == BlockTable::kNone) {
+          ways.lead_out = goals_[region];
+          return ways;
         }
+        ways.regions.push_back(region);
+        add_walls(pockets_[pocket_of_[region]]);
+      }
+      // The opposite wall may belong to another part.
+      add_met(from.at, from.up);
+      for (std::size_t edge = 0; edge < 3; ++edge)
+        if (const std::optional<Place> to = across(from, edge, obstacles)) add(*to);
     }
     return ways;
+  }
+
+  Vector3d normal_of(std::uint32_t triangle) const { return Facet(soup_.corners(triangle)).normal().stableNormalized(); }
+
+  /// The middle of the next triangle around an edge, if it can be gone to.
+  std::optional<Place> across(const Place& from, std::size_t edge, CellObstacles& obstacles) const {
+    const Triangle t = soup_.triangle(from.triangle);
+    const Facet facet(soup_.corners(from.triangle));
+    const std::uint32_t a = t[edge], b = t[(edge + 1) % 3], c = t[(edge + 2) % 3];
+    const Vector3d& origin = facet.corner[edge];
+    const Vector3d middle = 0.5 * (origin + facet.corner[(edge + 1) % 3]);
+    const Vector3d along = (facet.corner[(edge + 1) % 3] - origin).stableNormalized();
+    const auto away_from_edge = [&](const Vector3d& corner) {
+      const Vector3d way = corner - origin;
+      return Vector3d(way - way.dot(along) * along).stableNormalized();
+    };
+    const Vector3d back = away_from_edge(facet.corner[(edge + 2) % 3]);
+    double least = 2.0 * std::numbers::pi;
+    std::optional<Place> next;
+    for (const std::uint32_t number : obstacles.triangles_in(
+             {floor_to_int(middle[0]), floor_to_int(middle[1]), floor_to_int(middle[2])})) {
+      const Triangle other = soup_.triangle(number);
+      const auto has = [&](std::uint32_t point) { return std::find(other.begin(), other.end(), point) != other.end(); };
+      // A second copy of the triangle is none to go to.
+      if (!has(a) || !has(b) || has(c)) continue;
+      const Facet to(soup_.corners(number));
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (other[i] == a || other[i] == b) continue;
+        const Vector3d way = away_from_edge(to.corner[i]);
+        double angle = std::atan2(way.dot(from.up), way.dot(back));
+        if (angle < 0.0) angle += 2.0 * std::numbers::pi;
+        if (angle >= least) continue;
+        least = angle;
+        const Vector3d up = std::sin(angle) * back - std::cos(angle) * from.up;
+        next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
+      }
+    }
+    if (!next) return next;
+    const Vector3d bridge = middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
+    if (!obstacles.is_free(from.at, bridge) || !obstacles.is_free(bridge, next->at)) next.reset();
+    return next;
   }
 
   void find_pockets() {
@@ -274,6 +322,7 @@ class PocketOpener {
     return obstacles.is_free(from, to) && obstacles.is_free(from, to + kAside);
   }
 
+  const IndexSoup& soup_;
   const TriangleBins& bins_;
   const std::vector<BlockAt>& blocks_;
   Regions& regions_;

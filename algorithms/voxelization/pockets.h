@@ -8,7 +8,7 @@ namespace hermesh {
 
 /// Joins a region of few voxels to the outside where a straight way leads from one of them to a voxel
 /// outside, at most six voxels off on each axis, without meeting a triangle, or to another such region that
-/// is joined; and, unless there are very many, where a way with bends does, in steps of a sixteenth of a voxel. The
+/// is joined; and, unless there are very many, where one along the crevice's walls does, from triangle to triangle. The
 /// latter only if the triangles around the region face it, for the inside of thin walls is many small regions, too.
 /// Large regions are left as they are: a hole narrower than a voxel must not empty a solid.
 /// @throws Cancelled.

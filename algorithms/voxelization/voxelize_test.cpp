@@ -325,25 +325,27 @@ TEST(Voxelize, VoxelsOneBehindTheOtherInASlitAreOutside) {
 }
 
 TEST(Voxelize, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
-  // A chamber around (0, 0, z) with a passage a tenth of a voxel wide that turns twice before it ends at y = 8.2; no
-  // straight way leads through it. Plugged, it is a cavity.
-  const auto block = [](bool plugged) {
+  // A chamber around (0, 0, z) with a narrow passage that turns twice before it ends at y = 8.2; no straight way leads
+  // through it. Plugged, it is a cavity.
+  const auto block = [](double gap, bool plugged) {
     PolygonMesh mesh = box({-8.2, -8.2, -6.3}, {-0.3, 8.2, 6.3});
     append(mesh, box({-0.5, -8.2, -6.3}, {8.2, -0.3, 6.3}));
     append(mesh, box({-0.5, 0.3, -6.3}, {0.5, 8.2, 6.3}));
-    append(mesh, box({0.3, -0.5, -6.3}, {0.7, 0.2, 6.3}));
-    append(mesh, box({0.6, -0.5, -6.3}, {8.2, 8.2, 6.3}));
+    append(mesh, box({0.3, -0.5, -6.3}, {0.7, 0.3 - gap, 6.3}));
+    append(mesh, box({0.5 + gap, -0.5, -6.3}, {8.2, 8.2, 6.3}));
     append(mesh, box({-8.2, -8.2, 6.1}, {8.2, 8.2, 9.2}));
     append(mesh, box({-8.2, -8.2, -9.2}, {8.2, 8.2, -6.1}));
     if (plugged) append(mesh, box({0.45, 5.3, -6.3}, {0.65, 5.7, 6.3}));
     return mesh;
   };
-  const Voxelization open = run(block(false)), closed = run(block(true));
-  for (int z = -5; z <= 5; ++z) {
-    EXPECT_NEAR(at(open, 0, 0, z), 0.3, 1e-5);
-    EXPECT_LT(at(closed, 0, 0, z), 0.0);
+  for (const double gap : {0.1, 0.002}) {
+    const Voxelization open = run(block(gap, false)), closed = run(block(gap, true));
+    for (int z = -5; z <= 5; ++z) {
+      EXPECT_NEAR(at(open, 0, 0, z), 0.3, 1e-5) << gap;
+      EXPECT_LT(at(closed, 0, 0, z), 0.0) << gap;
+    }
+    EXPECT_LT(at(open, -3, 3, 0), 0.0) << gap;
   }
-  EXPECT_LT(at(open, -3, 3, 0), 0.0);
 }
 
 TEST(Voxelize, WindingNumbersOnVoxelsOfTheSurfaceMakeNoCaps) {
