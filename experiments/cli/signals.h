@@ -6,7 +6,7 @@
 namespace hermesh::cli {
 
 /// Handles SIGINT and SIGTERM from now on: the returned flag is set, and a watchdog thread ends the process
-/// 150 ms later, because a library's loop may never look at the flag. It removes unfinished files first. Call
+/// 50 ms later, because a library's loop may never look at the flag. It removes unfinished files first. Call
 /// once, before the work starts. A signal that the caller had ignored is handled, too: who sends it wants the
 /// end.
 const std::atomic<bool>& handle_signals();

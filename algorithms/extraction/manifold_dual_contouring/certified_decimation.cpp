@@ -7,7 +7,8 @@
 namespace hermesh {
 namespace {
 
-/// Where a proof has taken this share of its points out of sets there is room again, on large flat faces above all.
+/// Where a proof has taken this share of its points out of sets there is room again, on large flat faces above all; and
+/// another pass is worth its time if the one before had this share fewer points left than the one before that.
 constexpr double kWorthAnother = 0.1;
 constexpr int kMostPasses = 3;
 
@@ -34,8 +35,11 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     return now <= proposed ? 0.0 : double(now - proposed) / double(now);
   };
   brought_back(Collapses::bold, false);
-  for (int i = 0; i < kMostPasses; ++i)
+  for (int i = 0; i < kMostPasses; ++i) {
+    const double before = double(merged.mesh->points().size());
     if (brought_back(Collapses::careful, true) < kWorthAnother) break;
+    if (double(merged.mesh->points().size()) > (1.0 - kWorthAnother) * before) break;
+  }
   return {merged.mesh->points(), merged.mesh->triangles(), std::move(merged.origin)};
 }
 
