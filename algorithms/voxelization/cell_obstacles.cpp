@@ -1,5 +1,6 @@
 #include "algorithms/voxelization/cell_obstacles.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -39,17 +40,22 @@ struct CellObstacles::Block {
       for (const std::uint32_t t : bins.large(i)) add(soup, t, at);
   }
 
-  /// One that is in the way, or null.
-  const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to) const {
-    for (const std::uint32_t i : cells[cell])
-      if (obstacles[i].meeting(from, to) >= 0) return &obstacles[i];
+  /// One that is in the way, or null. What is in one way is often in the next one, so it comes first from now on.
+  const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to) {
+    std::vector<std::uint32_t>& numbers = cells[cell];
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (obstacles[numbers[i]].meeting(from, to) < 0) continue;
+      std::rotate(numbers.begin(), numbers.begin() + std::ptrdiff_t(i), numbers.begin() + std::ptrdiff_t(i) + 1);
+      return &obstacles[numbers.front()];
+    }
     return nullptr;
   }
 
-  /// Makes a triangle of the cell the first one met if it is.
+  /// Makes a triangle of the cell the first one met if it is; of several at one place that of the least number.
   void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& first) const {
     for (const std::uint32_t i : cells[cell])
-      if (const double along = obstacles[i].meeting(from, to); along >= 0 && along < first.part)
+      if (const double along = obstacles[i].meeting(from, to);
+          along >= 0 && (along < first.part || (along == first.part && triangles[i] < first.triangle)))
         first = {along, obstacles[i].faces(from), triangles[i]};
   }
 
@@ -78,7 +84,7 @@ CellObstacles::CellObstacles(const IndexSoup& soup, const TriangleBins& bins, st
 CellObstacles::~CellObstacles() = default;
 CellObstacles::CellObstacles(CellObstacles&&) noexcept = default;
 
-const CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
+CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
   const BlockAt at = tile_of(cell);
   if (last_ && at == last_at_) return *last_;
   auto known = blocks_.find(at);
@@ -136,6 +142,7 @@ std::vector<std::uint32_t> CellObstacles::triangles_in(const Voxel& cell) {
   const Block& block = block_of(cell);
   std::vector<std::uint32_t> numbers;
   for (const std::uint32_t i : block.cells[place_in_tile(cell)]) numbers.push_back(block.triangles[i]);
+  std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
 

@@ -37,19 +37,19 @@ class CellObstacles {
   /// The first triangle in the way.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-  /// Numbers of the triangles that may touch a cell.
+  /// Numbers of the triangles that may touch a cell, ascending.
   std::vector<std::uint32_t> triangles_in(const Voxel& cell);
 
  private:
   struct Block;
-  const Block& block_of(const Voxel& cell);
+  Block& block_of(const Voxel& cell);
   void remember(const Obstacle& met);
 
   const IndexSoup& soup_;
   const TriangleBins& bins_;
   std::size_t kept_;
   std::map<BlockAt, std::unique_ptr<Block>> blocks_;
-  const Block* last_ = nullptr;
+  Block* last_ = nullptr;
   BlockAt last_at_{};
   /// What was in the way lately is often in the way again.
   std::vector<Obstacle> met_;

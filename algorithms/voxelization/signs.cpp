@@ -1,5 +1,7 @@
 #include "algorithms/voxelization/signs.h"
 
+#include <optional>
+
 #include "algorithms/core/parallel.h"
 #include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/pockets.h"
@@ -95,33 +97,47 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
                  double reach, RunContext& context) {
   Signs signs;
   Regions regions = find_regions(bins.blocks(), band.crossed, context);
+  std::optional<OrientedWinding> winding;
+  const auto wound = [&]() -> const OrientedWinding& {
+    context.check();
+    if (!winding) winding.emplace(soup);
+    context.check();
+    return *winding;
+  };
   Flood flood;
-  if (rule != SignRule::winding_number) {
-    open_pockets(soup, bins, band.blocks, regions, context);
+  bool leaks = false;
+  const auto flood_from_infinity = [&] {
     signs.inside = enclosed_voxels(regions, band.blocks.size());
-    if (rule == SignRule::flood_fill) return signs;
+    if (rule == SignRule::flood_fill) return;
     flood = look_at_flood(band, signs.inside, context);
+    leaks = !flood.leaks.empty() && wound().usable() && leaked(flood.leaks, wound().number());
+  };
+  if (rule != SignRule::winding_number) {
+    if (rule == SignRule::automatic) flood_from_infinity();
+    // Pockets only make the outside larger: what leaks without them leaks with them, and there may be thousands.
+    if (!leaks) {
+      open_pockets(soup, bins, band.blocks, regions, context);
+      flood_from_infinity();
+    }
+    if (rule == SignRule::flood_fill) return signs;
     if (flood.leaks.empty() && flood.share > 0) return signs;
   }
-  context.check();
-  const OrientedWinding winding(soup);
-  context.check();
-  if (!winding.usable()) {
+  if (!wound().usable()) {
     // Faces that cancel can still enclose something.
     if (rule == SignRule::automatic && flood.share > 0.5) return signs;
-    context.note(std::string("The distances have no sign: ") + explanation(winding.orientation().verdict) +
-                 ".");
+    context.note(std::string("The distances have no sign: ") + explanation(wound().orientation().verdict) + ".");
     signs.inside.clear();
     signs.usable = false;
     return signs;
   }
   if (rule == SignRule::automatic) {
-    if (!leaked(flood.leaks, winding.number())) return signs;
+    if (!leaks) return signs;
     context.note(
         "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
   }
-  const bool open = winding.orientation().boundary_edges + winding.orientation().non_manifold_edges > 0;
-  return winding_signs(winding.number(), bins.blocks(), band, regions, open, reach, context);
+  const Orientation& orientation = wound().orientation();
+  const bool open = orientation.boundary_edges + orientation.non_manifold_edges > 0;
+  return winding_signs(wound().number(), bins.blocks(), band, regions, open, reach, context);
 }
 
 }  // namespace hermesh
