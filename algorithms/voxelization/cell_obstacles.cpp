@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include "algorithms/core/rounding.h"
@@ -11,6 +13,9 @@ namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
+
+/// A megabyte or so of each.
+constexpr std::size_t kMostBlocks = 512, kMostObstacles = 6000;
 
 /// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all did.
 template <class F>
@@ -25,57 +30,76 @@ bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
 
 }  // namespace
 
+/// Count, scan, fill: some hundred little lists would cost more than what is asked of them.
 struct CellObstacles::Block {
   std::vector<Obstacle> obstacles;
   std::vector<std::uint32_t> triangles;  ///< their numbers in the soup
-  std::array<std::vector<std::uint32_t>, 512> cells;  ///< numbers of the obstacles, by place_in_tile()
+  /// Numbers of the obstacles of cell c by place_in_tile(): numbers[first[c]] …
+  std::array<std::uint32_t, 513> first{};
+  std::vector<std::uint32_t> numbers;
 
   Block(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& at) {
+    const auto add = [&](std::uint32_t triangle) {
+      obstacles.emplace_back(Facet(soup.corners(triangle)));
+      bool touches = false;
+      for_each_cell(obstacles.back(), at, [&](unsigned cell) {
+        ++first[cell + 1];
+        touches = true;
+      });
+      if (touches)
+        triangles.push_back(triangle);
+      else
+        obstacles.pop_back();
+    };
     bins.for_each_cluster(at, around(at, 1.1), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > at[a] * 8.0 + 8.1 || cluster.box.high[a] < at[a] * 8.0 - 0.1) return;
-      for (const std::uint32_t t : cluster.triangles) add(soup, t, at);
+      for (const std::uint32_t t : cluster.triangles) add(t);
     });
     if (const std::uint32_t i = bins.blocks().find(at); i != BlockTable::kNone)
-      for (const std::uint32_t t : bins.large(i)) add(soup, t, at);
+      for (const std::uint32_t t : bins.large(i)) add(t);
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    numbers.resize(first.back());
+    std::array<std::uint32_t, 513> next = first;
+    for (std::uint32_t i = 0; i < obstacles.size(); ++i)
+      for_each_cell(obstacles[i], at, [&](unsigned cell) { numbers[next[cell]++] = i; });
   }
+
+  std::span<std::uint32_t> in_cell(unsigned cell) { return std::span(numbers).subspan(first[cell], first[cell + 1] - first[cell]); }
 
   /// One that is in the way, or null. What is in one way is often in the next one, so it comes first from now on.
   const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to) {
-    std::vector<std::uint32_t>& numbers = cells[cell];
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      if (obstacles[numbers[i]].meeting(from, to) < 0) continue;
-      std::rotate(numbers.begin(), numbers.begin() + std::ptrdiff_t(i), numbers.begin() + std::ptrdiff_t(i) + 1);
-      return &obstacles[numbers.front()];
+    const std::span<std::uint32_t> there = in_cell(cell);
+    for (auto i = there.begin(); i != there.end(); ++i) {
+      if (obstacles[*i].meeting(from, to) < 0) continue;
+      std::rotate(there.begin(), i, i + 1);
+      return &obstacles[there.front()];
     }
     return nullptr;
   }
 
   /// Makes a triangle of the cell the first one met if it is; of several at one place that of the least number.
-  void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& first) const {
-    for (const std::uint32_t i : cells[cell])
+  void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& met) {
+    for (const std::uint32_t i : in_cell(cell))
       if (const double along = obstacles[i].meeting(from, to);
-          along >= 0 && (along < first.part || (along == first.part && triangles[i] < first.triangle)))
-        first = {along, obstacles[i].faces(from), triangles[i]};
+          along >= 0 && (along < met.part || (along == met.part && triangles[i] < met.triangle)))
+        met = {along, obstacles[i].faces(from), triangles[i]};
   }
 
  private:
-  void add(const IndexSoup& soup, std::uint32_t triangle, const BlockAt& at) {
-    const Facet facet(soup.corners(triangle));
-    const Vector3d lowest = facet.low(), highest = facet.high();
+  /// Calls f(place_in_tile()) for the cells that may touch it.
+  template <class F>
+  static void for_each_cell(const Obstacle& obstacle, const BlockAt& at, F&& f) {
+    const Vector3d origin(at[0] * 8.0, at[1] * 8.0, at[2] * 8.0);
     int from[3], to[3];
     for (int a = 0; a < 3; ++a) {
-      const double origin = at[std::size_t(a)] * 8.0;
-      from[a] = int(std::clamp(std::floor(lowest[a] - origin - 1e-6), 0.0, 8.0));
-      to[a] = int(std::clamp(std::floor(highest[a] - origin + 1e-6), -1.0, 7.0));
-      if (from[a] > to[a]) return;
+      from[a] = int(std::clamp(std::floor(obstacle.low()[a] - origin[a]), 0.0, 8.0));
+      to[a] = int(std::clamp(std::floor(obstacle.high()[a] - origin[a]), -1.0, 7.0));
     }
-    const std::uint32_t number = std::uint32_t(obstacles.size());
-    obstacles.emplace_back(facet);
-    triangles.push_back(triangle);
     for (int x = from[0]; x <= to[0]; ++x)
       for (int y = from[1]; y <= to[1]; ++y)
-        for (int z = from[2]; z <= to[2]; ++z) cells[std::size_t(x * 64 + y * 8 + z)].push_back(number);
+        for (int z = from[2]; z <= to[2]; ++z)
+          if (obstacle.plane_meets_cell(origin + Vector3d(x, y, z))) f(unsigned(x * 64 + y * 8 + z));
   }
 };
 
@@ -89,8 +113,12 @@ CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
   if (last_ && at == last_at_) return *last_;
   auto known = blocks_.find(at);
   if (known == blocks_.end()) {
-    if (blocks_.size() >= kept_) blocks_.clear();
+    if (blocks_.size() >= kMostBlocks || (blocks_.size() >= kept_ && obstacles_ > kMostObstacles)) {
+      blocks_.clear();
+      obstacles_ = 0;
+    }
     known = blocks_.emplace(at, std::make_unique<Block>(soup_, bins_, at)).first;
+    obstacles_ += known->second->obstacles.size();
   }
   last_at_ = at;
   last_ = known->second.get();
@@ -139,9 +167,9 @@ CellObstacles::Met CellObstacles::first_met(const Vector3d& from, const Vector3d
 }
 
 std::vector<std::uint32_t> CellObstacles::triangles_in(const Voxel& cell) {
-  const Block& block = block_of(cell);
+  Block& block = block_of(cell);
   std::vector<std::uint32_t> numbers;
-  for (const std::uint32_t i : block.cells[place_in_tile(cell)]) numbers.push_back(block.triangles[i]);
+  for (const std::uint32_t i : block.in_cell(place_in_tile(cell))) numbers.push_back(block.triangles[i]);
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }

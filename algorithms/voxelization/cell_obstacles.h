@@ -17,7 +17,7 @@ class CellObstacles {
   /// Coordinates of a voxel, and of the cell up from it.
   using Voxel = std::array<std::int32_t, 3>;
 
-  /// Keeps references, and the cells of at most `kept` blocks.
+  /// Keeps references, and the cells of `kept` blocks, or more where few triangles are.
   CellObstacles(const IndexSoup& soup, const TriangleBins& bins, std::size_t kept);
   ~CellObstacles();
   CellObstacles(CellObstacles&&) noexcept;
@@ -49,6 +49,7 @@ class CellObstacles {
   const TriangleBins& bins_;
   std::size_t kept_;
   std::map<BlockAt, std::unique_ptr<Block>> blocks_;
+  std::size_t obstacles_ = 0;  ///< in them
   Block* last_ = nullptr;
   BlockAt last_at_{};
   /// What was in the way lately is often in the way again.

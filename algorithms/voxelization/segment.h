@@ -61,6 +61,14 @@ class Obstacle {
     if (std::min(a, b) > slack_ || std::max(a, b) < -slack_) return -1.0;
     return hermesh::meeting(from, to, facet_);
   }
+  /// Box, with a margin.
+  const Eigen::Vector3d& low() const { return low_; }
+  const Eigen::Vector3d& high() const { return high_; }
+  /// Whether the triangle's plane, with a margin, meets the cell up from a voxel.
+  bool plane_meets_cell(const Eigen::Vector3d& voxel) const {
+    const double from_middle = normal_.dot(voxel + Eigen::Vector3d::Constant(0.5)) - offset_;
+    return std::abs(from_middle) <= 0.5 * normal_.lpNorm<1>() + slack_;
+  }
   /// Whether p is on the side that the triangle is wound counter-clockwise on.
   bool faces(const Eigen::Vector3d& p) const { return normal_.dot(p) > offset_; }
 
