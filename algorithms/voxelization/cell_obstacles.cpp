@@ -68,9 +68,10 @@ struct CellObstacles::Block {
   std::span<std::uint32_t> in_cell(unsigned cell) { return std::span(numbers).subspan(first[cell], first[cell + 1] - first[cell]); }
 
   /// One that is in the way, or null. What is in one way is often in the next one, so it comes first from now on.
-  const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to) {
+  const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to, std::size_t& work) {
     const std::span<std::uint32_t> there = in_cell(cell);
     for (auto i = there.begin(); i != there.end(); ++i) {
+      ++work;
       if (obstacles[*i].meeting(from, to) < 0) continue;
       std::rotate(there.begin(), i, i + 1);
       return &obstacles[there.front()];
@@ -119,6 +120,7 @@ CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
     }
     known = blocks_.emplace(at, std::make_unique<Block>(soup_, bins_, at)).first;
     obstacles_ += known->second->obstacles.size();
+    work_ += known->second->numbers.size();
   }
   last_at_ = at;
   last_ = known->second.get();
@@ -126,7 +128,7 @@ CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
 }
 
 bool CellObstacles::is_free_in(const Voxel& cell, const Vector3d& from, const Vector3d& to) {
-  return !block_of(cell).find(place_in_tile(cell), from, to);
+  return !block_of(cell).find(place_in_tile(cell), from, to, work_);
 }
 
 bool CellObstacles::is_free(const Vector3d& from, const Vector3d& to) {
@@ -138,7 +140,7 @@ bool CellObstacles::is_free(const Vector3d& from, const Vector3d& to) {
     const Vector3d begin = from + (to - from) * (double(i) / pieces),
                    end = from + (to - from) * (double(i + 1) / pieces);
     const bool free = all_cells(begin, end, [&](const Voxel& cell) {
-      const Obstacle* met = block_of(cell).find(place_in_tile(cell), from, to);
+      const Obstacle* met = block_of(cell).find(place_in_tile(cell), from, to, work_);
       if (met) remember(*met);
       return !met;
     });
@@ -160,18 +162,20 @@ void CellObstacles::remember(const Obstacle& met) {
 CellObstacles::Met CellObstacles::first_met(const Vector3d& from, const Vector3d& to) {
   Met first;
   all_cells(from, to, [&](const Voxel& cell) {
-    block_of(cell).meet(place_in_tile(cell), from, to, first);
+    Block& block = block_of(cell);
+    work_ += 1 + block.in_cell(place_in_tile(cell)).size();
+    block.meet(place_in_tile(cell), from, to, first);
     return true;
   });
   return first;
 }
 
-std::vector<std::uint32_t> CellObstacles::triangles_in(const Voxel& cell) {
+const std::vector<std::uint32_t>& CellObstacles::triangles_in(const Voxel& cell) {
   Block& block = block_of(cell);
-  std::vector<std::uint32_t> numbers;
-  for (const std::uint32_t i : block.in_cell(place_in_tile(cell))) numbers.push_back(block.triangles[i]);
-  std::sort(numbers.begin(), numbers.end());
-  return numbers;
+  found_.clear();
+  for (const std::uint32_t i : block.in_cell(place_in_tile(cell))) found_.push_back(block.triangles[i]);
+  work_ += found_.size();
+  return found_;
 }
 
 }  // namespace hermesh

@@ -37,12 +37,19 @@ class CellObstacles {
   /// The first triangle in the way.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-  /// Numbers of the triangles that may touch a cell, ascending.
-  std::vector<std::uint32_t> triangles_in(const Voxel& cell);
+  /// Calls f(number) for the triangles that may touch a cell, in an order that depends on earlier questions.
+  template <class F>
+  void for_each_triangle(const Voxel& cell, F&& f) {
+    for (const std::uint32_t triangle : triangles_in(cell)) f(triangle);
+  }
+
+  /// Triangles that all questions so far have looked at, which is what they cost; it depends on their order.
+  std::size_t work() const { return work_; }
 
  private:
   struct Block;
   Block& block_of(const Voxel& cell);
+  const std::vector<std::uint32_t>& triangles_in(const Voxel& cell);
   void remember(const Obstacle& met);
 
   const IndexSoup& soup_;
@@ -50,6 +57,8 @@ class CellObstacles {
   std::size_t kept_;
   std::map<BlockAt, std::unique_ptr<Block>> blocks_;
   std::size_t obstacles_ = 0;  ///< in them
+  std::size_t work_ = 0;
+  std::vector<std::uint32_t> found_;  ///< by triangles_in()
   Block* last_ = nullptr;
   BlockAt last_at_{};
   /// What was in the way lately is often in the way again.

@@ -25,9 +25,11 @@ constexpr std::size_t kMost = 64;
 constexpr std::int32_t kFar[] = {2, 6};
 /// How far from the walls the ways along them keep, in voxels: a crevice that is narrower is closed.
 constexpr double kHair = 1e-5;
-/// How many triangles the ways along walls may lead over, for all pockets together: some tenths of a second. Many
+/// How many triangles may be looked at for ways along walls, for all pockets together: some tenths of a second. Many
 /// thousands of pockets are no crevices, but what parts of a model enclose between them where they intersect.
-constexpr std::size_t kMostPlaces = 50'000;
+constexpr std::size_t kMostWork = 20'000'000;
+/// A triangle folded back onto the one beside it this closely, in radians, leaves no room to go on.
+constexpr double kFolded = 1e-6;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
@@ -127,18 +129,18 @@ class PocketOpener {
     return sees;
   }
 
-  /// Opens those that a way along their walls leads out of.
+  /// Opens those that a way along their walls leads out of. One after the other, with obstacles of their own: what these
+  /// cost must not depend on what threads asked before.
   void open_along_walls(std::vector<char>& open) {
+    CellObstacles obstacles(soup_, bins_, kKept);
     goals_ = open;
     std::vector<char> known(pockets_.size(), 0);
-    std::size_t left = kMostPlaces;
     for (const std::uint32_t pocket : closed_ones(open)) {
-      if (known[pocket] || left == 0) continue;
+      if (obstacles.work() >= kMostWork) return;
       context_.check();
-      if (!may_be_outside(pockets_[pocket])) continue;
-      const Ways ways = follow_walls(pockets_[pocket], left);
-      left -= std::min(left, ways.places);
-      // What holds for a pocket holds for all that its ways lead to.
+      if (known[pocket] || !may_be_outside(pockets_[pocket], obstacles)) continue;
+      const Ways ways = follow_walls(pockets_[pocket], obstacles);
+      // What was found out for a pocket is taken to hold for all that its ways lead to.
       for (const std::uint32_t region : ways.regions) {
         known[pocket_of_[region]] = 1;
         if (ways.lead_out) open[region] = 1;
@@ -148,12 +150,12 @@ class PocketOpener {
 
   /// Whether the triangles around the first voxel face it more often than not. What is inside of a thin wall is many
   /// pockets, and to follow all ways within it would take longer than all the rest.
-  bool may_be_outside(const Pocket& pocket) {
+  bool may_be_outside(const Pocket& pocket, CellObstacles& obstacles) const {
     const Vector3d from = position(pocket.voxels.front());
     int facing = 0;
     for (int axis = 0; axis < 3; ++axis)
       for (const double step : {-1.0, 1.0}) {
-        const CellObstacles::Met met = obstacles_.local().first_met(from, from + step * Vector3d::Unit(axis));
+        const CellObstacles::Met met = obstacles.first_met(from, from + step * Vector3d::Unit(axis));
         if (met.part < 1.0) facing += met.faces_from ? 1 : -1;
       }
     return facing >= 0;
@@ -161,7 +163,6 @@ class PocketOpener {
 
   struct Ways {
     bool lead_out = false;
-    std::size_t places = 0;              ///< that they lead over
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
@@ -175,9 +176,8 @@ class PocketOpener {
   /// From triangle to triangle over their common edges, so that a crevice may be as narrow as it likes and bend as it
   /// likes, but no way leads around the border of a hole. They lead out if a goal is seen from them before any other
   /// large region. Where that comes first, there is a hole in the solid, which must not be emptied.
-  Ways follow_walls(const Pocket& pocket, std::size_t most) {
-    CellObstacles& obstacles = obstacles_.local();
-    Ways ways{.lead_out = false, .places = 0, .regions = {pocket.region}};
+  Ways follow_walls(const Pocket& pocket, CellObstacles& obstacles) const {
+    Ways ways{.lead_out = false, .regions = {pocket.region}};
     std::vector<Place> places;
     std::unordered_set<std::uint64_t> known;
     const auto add = [&](const Place& place) {
@@ -187,8 +187,9 @@ class PocketOpener {
     const auto add_met = [&](const Vector3d& from, const Vector3d& way) {
       const CellObstacles::Met met = obstacles.first_met(from, from + way);
       if (met.part >= 1.0) return;
-      const Vector3d up = (met.faces_from ? 1.0 : -1.0) * normal_of(met.triangle);
-      add({met.triangle, up, from + met.part * way + kHair * up});
+      const Vector3d up = (met.faces_from ? 1.0 : -1.0) * normal_of(met.triangle), at = from + met.part * way + kHair * up;
+      // At the bottom of a sharp crease a hair above one wall is behind the other.
+      if (obstacles.is_free(from, at)) add({met.triangle, up, at});
     };
     const auto add_walls = [&](const Pocket& of) {
       for (const Voxel& voxel : of.voxels)
@@ -196,11 +197,13 @@ class PocketOpener {
           for (const double step : {-1.0, 1.0}) add_met(position(voxel), step * Vector3d::Unit(axis));
     };
     add_walls(pocket);
-    for (; ways.places < std::min(places.size(), most); ++ways.places) {
-      const Place from = places[ways.places];
+    for (std::size_t next = 0; next < places.size() && obstacles.work() < kMostWork; ++next) {
+      context_.check();
+      const Place from = places[next];
       const Voxel cell{floor_to_int(from.at[0]), floor_to_int(from.at[1]), floor_to_int(from.at[2])};
       for (int corner = 0; corner < 8; ++corner) {
         const Voxel voxel{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)};
+        if (bins_.blocks().find(tile_of(voxel)) == BlockTable::kNone) continue;
         const std::uint32_t region = region_of(voxel);
         if (std::find(ways.regions.begin(), ways.regions.end(), region) != ways.regions.end()) continue;
         if (!is_free(from.at, position(voxel), obstacles)) continue;
@@ -228,32 +231,35 @@ class PocketOpener {
     const std::uint32_t a = t[edge], b = t[(edge + 1) % 3], c = t[(edge + 2) % 3];
     const Vector3d& origin = facet.corner[edge];
     const Vector3d middle = 0.5 * (origin + facet.corner[(edge + 1) % 3]);
+    const double length = (facet.corner[(edge + 1) % 3] - origin).norm();
     const Vector3d along = (facet.corner[(edge + 1) % 3] - origin).stableNormalized();
     const auto away_from_edge = [&](const Vector3d& corner) {
       const Vector3d way = corner - origin;
-      return Vector3d(way - way.dot(along) * along).stableNormalized();
+      return Vector3d(way - way.dot(along) * along);
     };
-    const Vector3d back = away_from_edge(facet.corner[(edge + 2) % 3]);
+    const Vector3d back = away_from_edge(facet.corner[(edge + 2) % 3]).stableNormalized();
     double least = 2.0 * std::numbers::pi;
     std::optional<Place> next;
-    for (const std::uint32_t number : obstacles.triangles_in(
-             {floor_to_int(middle[0]), floor_to_int(middle[1]), floor_to_int(middle[2])})) {
+    const Voxel cell{floor_to_int(middle[0]), floor_to_int(middle[1]), floor_to_int(middle[2])};
+    obstacles.for_each_triangle(cell, [&](std::uint32_t number) {
       const Triangle other = soup_.triangle(number);
       const auto has = [&](std::uint32_t point) { return std::find(other.begin(), other.end(), point) != other.end(); };
       // A second copy of the triangle is none to go to.
-      if (!has(a) || !has(b) || has(c)) continue;
+      if (!has(a) || !has(b) || has(c)) return;
       const Facet to(soup_.corners(number));
-      for (std::size_t i = 0; i < 3; ++i) {
-        if (other[i] == a || other[i] == b) continue;
-        const Vector3d way = away_from_edge(to.corner[i]);
-        double angle = std::atan2(way.dot(from.up), way.dot(back));
-        if (angle < 0.0) angle += 2.0 * std::numbers::pi;
-        if (angle >= least) continue;
-        least = angle;
-        const Vector3d up = std::sin(angle) * back - std::cos(angle) * from.up;
-        next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
-      }
-    }
+      std::size_t i = 0;
+      while (i < 3 && (other[i] == a || other[i] == b)) ++i;
+      if (i == 3) return;
+      const Vector3d way = away_from_edge(to.corner[i]);
+      if (way.norm() <= 1e-9 * length) return;  // no area, no side
+      double angle = std::atan2(way.dot(from.up), way.dot(back));
+      if (angle < 0.0) angle += 2.0 * std::numbers::pi;
+      if (angle > least || (angle == least && (!next || number > next->triangle))) return;
+      least = angle;
+      const Vector3d up = std::sin(angle) * back - std::cos(angle) * from.up;
+      next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
+    });
+    if (least < kFolded) next.reset();
     if (!next) return next;
     const Vector3d bridge = middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
     if (!obstacles.is_free(from.at, bridge) || !obstacles.is_free(bridge, next->at)) next.reset();

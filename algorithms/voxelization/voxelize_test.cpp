@@ -348,6 +348,27 @@ TEST(Voxelize, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
   }
 }
 
+TEST(Voxelize, APocketThatLooksIntoASharpCreaseFromWithinIsNotOutside) {
+  // A closed prism, inside out, that narrows to a crease on the lattice: a hair off one of the walls there is behind the
+  // other.
+  PolygonMesh mesh;
+  for (const float z : {-1.3f, 1.3f})
+    for (const Vector3f& p : {Vector3f(3.5f, 0, z), Vector3f(3.2f, 0.0685714286f, z), Vector3f(-3.5f, 1.6f, z),
+                              Vector3f(-3.5f, -1.6f, z), Vector3f(3.2f, -0.0685714286f, z)})
+      mesh.points.push_back(p);
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const std::uint32_t j = (i + 1) % 5;
+    mesh.triangles.push_back({i, j + 5, j});
+    mesh.triangles.push_back({i, i + 5, j + 5});
+  }
+  for (std::uint32_t i = 1; i < 4; ++i) {
+    mesh.triangles.push_back({0, i, i + 1});
+    mesh.triangles.push_back({5, i + 6, i + 5});
+  }
+  const Voxelization v = run(mesh, {.signs = SignRule::flood_fill});
+  for (int x = -3; x <= 3; ++x) EXPECT_LT(at(v, x, 0, 0), 0.0) << x;
+}
+
 TEST(Voxelize, WindingNumbersOnVoxelsOfTheSurfaceMakeNoCaps) {
   const PolygonMesh mesh = box({-10, -10, -10}, {10, 10, 10});
   const Voxelization v = run(mesh, {.signs = SignRule::winding_number});

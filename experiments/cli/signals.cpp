@@ -42,12 +42,16 @@ extern "C" void on_signal(int number) {
 }
 
 /// To take back gigabytes, and a large file that is removed while it is open, costs the system some tenths of a second,
-/// which nobody should have to wait for: a process that shares them outlives this one, and has them taken from it.
+/// which who waits for this process should not have to wait for: one that shares them outlives it, and has them taken
+/// from it. (Pipes stay open until then.)
 void leave_memory_to_another_process() {
   constexpr std::size_t kStack = 16384;
   alignas(16) static char stack[kStack];
   static std::atomic_flag done;
   if (done.test_and_set()) return;
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, nullptr);  // its stack is too small for handlers
   static const pid_t parent = getpid();
   const auto outlive = [](void*) -> int {
     while (getppid() == parent) usleep(1000);
