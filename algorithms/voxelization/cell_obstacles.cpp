@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A megabyte or so of each.
-constexpr std::size_t kMostBlocks = 512, kMostObstacles = 6000;
+/// Some hundred kilobytes of each.
+constexpr std::size_t kMostBlocks = 256, kMostObstacles = 2000;
 
 /// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all did.
 template <class F>

@@ -77,6 +77,7 @@ class PocketOpener {
       }
       opened_.clear();
     }
+    obstacles_.clear();
     open_along_walls(open);
     for (BlockComponent& component : regions_.components)
       if (open[component.region]) component.region = Regions::kOutside;
