@@ -65,7 +65,9 @@ struct CellObstacles::Block {
       for_each_cell(obstacles[i], at, [&](unsigned cell) { numbers[next[cell]++] = i; });
   }
 
-  std::span<std::uint32_t> in_cell(unsigned cell) { return std::span(numbers).subspan(first[cell], first[cell + 1] - first[cell]); }
+  std::span<std::uint32_t> in_cell(unsigned cell) {
+    return {numbers.data() + first[cell], numbers.data() + first[cell + 1]};
+  }
 
   /// One that is in the way, or null. What is in one way is often in the next one, so it comes first from now on.
   const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to, std::size_t& work) {

@@ -37,11 +37,8 @@ class CellObstacles {
   /// The first triangle in the way.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-  /// Calls f(number) for the triangles that may touch a cell, in an order that depends on earlier questions.
-  template <class F>
-  void for_each_triangle(const Voxel& cell, F&& f) {
-    for (const std::uint32_t triangle : triangles_in(cell)) f(triangle);
-  }
+  /// Numbers of the triangles that may touch a cell, in an order that depends on earlier questions. Valid until the next.
+  const std::vector<std::uint32_t>& triangles_in(const Voxel& cell);
 
   /// Triangles that all questions so far have looked at, which is what they cost; it depends on their order.
   std::size_t work() const { return work_; }
@@ -49,7 +46,6 @@ class CellObstacles {
  private:
   struct Block;
   Block& block_of(const Voxel& cell);
-  const std::vector<std::uint32_t>& triangles_in(const Voxel& cell);
   void remember(const Obstacle& met);
 
   const IndexSoup& soup_;

@@ -3,14 +3,11 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <optional>
-#include <unordered_set>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/rounding.h"
 #include "algorithms/voxelization/cell_obstacles.h"
+#include "algorithms/voxelization/wall_walk.h"
 
 namespace hermesh {
 namespace {
@@ -23,13 +20,9 @@ constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
-/// How far from the walls the ways along them keep, in voxels: a crevice that is narrower is closed.
-constexpr double kHair = 1e-5;
 /// How many triangles may be looked at for ways along walls, for all pockets together: some tenths of a second. Many
 /// thousands of pockets are no crevices, but what parts of a model enclose between them where they intersect.
 constexpr std::size_t kMostWork = 20'000'000;
-/// A triangle folded back onto the one beside it this closely, in radians, leaves no room to go on.
-constexpr double kFolded = 1e-6;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
@@ -167,104 +160,36 @@ class PocketOpener {
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
-  /// A hair's breadth above one side of a triangle.
-  struct Place {
-    std::uint32_t triangle = 0;
-    Vector3d up;  ///< the triangle's unit normal on that side
-    Vector3d at;
-  };
-
-  /// From triangle to triangle over their common edges, so that a crevice may be as narrow as it likes and bend as it
-  /// likes, but no way leads around the border of a hole. They lead out if a goal is seen from them before any other
-  /// large region. Where that comes first, there is a hole in the solid, which must not be emptied.
+  /// They lead out if a goal is seen from them before any other large region. Where that comes first, there is a hole in
+  /// the solid, which must not be emptied.
   Ways follow_walls(const Pocket& pocket, CellObstacles& obstacles) const {
     Ways ways{.lead_out = false, .regions = {pocket.region}};
-    std::vector<Place> places;
-    std::unordered_set<std::uint64_t> known;
-    const auto add = [&](const Place& place) {
-      const bool front = normal_of(place.triangle).dot(place.up) > 0.0;
-      if (known.insert(std::uint64_t(place.triangle) * 2 + front).second) places.push_back(place);
-    };
-    const auto add_met = [&](const Vector3d& from, const Vector3d& way) {
-      const CellObstacles::Met met = obstacles.first_met(from, from + way);
-      if (met.part >= 1.0) return;
-      const Vector3d up = (met.faces_from ? 1.0 : -1.0) * normal_of(met.triangle), at = from + met.part * way + kHair * up;
-      // At the bottom of a sharp crease a hair above one wall is behind the other.
-      if (obstacles.is_free(from, at)) add({met.triangle, up, at});
-    };
-    const auto add_walls = [&](const Pocket& of) {
+    WallWalk walk(soup_, obstacles);
+    const auto begin_at_walls = [&](const Pocket& of) {
       for (const Voxel& voxel : of.voxels)
         for (int axis = 0; axis < 3; ++axis)
-          for (const double step : {-1.0, 1.0}) add_met(position(voxel), step * Vector3d::Unit(axis));
+          for (const double step : {-1.0, 1.0}) walk.begin(position(voxel), step * Vector3d::Unit(axis));
     };
-    add_walls(pocket);
-    for (std::size_t next = 0; next < places.size() && obstacles.work() < kMostWork; ++next) {
+    begin_at_walls(pocket);
+    while (obstacles.work() < kMostWork) {
       context_.check();
-      const Place from = places[next];
-      const Voxel cell{floor_to_int(from.at[0]), floor_to_int(from.at[1]), floor_to_int(from.at[2])};
+      const std::optional<Vector3d> at = walk.next();
+      if (!at) break;
+      const Voxel cell = cell_of(*at);
       for (int corner = 0; corner < 8; ++corner) {
         const Voxel voxel{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)};
-        if (bins_.blocks().find(tile_of(voxel)) == BlockTable::kNone) continue;
         const std::uint32_t region = region_of(voxel);
-        if (std::find(ways.regions.begin(), ways.regions.end(), region) != ways.regions.end()) continue;
-        if (!is_free(from.at, position(voxel), obstacles)) continue;
+        if (region == BlockTable::kNone || std::ranges::count(ways.regions, region) > 0) continue;
+        if (!is_free(*at, position(voxel), obstacles)) continue;
         if (goals_[region] || pocket_of_[region] == BlockTable::kNone) {
           ways.lead_out = goals_[region];
           return ways;
         }
         ways.regions.push_back(region);
-        add_walls(pockets_[pocket_of_[region]]);
+        begin_at_walls(pockets_[pocket_of_[region]]);
       }
-      // The opposite wall may belong to another part.
-      add_met(from.at, from.up);
-      for (std::size_t edge = 0; edge < 3; ++edge)
-        if (const std::optional<Place> to = across(from, edge, obstacles)) add(*to);
     }
     return ways;
-  }
-
-  Vector3d normal_of(std::uint32_t triangle) const { return Facet(soup_.corners(triangle)).normal().stableNormalized(); }
-
-  /// The middle of the next triangle around an edge, if it can be gone to.
-  std::optional<Place> across(const Place& from, std::size_t edge, CellObstacles& obstacles) const {
-    const Triangle t = soup_.triangle(from.triangle);
-    const Facet facet(soup_.corners(from.triangle));
-    const std::uint32_t a = t[edge], b = t[(edge + 1) % 3], c = t[(edge + 2) % 3];
-    const Vector3d& origin = facet.corner[edge];
-    const Vector3d middle = 0.5 * (origin + facet.corner[(edge + 1) % 3]);
-    const double length = (facet.corner[(edge + 1) % 3] - origin).norm();
-    const Vector3d along = (facet.corner[(edge + 1) % 3] - origin).stableNormalized();
-    const auto away_from_edge = [&](const Vector3d& corner) {
-      const Vector3d way = corner - origin;
-      return Vector3d(way - way.dot(along) * along);
-    };
-    const Vector3d back = away_from_edge(facet.corner[(edge + 2) % 3]).stableNormalized();
-    double least = 2.0 * std::numbers::pi;
-    std::optional<Place> next;
-    const Voxel cell{floor_to_int(middle[0]), floor_to_int(middle[1]), floor_to_int(middle[2])};
-    obstacles.for_each_triangle(cell, [&](std::uint32_t number) {
-      const Triangle other = soup_.triangle(number);
-      const auto has = [&](std::uint32_t point) { return std::find(other.begin(), other.end(), point) != other.end(); };
-      // A second copy of the triangle is none to go to.
-      if (!has(a) || !has(b) || has(c)) return;
-      const Facet to(soup_.corners(number));
-      std::size_t i = 0;
-      while (i < 3 && (other[i] == a || other[i] == b)) ++i;
-      if (i == 3) return;
-      const Vector3d way = away_from_edge(to.corner[i]);
-      if (way.norm() <= 1e-9 * length) return;  // no area, no side
-      double angle = std::atan2(way.dot(from.up), way.dot(back));
-      if (angle < 0.0) angle += 2.0 * std::numbers::pi;
-      if (angle > least || (angle == least && (!next || number > next->triangle))) return;
-      least = angle;
-      const Vector3d up = std::sin(angle) * back - std::cos(angle) * from.up;
-      next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
-    });
-    if (least < kFolded) next.reset();
-    if (!next) return next;
-    const Vector3d bridge = middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
-    if (!obstacles.is_free(from.at, bridge) || !obstacles.is_free(bridge, next->at)) next.reset();
-    return next;
   }
 
   void find_pockets() {
@@ -297,18 +222,18 @@ class PocketOpener {
       }
   }
 
-  /// The region without blocks is the outside; large solids have such space, too, but no pocket is as far away.
+  /// kNone where there is no block, which neither the outside nor the depth of a solid has.
   std::uint32_t region_of(const Voxel& voxel) const {
     const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
-    if (i == BlockTable::kNone) return Regions::kOutside;
+    if (i == BlockTable::kNone) return BlockTable::kNone;
     const unsigned place = place_in_tile(voxel);
-    for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-      if (regions_.components[c].voxels[place >> 6] >> (place & 63) & 1) return regions_.components[c].region;
-    return Regions::kOutside;
+    std::uint32_t c = regions_.first[i];
+    while (!(regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)) ++c;  // each voxel is in one
+    return regions_.components[c].region;
   }
   bool is_goal(const Voxel& voxel) const {
-    if (bins_.blocks().find(tile_of(voxel)) == BlockTable::kNone) return false;
-    return goals_[region_of(voxel)];
+    const std::uint32_t region = region_of(voxel);
+    return region != BlockTable::kNone && goals_[region];
   }
 
   bool sees_goal(const Voxel& voxel, CellObstacles& obstacles) const {
