@@ -22,9 +22,9 @@ class Sha256 {
     check(context_ && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr));
   }
   void add(const void* bytes, std::size_t size) { check(EVP_DigestUpdate(context_.get(), bytes, size)); }
-  template <class T>
-  void add_array(const std::vector<T>& items) {
-    add(items.data(), items.size() * sizeof(T));
+  template <class Array>
+  void add_array(const Array& items) {
+    add(items.data(), items.size() * sizeof(items[0]));
   }
   std::string hex() {
     unsigned char digest[EVP_MAX_MD_SIZE];

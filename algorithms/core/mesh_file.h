@@ -16,7 +16,7 @@ namespace hermesh {
 struct MeshFile {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
-  std::vector<Quad> quads;
+  LargeArray<Quad> quads;
   std::vector<MeshAttribute> attributes;  ///< only where ReadOptions asked for them
   /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading
   /// back gives the same points.

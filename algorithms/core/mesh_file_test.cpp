@@ -223,7 +223,7 @@ TEST_F(MeshFileTest, PolygonsBecomeFansAndSliversOfTwoCornersGo) {
   const MeshFile mesh = read(
       "a.off", "OFF 6 4 0\n0 0 0\n1 0 0\n2 1 0\n1 2 0\n0 2 0\n-1 1 0\n5 0 1 2 3 4\n4 0 1 2 3\n2 0 1\n1 4\n");
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
-  EXPECT_EQ(mesh.quads, (std::vector<Quad>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.quads, (LargeArray<Quad>{{0, 1, 2, 3}}));
   EXPECT_EQ(mesh.triangle_count(), 5u);
   ASSERT_EQ(context.notes.size(), 1u);
   EXPECT_NE(context.notes[0].find("2 polygons with fewer than three corners"), std::string::npos);

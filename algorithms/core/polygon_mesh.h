@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/mesh_attribute.h"
 
 namespace hermesh {
@@ -21,7 +22,7 @@ struct PolygonMesh {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< world units
   std::vector<Eigen::Vector3f> points;               ///< world units, relative to origin
   std::vector<Triangle> triangles;
-  std::vector<Quad> quads;
+  LargeArray<Quad> quads;
   std::vector<MeshAttribute> attributes;  ///< of different names; read_mesh() reads them where asked to
 
   /// Position of a point in world units. This double is the point's position: a writer stores it without

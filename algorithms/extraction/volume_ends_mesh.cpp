@@ -60,7 +60,7 @@ class PlaneCut {
 
   void cut() {
     std::vector<Triangle> triangles;
-    std::vector<Quad> quads;
+    LargeArray<Quad> quads;
     triangles.swap(mesh_.triangles);
     quads.swap(mesh_.quads);
     for (const Triangle& t : triangles) {

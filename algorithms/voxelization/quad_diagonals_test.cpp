@@ -49,7 +49,7 @@ TEST(QuadDiagonals, ATieGoesToTheLowestPointWhereverTheFileStarts) {
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   mesh.quads = {{0, 1, 2, 3}, {1, 2, 3, 0}, {2, 3, 0, 1}, {3, 0, 1, 2}};
   choose_diagonals(mesh);
-  EXPECT_EQ(mesh.quads, (std::vector<Quad>{{0, 1, 2, 3}, {2, 3, 0, 1}, {2, 3, 0, 1}, {0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.quads, (LargeArray<Quad>{{0, 1, 2, 3}, {2, 3, 0, 1}, {2, 3, 0, 1}, {0, 1, 2, 3}}));
 }
 
 TEST(QuadDiagonals, HalfWithoutAreaIsAvoided) {

@@ -11,32 +11,44 @@
 namespace hermesh {
 namespace {
 
-/// The numbers of the points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
+/// The point of each active cell. Numbers within blocks are half as many bytes to touch as those of the mesh, and touching
+/// fresh memory is what the grid costs.
+struct MaskGrid {
+  LargeArray<std::uint16_t> numbers;  ///< by block and cell; of cells that are not active whatever the memory held
+  std::vector<std::uint64_t> first;   ///< by block: its first point
+};
+
+/// The points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
 class CellsAround {
  public:
-  CellsAround(const HermiteView& view, const LargeArray<std::uint32_t>& mask, std::size_t block, int axis)
-      : mask_(mask.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
+  CellsAround(const HermiteView& view, const MaskGrid& mask, std::size_t block, int axis)
+      : numbers_(mask.numbers.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
     for (int side = 0; side < 4; ++side) {
       int d[3] = {0, 0, 0};
       d[(axis + 1) % 3] = -(side & 1);
       d[(axis + 2) % 3] = -(side >> 1);
       const std::int64_t there = view.blocks()[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
       // Coordinate −1 is 7 there. A block that is not there has no cell of a crossing edge, and is not asked for.
-      first_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
+      cell_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
+      first_[side] = there < 0 ? 0 : static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(there)]);
     }
   }
 
-  Quad operator()(int sample) const {
-    const bool low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0;
-    return {mask_[first_[low_u + 2 * low_v] + sample - u_ - v_], mask_[first_[2 * low_v] + sample - v_],
-            mask_[first_[0] + sample], mask_[first_[low_u] + sample - u_]};
+  /// @return false if one of the cells has no point.
+  bool find(int sample, Quad& points) const {
+    const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
+    const std::uint16_t n[4] = {numbers_[cell_[low_u + low_v] + sample - u_ - v_], numbers_[cell_[low_v] + sample - v_],
+                                numbers_[cell_[0] + sample], numbers_[cell_[low_u] + sample - u_]};
+    points = {first_[low_u + low_v] + n[0], first_[low_v] + n[1], first_[0] + n[2], first_[low_u] + n[3]};
+    return n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
   }
 
  private:
   static constexpr int kStep[3] = {64, 8, 1};
-  const std::uint32_t* mask_;
+  const std::uint16_t* numbers_;
   const int u_, v_;
-  std::int64_t first_[4];
+  std::int64_t cell_[4];
+  std::uint32_t first_[4];
 };
 
 /// One run, stage by stage.
@@ -71,8 +83,7 @@ class Contourer {
     return view_of(hermite, context);
   }
 
-  /// The mask grid holds numbers within each block afterwards, and `places_` the points, with room for one an active
-  /// cell.
+  /// `places_` gets the points, with room for one an active cell.
   void merge() {
     Stage stage(context_, "merge cells");
     first_place_.resize(blocks_);
@@ -82,49 +93,57 @@ class Contourer {
       first_place_[b] = static_cast<std::uint64_t>(count(cells[b].active));
     });
     places_.resize(exclusive_scan(first_place_, "points"));
-    mask_.resize(512 * blocks_);
+    mask_.numbers.resize(512 * blocks_);
     results_.resize(blocks_);
     parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      results_[b] = merge_block(input_, static_cast<std::int32_t>(b), cells[b], mask_.data() + 512 * b,
-                                places_.data() + first_place_[b]);
+      std::uint16_t* mask = mask_.numbers.data() + 512 * b;
+      if (field_.leaves_out_outside()) std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
+      results_[b] =
+          merge_block(input_, static_cast<std::int32_t>(b), cells[b], mask, places_.data() + first_place_[b]);
     });
   }
 
   void number_points(PolygonMesh& mesh) {
     Stage stage(context_, "number points");
-    std::vector<std::uint64_t> first(blocks_);
-    for (std::size_t b = 0; b < blocks_; ++b) first[b] = results_[b].points;
-    mesh.points.resize(exclusive_scan(first, "points"));
+    mask_.first.resize(blocks_);
+    for (std::size_t b = 0; b < blocks_; ++b) mask_.first[b] = results_[b].points;
+    mesh.points.resize(exclusive_scan(mask_.first, "points"));
     const IndexToWorld& placement = hermite_.placement;
     parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      std::uint32_t* mask = mask_.data() + 512 * b;
-      for (int cell = 0; cell < 512; ++cell)
-        if (mask[cell] != kNoPoint) mask[cell] += static_cast<std::uint32_t>(first[b]);
       Eigen::Vector3d lower;
       for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
       for (std::uint32_t i = 0; i < results_[b].points; ++i)
-        mesh.points[first[b] + i] = placement.local(lower + places_[first_place_[b] + i].cast<double>()).cast<float>();
+        mesh.points[mask_.first[b] + i] =
+            placement.local(lower + places_[first_place_[b] + i].cast<double>()).cast<float>();
     });
     places_ = {};
   }
 
+  /// Groups of blocks keep their polygons until it is known how many there are before them: far fewer than crossing edges.
   void connect(PolygonMesh& mesh) {
     Stage stage(context_, "connect");
-    std::vector<std::uint64_t> quads(blocks_), triangles(blocks_);
-    parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      for_each_polygon(b, [&](const Quad&, int corners) { ++(corners == 4 ? quads : triangles)[b]; });
+    constexpr std::size_t kGroup = 64;
+    const std::size_t groups = (blocks_ + kGroup - 1) / kGroup;
+    std::vector<std::vector<Quad>> quads(groups);
+    std::vector<std::vector<Triangle>> triangles(groups);
+    std::vector<std::uint64_t> first_quad(groups), first_triangle(groups);
+    parallel_blocks(groups, context_, [&](std::size_t g) {
+      for (std::size_t b = g * kGroup; b < std::min(blocks_, (g + 1) * kGroup); ++b)
+        for_each_polygon(b, [&](const Quad& polygon, int corners) {
+          if (corners == 4)
+            quads[g].push_back(polygon);
+          else
+            triangles[g].push_back({polygon[0], polygon[1], polygon[2]});
+        });
+      first_quad[g] = quads[g].size();
+      first_triangle[g] = triangles[g].size();
     });
-    mesh.quads.resize(exclusive_scan(quads, "quads"));
-    mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
-    parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      Quad* quad = mesh.quads.data() + quads[b];
-      Triangle* triangle = mesh.triangles.data() + triangles[b];
-      for_each_polygon(b, [&](const Quad& polygon, int corners) {
-        if (corners == 4)
-          *quad++ = polygon;
-        else
-          *triangle++ = {polygon[0], polygon[1], polygon[2]};
-      });
+    mesh.quads.resize(exclusive_scan(first_quad, "quads"));
+    mesh.triangles.resize(exclusive_scan(first_triangle, "triangles"));
+    parallel_blocks(groups, context_, [&](std::size_t g) {
+      std::copy(quads[g].begin(), quads[g].end(), mesh.quads.begin() + static_cast<std::ptrdiff_t>(first_quad[g]));
+      std::copy(triangles[g].begin(), triangles[g].end(),
+                mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first_triangle[g]));
     });
   }
 
@@ -137,8 +156,8 @@ class Contourer {
       if (!any(block.crossing[axis])) continue;
       const CellsAround around(view_, mask_, b, axis);
       for_each_bit(block.crossing[axis], [&](int sample) {
-        Quad polygon = around(sample);
-        if (field_.leaves_out_outside() && std::find(polygon.begin(), polygon.end(), kNoPoint) != polygon.end()) return;
+        Quad polygon;
+        if (!around.find(sample, polygon)) return;
         int corners = 0;
         // Cells of one region follow one another: it is a cube.
         for (int i = 0; i < 4; ++i)
@@ -173,7 +192,7 @@ class Contourer {
   const std::size_t blocks_;
   std::vector<std::uint64_t> first_place_;  ///< by block
   LargeArray<Eigen::Vector3f> places_;      ///< voxels from the block's first sample
-  LargeArray<std::uint32_t> mask_;          ///< by block and cell: the number of its point
+  MaskGrid mask_;
   std::vector<BlockResult> results_;
 };
 

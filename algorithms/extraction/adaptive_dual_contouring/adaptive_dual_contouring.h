@@ -7,9 +7,9 @@
 //   6.3    both topology tests, the first by a table. They gate merging alone: a cell with several sheets still has
 //          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5).
 //   6.4    steps 1 to 4: level by level, a region is tried only if all its active cells are mergeable, and its cells
-//          are no longer mergeable once it fails; every block by itself; a mask grid of 32-bit integers, which hold the
-//          number of the cell's point in the end. (While a block is at work its levels and flags are one bit a region:
-//          nobody else reads them.)
+//          are no longer mergeable once it fails; every block by itself; a mask grid of integers, which hold the
+//          number of the cell's point in the end: 16 bits that count within the block, where the thesis has 32. (While a
+//          block is at work its levels and flags are one bit a region: nobody else reads them.)
 //   6.5    for every crossing edge the four cells around it give a quad, a triangle where they have three points, and
 //          nothing where they have fewer. The sign at the edge's first sample orients it.
 //

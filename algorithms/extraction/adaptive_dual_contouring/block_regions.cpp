@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace hermesh {
 namespace {
@@ -13,6 +12,7 @@ using Eigen::Vector3d;
 constexpr float kNoLimit = std::numeric_limits<float>::infinity();
 constexpr std::uint16_t kNoSlot = 512;
 constexpr int kAlone = -1;  ///< level of a cell that was not merged
+constexpr std::uint8_t kNoRegion = 255;
 constexpr float kMiddle =
     4.0f;  ///< planes and points are relative to the block's middle, for the sake of their squares
 
@@ -60,6 +60,9 @@ Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, i
                     Plane* plane) {
   // Of an upper neighbour the first layers count.
   const std::uint64_t layer = (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
+  std::uint64_t wanted = 0;
+  for (int x = 0; x < (d[0] ? 1 : 8); ++x) wanted |= owner.crossing[axis][x];
+  if (!(wanted & layer)) return plane;
   const EdgeCrossing* next = input.hermite.crossings.data() + input.hermite.leaves[owner.leaf].first;
   for (int a = 0; a < axis; ++a) next += count(owner.crossing[a]);
   for (int x = 0; x < (d[0] ? 1 : 8); ++x) {
@@ -130,7 +133,7 @@ struct Level {
   std::array<QefSum, 64> sums;
   std::array<Vector3d, 64> places;
   std::array<float, 64> limits;
-  std::array<std::uint32_t, 64> points;
+  std::array<std::uint16_t, 64> points;
 };
 
 class BlockMerger {
@@ -138,7 +141,7 @@ class BlockMerger {
   BlockMerger(const RegionInput& input, std::int32_t block, const BlockCells& cells)
       : input_(input), block_(input.view.blocks()[block]), lattice_(cells.lattice), active_(cells.active) {}
 
-  BlockResult merge(std::uint32_t* mask, Eigen::Vector3f* points) {
+  BlockResult merge(std::uint16_t* mask, Eigen::Vector3f* points) {
     sum_cells();
     const bool merges = input_.options.threshold > 0 || input_.field.simplifies_outside();
     if (merges) {
@@ -254,23 +257,23 @@ class BlockMerger {
     return kAlone;
   }
 
-  void number_cells(std::uint32_t* mask, Eigen::Vector3f* points) {
-    std::fill_n(mask, 512, kNoPoint);
+  void number_cells(std::uint16_t* mask, Eigen::Vector3f* points) {
     for (Level& level : levels_) level.points.fill(kNoPoint);
+    merged_into_.fill(kNoRegion);
     int alone = 0;
     for_each_bit(active_, [&](int cell) {
       const int number = level_of(cell);
-      cell_level_[cell] = static_cast<std::int8_t>(number);
       if (number == kAlone) {
         lone_cells_[alone] = static_cast<std::uint16_t>(cell);
         lone_sums_[alone++] = &sums_[slots_[cell]];
-        mask[cell] = result_.points++;
+        mask[cell] = static_cast<std::uint16_t>(result_.points++);
         return;
       }
       Level& level = levels_[number];
       const int region = kRegion[number][cell];
+      merged_into_[cell] = static_cast<std::uint8_t>(64 * number + region);
       if (level.points[region] == kNoPoint) {
-        level.points[region] = result_.points++;
+        level.points[region] = static_cast<std::uint16_t>(result_.points++);
         ++result_.regions[number];
         put(points[level.points[region]], level.places[region], kFirstCell[number][region], side_of(number));
       }
@@ -291,20 +294,21 @@ class BlockMerger {
   }
 
   void find_largest_distance() {
+    double largest = 0.0;
     for (int i = 0; i < plane_count_; ++i) {
       const Plane& plane = planes_[i];
-      int before = kAlone;
+      std::uint8_t before = kNoRegion;
       for_each_cell_around(plane, [&](int cell) {
-        const int number = slots_[cell] == kNoSlot ? kAlone : cell_level_[cell];
-        if (number == kAlone) return;
-        if (const int key = 64 * number + kRegion[number][cell]; std::exchange(before, key) == key) return;
-        const Vector3d& place = levels_[number].places[kRegion[number][cell]];
+        const std::uint8_t region = merged_into_[cell];
+        if (region == before || region == kNoRegion) return;
+        before = region;
+        const Vector3d& place = levels_[region >> 6].places[region & 63];
         double distance = 0.0;
         for (int a = 0; a < 3; ++a) distance += plane.normal[a] * (place[a] - plane.point[a]);
-        result_.largest_plane_distance =
-            std::max(result_.largest_plane_distance, static_cast<float>(std::fabs(distance)));
+        largest = std::max(largest, std::fabs(distance));
       });
     }
+    result_.largest_plane_distance = static_cast<float>(largest);
   }
 
   const RegionInput& input_;
@@ -315,7 +319,7 @@ class BlockMerger {
   int cells_ = 0, plane_count_ = 0;
   std::array<std::uint16_t, 512> slots_;  ///< by cell: where its sum is
   std::array<QefSum, 513> sums_;
-  std::array<std::int8_t, 512> cell_level_;  ///< of active cells
+  std::array<std::uint8_t, 512> merged_into_;  ///< by cell: 64 times the level and the region
   std::array<Level, 3> levels_;              ///< of regions of 2³, 4³ and 8³ cells
   std::array<std::uint16_t, 512> lone_cells_;
   std::array<const QefSum*, 512> lone_sums_;
@@ -330,7 +334,7 @@ BlockCells::BlockCells(const RegionInput& input, std::int32_t block)
   if (input.field.leaves_out_outside()) active = input.field.inside(input.view.blocks()[block].lower, active);
 }
 
-BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint32_t* mask,
+BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint16_t* mask,
                         Eigen::Vector3f* points) {
   return BlockMerger(input, block, cells).merge(mask, points);
 }

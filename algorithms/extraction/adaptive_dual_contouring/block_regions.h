@@ -19,8 +19,8 @@ struct RegionInput {
   const FieldEvaluator& field;
 };
 
-/// Entry of the mask grid for a cell that gets no point.
-inline constexpr std::uint32_t kNoPoint = 0xffffffffu;
+/// Entry of the mask grid for a cell that gets no point although the surface passes through it.
+inline constexpr std::uint16_t kNoPoint = 0xffff;
 
 /// What merging one block came to.
 struct BlockResult {
@@ -39,9 +39,10 @@ struct BlockCells {
   BlockMask active;
 };
 
-/// Merges, writes for each of the 512 cells the number of its point within the block to `mask` (or kNoPoint), and that
-/// many points, relative to the block's first sample, to `points`; there is room for one an active cell.
-BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint32_t* mask,
+/// Merges, writes for each active one of the 512 cells the number of its point within the block to `mask`, whose other
+/// entries stay as they are, and that many points, relative to the block's first sample, to `points`; there is room for
+/// one an active cell.
+BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint16_t* mask,
                         Eigen::Vector3f* points);
 
 }  // namespace hermesh

@@ -66,7 +66,7 @@ Eigen::Vector3d slope(const QefSum& sum, const Eigen::Vector3d& x) {
 
 /// The steps from the mass points, by the singular values that are kept. Compiled for wider vectors, too, and chosen
 /// when the program starts; every lane's operations are the same, and so are its bytes.
-[[gnu::target_clones("avx2", "default")]] void solve(EigenLanes& m, float truncation, const Lanes (&slopes)[3],
+[[gnu::target_clones("avx512f", "avx2", "default")]] void solve(EigenLanes& m, float truncation, const Lanes (&slopes)[3],
                                                      Lanes (&step)[3]) {
   decompose(m);
   const float share = truncation * truncation;

@@ -185,7 +185,7 @@ class Contourer {
     };
     const double first = height(quad, left_of(0, 2) ? std::array{0, 2, 3} : std::array{0, 1, 2}, hit, axis);
     const double second = height(quad, left_of(1, 3) ? std::array{1, 3, 0} : std::array{1, 2, 3}, hit, axis);
-    constexpr double kAlike = 1e-4;  // voxels
+    constexpr double kAlike = 1e-3;  // voxels
     const double difference = std::abs(first) - std::abs(second);
     if (std::abs(difference) > kAlike) return difference > 0;
     const double d02 = (positions_[quad[0]] - positions_[quad[2]]).squaredNorm();

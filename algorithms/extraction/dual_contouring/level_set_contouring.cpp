@@ -1,7 +1,6 @@
 #include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 
 #include <sys/mman.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <atomic>
@@ -56,11 +55,12 @@ class Plain final : public leaf_kernels::PlainCode {
   const DualContouringOptions& options_;
 };
 
-/// Count, scan, fill. What bounds each pass, by profiles of one thread on the bunny at 800 voxels with
-/// AVX-512: reading the signs, memory bandwidth; counting, the leaves' neighbours, that is latency;
-/// average placement, a third of the time waiting for the samples' cache lines in spite of the prefetches, then the
-/// gathers of corners; optimal placement, arithmetic (planes and eigenvalues) more than twice as long as all that; the
-/// quads, instructions: lists of bits, copies of places, shuffles. First touches of the results' pages come to 5 %.
+/// Count, scan, fill. What bounds each pass, by profiles of the bunny and the Nefertiti at 800 voxels with AVX-512: reading
+/// the signs, memory bandwidth; counting, the leaves' neighbours, that is latency; average placement, a third of the time
+/// waiting for the samples' cache lines in spite of the prefetches, then the gathers of corners; optimal placement,
+/// arithmetic more than twice as long as all that (planes first, then crossings); the quads, instructions: lists of bits,
+/// shuffles. Where the machine clears pages slowly, a fifth of it all goes into the first touches of the results, so nothing
+/// is kept beside these that can be found anew.
 class LevelSetContourer {
  public:
   LevelSetContourer(const SampledVolume& volume, const IndexToWorld& placement, const DualContouringOptions& options,
@@ -102,28 +102,32 @@ class LevelSetContourer {
     PolygonMesh mesh;
     mesh.origin = placement_.origin;
     reserve_huge(mesh.points, points_);
-    reserve_huge(mesh.quads, quads_);
     mesh.points.resize(points_);
-    LargeArray<leaf_kernels::Place> places(points_);
+    mesh.quads.resize(quads_);
     LargeArray<float> offsets(quads_ + leaf_kernels::kLargestVector);
     {
       const Stage stage(context_, "place points");
-      // A vector's new elements are written by one thread, which the others do not wait for.
-      tbb::parallel_invoke([&] { mesh.quads.resize(quads_); },
-                           [&] {
-                             parallel_blocks(live_.size(), context_, [&](std::size_t i) {
-                               if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
-                               place(live_[i], {places.data(), mesh.points.data()->data(), offsets.data()});
-                             });
-                           });
+      parallel_blocks(live_.size(), context_, [&](std::size_t i) {
+        if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
+        place(live_[i], {mesh.points.data()->data(), offsets.data()});
+      });
     }
     const Stage stage(context_, "connect");
     const bool mirrors = placement_.mirrors();
+    const Eigen::Matrix3d to_voxels = placement_.linear.inverse();
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
       const LeafCells& cells = cells_[live_[i]];
       if (cells.quads == 0) return;
-      leaf_kernels::ConnectInput input{upper_signs(upper_[live_[i]]), {}, places.data(), offsets.data() + cells.first_quad,
-                                       mirrors};
+      leaf_kernels::ConnectInput input{};
+      input.signs = upper_signs(upper_[live_[i]]);
+      input.points = mesh.points.data()->data();
+      input.offsets = offsets.data() + cells.first_quad;
+      input.mirrors = mirrors;
+      const Eigen::Vector3d corner = corner_of(live_[i]);
+      for (int axis = 0; axis < 3; ++axis) {
+        input.corner[axis] = static_cast<float>(corner[axis]);
+        for (int k = 0; k < 3; ++k) input.to_voxels[axis][k] = static_cast<float>(to_voxels(k, axis));
+      }
       const Neighbours lower = table_.neighbours(live_[i], -1);
       for (int slot = 0; slot < 8; ++slot)
         input.cells[slot] = lower[slot] >= 0 ? &cells_[static_cast<std::size_t>(lower[slot])] : nullptr;
@@ -139,6 +143,13 @@ class LevelSetContourer {
     UpperSigns signs;
     for (int slot = 0; slot < 8; ++slot) signs.inside[slot] = table_.signs(upper[slot]).data();
     return signs;
+  }
+
+  /// Where the leaf's first sample is in the mesh's coordinates.
+  Eigen::Vector3d corner_of(std::size_t leaf) const {
+    const Coord lower = table_.lower(leaf);
+    return placement_.local(Eigen::Vector3d(lower.x() - placement_.base[0], lower.y() - placement_.base[1],
+                                            lower.z() - placement_.base[2]));
   }
 
   /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more than the
@@ -193,14 +204,11 @@ class LevelSetContourer {
     input.plain = &plain;
     input.isovalue = table_.rule().isovalue;
     input.scale = table_.rule().scale;
-    const Coord lower = table_.lower(leaf);
-    const Eigen::Vector3d corner = placement_.local(Eigen::Vector3d(
-        lower.x() - placement_.base[0], lower.y() - placement_.base[1], lower.z() - placement_.base[2]));
+    const Eigen::Vector3d corner = corner_of(leaf);
     for (int row = 0; row < 3; ++row) {
       input.corner[row] = corner[row];
       for (int column = 0; column < 3; ++column) input.linear[row][column] = placement_.linear(row, column);
     }
-    output.places += cells.first_point;
     output.points += 3 * std::size_t{cells.first_point};
     output.offsets += cells.first_quad;
     (optimal ? kernels_.place_optimal : kernels_.place_average)(input, output);

@@ -21,7 +21,7 @@ void report(const UniformMesh& mesh, RunContext& context) {
 }
 
 PolygonMesh in_world(const std::vector<Eigen::Vector3d>& points, std::vector<Triangle> triangles,
-                     std::vector<Quad> quads, const FilePoints& file, RunContext& context) {
+                     LargeArray<Quad> quads, const FilePoints& file, RunContext& context) {
   PolygonMesh result;
   result.origin = file.placement().origin;
   result.points.resize(points.size());

@@ -46,7 +46,7 @@ namespace hermesh {
 
 struct UniformMesh {
   std::vector<Eigen::Vector3d> points;  ///< index space relative to the placement's base; FilePoints::rounded()
-  std::vector<Quad> quads;              ///< abc and acd, counter-clockwise seen from outside, in index space
+  LargeArray<Quad> quads;              ///< abc and acd, counter-clockwise seen from outside, in index space
   std::vector<Triangle> triangles;
 
   std::uint64_t cells = 0;           ///< that the surface passes through

@@ -63,16 +63,9 @@ struct PlaceInput : edge_kernels::LeafInput {
 /// Below it single precision cannot tell which singular values are to be dropped.
 inline constexpr float kLeastTruncation = 0.03f;
 
-/// A point within its cell: 16 bytes, so that it is copied in one piece.
-struct Place {
-  float x, y, z;  ///< voxels from the cell's first corner
-  std::uint32_t point;
-};
-
 /// Where they go.
 struct PlaceOutput {
-  Place* places;   ///< of the leaf's cells
-  float* points;   ///< the same in the mesh's coordinates, three numbers a point
+  float* points;   ///< of the leaf's cells, in the mesh's coordinates, three numbers a point
   float* offsets;  ///< of the leaf's crossing edges, from their first sample, in voxels
 };
 
@@ -87,8 +80,10 @@ struct ConnectInput {
   /// Cells of the leaf and its lower neighbours, at dx + 2dy + 4dz with the offsets turned positive; null where there is
   /// no leaf or none of its cells is needed.
   const LeafCells* cells[8];
-  const Place* places;   ///< of all points
+  const float* points;   ///< of the mesh
   const float* offsets;  ///< of the leaf's crossing edges; kLargestVector more can be read
+  float corner[3];       ///< where the leaf's first sample is in the mesh's coordinates
+  float to_voxels[3][4];  ///< by axis of the mesh: what a step along it is in voxels, and 0
   bool mirrors;          ///< turns the quads about
 };
 
