@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
@@ -15,34 +16,55 @@ namespace {
 using Eigen::Vector3d;
 using Cells = std::vector<CellBlocks::Cell>;
 
+bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
+  return std::tie(a.block, a.axis, a.sample) < std::tie(b.block, b.axis, b.sample);
+}
+
 class Trials {
  public:
   Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, RunContext& context)
-      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points), candidates_(cells.size()) {
+      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points), untested_(cells.size()) {
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      const auto block = static_cast<std::int32_t>(b);
-      for_each_bit(cells_[block].active, [&](int cell) {
-        if (polygons_.can_be_held({block, cell}) || is_joint_of_several({block, cell}))
-          candidates_[b].push_back({block, cell});
+      cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
+        for (const CellBlocks::Cell& cell : cells_.around(edge).cells)
+          if (is_tried(cell)) mark(edge);
       });
     });
   }
 
-  Cells not_worth_a_trial(RunContext& context) const {
-    return gathered(context, [&](const CellBlocks::Cell& cell, Cells& found) {
-      if (!polygons_.can_be_held(cell)) return;
-      if (polygons_.is_crowded(cell) || would_be_pinched(cell.block, cell.cell)) found.push_back(cell);
+  /// Cells with a face at which an edge would have four polygons.
+  Cells pinched(RunContext& context) const {
+    std::vector<Cells> found(cells_.size());
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      const auto block = static_cast<std::int32_t>(b);
+      for_each_bit(cells_[block].active, [&](int cell) {
+        if (polygons_.can_be_held({block, cell}) && would_be_pinched(block, cell)) found[b].push_back({block, cell});
+      });
     });
+    return joined(found);
   }
 
-  /// Tried cells with a polygon that meets another, and those of the other one.
-  Cells that_meet(RunContext& context) const {
-    return gathered(context, [&](const CellBlocks::Cell& cell, Cells& found) {
-      if (!is_tried(cell)) return;
+  /// Holds them; the polygons of their edges are to be tested anew.
+  void hold(const Cells& held, RunContext& context) {
+    polygons_.hold(held, points_, context);
+    for (const CellBlocks::Cell& cell : held)
       for (int edge = 0; edge < 12; ++edge)
-        if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
-          test_edge(at, found);
+        if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at)) mark(at);
+  }
+
+  /// Tried cells near polygons that meet. Those polygons are to be tested again next time, the others are not.
+  Cells that_meet(RunContext& context) {
+    std::vector<Cells> found(cells_.size());
+    std::vector<std::array<BlockMask, 3>> meeting(cells_.size());
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      for (int axis = 0; axis < 3; ++axis)
+        for_each_bit(untested_[b][axis], [&](int sample) {
+          if (meets({static_cast<std::int32_t>(b), sample, axis}, found[b]))
+            meeting[b][axis][sample >> 6] |= std::uint64_t{1} << (sample & 63);
+        });
     });
+    untested_ = std::move(meeting);
+    return joined(found);
   }
 
   void place_crossings(const FilePoints& file, RunContext& context) {
@@ -56,25 +78,23 @@ class Trials {
   }
 
  private:
-  template <class F>
-  Cells gathered(RunContext& context, F&& of_candidate) const {
-    std::vector<Cells> found(cells_.size());
-    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      for (const CellBlocks::Cell& cell : candidates_[b]) of_candidate(cell, found[b]);
-    });
+  static Cells joined(const std::vector<Cells>& lists) {
     Cells all;
-    for (const Cells& some : found) all.insert(all.end(), some.begin(), some.end());
+    for (const Cells& list : lists) all.insert(all.end(), list.begin(), list.end());
     return all;
+  }
+  void mark(const CellBlocks::Edge& edge) {
+    untested_[edge.block][edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
   }
 
   /// Whether both segments of an ambiguous face belong to one sheet in either cell beside it: then four polygons would meet
-  /// in the edge between the two cells' points.
+  /// in the edge between the two cells' points. To hold one of the two is enough, so only upper faces are looked at.
   bool would_be_pinched(std::int32_t block, int cell) const {
     const CellSheets& own = cells_.sheets(block, cell);
-    for (int face = 0; face < 6; ++face) {
+    for (int face = 1; face < 6; face += 2) {
       if (!((own.ambiguous_faces >> face) & 1)) continue;
       int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
-      at[face >> 1] += face & 1 ? 1 : -1;
+      ++at[face >> 1];
       const CellBlocks::Cell there = cells_.locate(block, at[0], at[1], at[2]);
       const auto has_one_sheet = [](const CellSheets& sheets, int f) {
         const std::array<int, 4> edges = face_edges(f);
@@ -93,36 +113,42 @@ class Trials {
   bool is_tried(const CellBlocks::Cell& cell) const {
     return is_joint_of_several(cell) || (polygons_.can_be_held(cell) && !polygons_.is_held(cell));
   }
-  /// With those beside them, so that few rounds do.
-  void add_tried(const CellBlocks::Edge& edge, Cells& found) const {
-    cells_.for_each_about({edge.block, edge.sample}, 2, [&](const CellBlocks::Cell& cell) {
+  /// Those at the two edges, or if there are none the nearest ones.
+  void add_tried(const CellBlocks::Edge& edge, const CellBlocks::Edge& other, Cells& found) const {
+    const std::size_t before = found.size();
+    const auto add = [&](const CellBlocks::Cell& cell) {
       if (is_tried(cell)) found.push_back(cell);
-    });
+    };
+    for (const CellBlocks::Edge& at : {edge, other})
+      for (const CellBlocks::Cell& cell : cells_.around(at).cells) add(cell);
+    for (int steps = 1; found.size() == before && steps <= 2; ++steps)
+      for (const CellBlocks::Edge& at : {edge, other}) cells_.for_each_about({at.block, at.sample}, steps, add);
   }
 
-  void test_edge(const CellBlocks::Edge& edge, Cells& found) const {
+  /// Of two edges that are to be tested, the first one asks.
+  bool meets(const CellBlocks::Edge& edge, Cells& found) const {
     bool meets = false;
     mesh_.for_each_triangle(edge, [&](const Triangle& t) {
       if (meets) return;
       bool itself = false;
       mesh_.for_each_near(edge.block, mesh_.box_of(t), [&](const CellBlocks::Edge& other, const Triangle& u) {
-        if (meets) return;
+        if (meets || (other < edge && test(untested_[other.block][other.axis], other.sample))) return;
         if (t == u && !itself) {
           itself = true;
         } else if (!mesh_.apart(t, u)) {
-          add_tried(edge, found);
-          add_tried(other, found);
+          add_tried(edge, other, found);
           meets = true;
         }
       });
     });
+    return meets;
   }
 
   const CellBlocks& cells_;
   EdgePolygons& polygons_;
   const PolygonNeighbourhood mesh_;
   std::vector<Vector3d>& points_;
-  std::vector<Cells> candidates_;  ///< by block: all that can be held, and joints of several sheets
+  std::vector<std::array<BlockMask, 3>> untested_;  ///< by block and axis: edges whose polygons may meet others
 };
 
 Cells without_repeats(Cells cells) {
@@ -139,15 +165,15 @@ Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, cons
                            std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "try sheets");
   Trials trials(cells, polygons, points, context);
-  Cells held = trials.not_worth_a_trial(context);
+  Cells held = trials.pinched(context);
   for (;;) {
-    if (!held.empty()) polygons.hold(held, points, context);
+    if (!held.empty()) trials.hold(held, context);
     trials.place_crossings(file, context);
-    const Cells meeting = trials.that_meet(context);
+    const Cells meeting = without_repeats(trials.that_meet(context));
     held.clear();
     std::ranges::copy_if(meeting, std::back_inserter(held),
                          [&](const CellBlocks::Cell& cell) { return polygons.can_be_held(cell); });
-    if (held.empty()) return without_repeats(meeting);
+    if (held.empty()) return meeting;
   }
 }
 
