@@ -33,7 +33,7 @@ class LabelledGrid : public CellGrid {
   const IndexToWorld& placement() const override { return solid_.placement; }
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override;
   std::span<const std::array<BlockMask, 3>> cuts() const override { return cuts_; }
-  std::span<const JointSheetsOfBlock> joint_sheets() const override { return joint_sheets_; }
+  std::span<const SheetsOfBlock> joint_sheets() const override { return joint_sheets_; }
 
   /// By the number of the crossing edge: by block, axis and sample.
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
@@ -47,7 +47,7 @@ class LabelledGrid : public CellGrid {
 
   LabelledSolid& solid_;
   std::vector<std::array<BlockMask, 3>> cuts_;
-  std::vector<JointSheetsOfBlock> joint_sheets_;
+  std::vector<SheetsOfBlock> joint_sheets_;
   std::vector<std::uint32_t> first_;  ///< by block its first crossing edge
   LargeArray<EdgeCrossing> crossings_;
   LargeArray<EdgeSides> sides_;

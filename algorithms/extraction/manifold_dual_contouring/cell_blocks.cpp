@@ -6,6 +6,15 @@
 #include "algorithms/core/parallel.h"
 
 namespace hermesh {
+namespace {
+
+/// Whether all crossings of a face belong to one sheet.
+bool has_one_sheet(const CellSheets& sheets, int face) {
+  const std::array<int, 4> edges = face_edges(face);
+  return std::ranges::all_of(edges, [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
+}
+
+}  // namespace
 
 CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     : grid_(grid),
@@ -35,28 +44,84 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       before += static_cast<std::uint32_t>(bits_in(block.active[word]));
     }
     found[b].reserve(before);
-    std::uint16_t later = 0;
     for_each_bit(block.active, [&](int cell) {
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
       found[b].push_back(static_cast<std::uint8_t>(code));
-      const int sheets = test(block.joints, cell) ? joint_points(static_cast<std::int32_t>(b), cell)
-                                                  : kCellSheets[code].sheets;
-      if (sheets > 1) {
-        block.several.emplace_back(static_cast<std::uint16_t>(cell), later);
-        later = static_cast<std::uint16_t>(later + sheets - 1);
-      }
     });
     codes[b] = before;
-    points[b] = before + later;
   });
   codes_.resize(exclusive_scan(codes, "cells"));
-  points_ = exclusive_scan(points, "points");
-  for (std::size_t b = 0; b < n; ++b) {
+  parallel_blocks(n, context, [&](std::size_t b) {
     blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
-    blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
     std::copy(found[b].begin(), found[b].end(), codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
-  }
+  });
+  unpinch(context);
+  parallel_blocks(n, context, [&](std::size_t b) {
+    std::uint16_t later = 0;
+    for_each_bit(blocks_[b].active, [&](int cell) {
+      const int sheets = point_count(static_cast<std::int32_t>(b), cell);
+      if (sheets <= 1) return;
+      blocks_[b].several.emplace_back(static_cast<std::uint16_t>(cell), later);
+      later = static_cast<std::uint16_t>(later + sheets - 1);
+    });
+    points[b] = found[b].size() + later;
+  });
+  points_ = exclusive_scan(points, "points");
+  for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
+}
+
+/// One face after the other, for what is done to one may help the next one of its cells.
+void CellBlocks::unpinch(RunContext& context) {
+  struct Face {
+    std::int32_t block;
+    int cell, face;
+  };
+  std::vector<std::vector<Face>> faces(blocks_.size());
+  parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
+    const auto block = static_cast<std::int32_t>(b);
+    for_each_bit(blocks_[b].active, [&](int cell) {
+      for (int face = 1; face < 6; face += 2)
+        if (is_pinched(block, cell, face)) faces[b].push_back({block, cell, face});
+    });
+  });
+  std::vector<std::vector<std::pair<std::uint16_t, std::uint8_t>>> joined(blocks_.size());  // by block: cells, and faces
+  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& {
+    auto& list = joined[static_cast<std::size_t>(at.block)];
+    const auto found = std::ranges::find(list, at.cell, [](const auto& entry) { return int(entry.first); });
+    if (found != list.end()) return found->second;
+    return list.emplace_back(static_cast<std::uint16_t>(at.cell), std::uint8_t{0}).second;
+  };
+  for (const auto& list : faces)
+    for (const auto& [block, cell, face] : list) {
+      const Cell lower{block, cell}, upper = beside(block, cell, face);
+      if (is_joint(lower.block, lower.cell) || is_joint(upper.block, upper.cell)) continue;
+      const auto sheets_of = [&](const Cell& at) { return cell_sheets(codes_[code_at(at.block, at.cell)], joined_faces(at)); };
+      if (!has_one_sheet(sheets_of(lower), face) || !has_one_sheet(sheets_of(upper), face ^ 1)) continue;
+      joined_faces(lower) |= static_cast<std::uint8_t>(1 << face);
+      joined_faces(upper) |= static_cast<std::uint8_t>(1 << (face ^ 1));
+    }
+  parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
+    std::ranges::sort(joined[b]);
+    for (const auto& [cell, which] : joined[b]) {
+      blocks_[b].unpinched[cell >> 6] |= std::uint64_t{1} << (cell & 63);
+      blocks_[b].unpinched_sheets.emplace_back(
+          cell, cell_sheets(codes_[code_at(static_cast<std::int32_t>(b), cell)], which));
+    }
+  });
+}
+
+bool CellBlocks::is_pinched(std::int32_t block, int cell, int face) const {
+  const CellSheets& own = sheets(block, cell);
+  if (!((own.ambiguous_faces >> face) & 1) || !has_one_sheet(own, face)) return false;
+  const Cell there = beside(block, cell, face);
+  return has_one_sheet(sheets(there.block, there.cell), face ^ 1);
+}
+
+CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) const {
+  int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
+  at[face >> 1] += face & 1 ? 1 : -1;
+  return locate(block, at[0], at[1], at[2]);
 }
 
 /// A block that owns no crossing edge has one sign, and so have the blocks that are not there, up to the nearest owner
@@ -126,8 +191,12 @@ double CellBlocks::margin_for_rounding() const {
   return std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
 }
 
+const CellSheets& CellBlocks::find(const SheetsOfBlock& list, int cell) {
+  return std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); })->second;
+}
+
 const CellSheets* CellBlocks::find_told(std::int32_t block, int cell) const {
-  const JointSheetsOfBlock& list = told_[static_cast<std::size_t>(block)];
+  const SheetsOfBlock& list = told_[static_cast<std::size_t>(block)];
   const auto at =
       std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); });
   return at != list.end() && at->first == cell ? &at->second : nullptr;
@@ -188,9 +257,7 @@ bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
   const CellSheets& own = sheets(block, cell);
   if (own.sheets > 1 || own.ambiguous_faces != 0) return true;
   for (int face = 0; face < 6; ++face) {
-    int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
-    at[face >> 1] += face & 1 ? 1 : -1;
-    const Cell there = locate(block, at[0], at[1], at[2]);
+    const Cell there = beside(block, cell, face);
     if (there.block >= 0 && test(blocks_[there.block].active, there.cell) &&
         sheets(there.block, there.cell).sheets > 1)
       return true;

@@ -2,8 +2,8 @@
 //
 // The lattice is that of Hermite data, or one whose inside is divided among several pieces
 // (algorithms/fracture/): then an edge is crossed, too, whose ends are both inside, but in different pieces.
-// Such an edge is a *cut*. A cell without a cut is as in Hermite data: kCellSheets tells its sheets from the
-// inside bits of its corners. A cell with a cut is a *joint*. Most have one point, which all their crossing
+// Such an edge is a *cut*. A cell without a cut is as in Hermite data: the inside bits of its corners tell its
+// sheets. A cell with a cut is a *joint*. Most have one point, which all their crossing
 // edges share; for the others the lattice tells the sheets. Who makes such a lattice sees to it that the
 // pieces become manifold (fracture/label_repair.h).
 #pragma once
@@ -19,8 +19,8 @@
 
 namespace hermesh {
 
-/// The joints of a block that have several sheets or an ambiguous face, by cell, ascending.
-using JointSheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
+/// Cells of a block whose sheets are not those of kCellSheets, ascending.
+using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 
 /// What the cells are made from.
 class CellGrid {
@@ -33,8 +33,8 @@ class CellGrid {
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
   /// By block and axis those crossing edges that are cuts; empty where there are none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
-  /// By block; empty where there are none.
-  virtual std::span<const JointSheetsOfBlock> joint_sheets() const { return {}; }
+  /// By block the joints that have several sheets or an ambiguous face; empty where there are none.
+  virtual std::span<const SheetsOfBlock> joint_sheets() const { return {}; }
 };
 
 class CellBlocks {
@@ -43,6 +43,8 @@ class CellBlocks {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
     BlockMask joints{};  ///< of these, those with a cut
+    BlockMask unpinched{};      ///< of these, those with a face that was pinched
+    SheetsOfBlock unpinched_sheets;
     std::uint32_t first_point = 0, first_code = 0;
     std::array<std::uint32_t, 8> rank{};  ///< active cells before each word
     /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
@@ -80,11 +82,18 @@ class CellBlocks {
   /// By the inside bits of the corners, but for those joints of which the lattice tells them. Of other joints
   /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
   /// it has one sheet (or none, all corners being inside) and no ambiguous face.
+  ///
+  /// An ambiguous face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons
+  /// would meet in the edge between the two cells' points. There the inside is joined and the outside corners are cut off,
+  /// which parts each of the two sheets into two, and closes a tunnel of less than a voxel or opens a wall of less than one.
   const CellSheets& sheets(std::int32_t block, int cell) const {
     if (const CellSheets* told = told_sheets(block, cell)) return *told;
+    if (test(blocks_[block].unpinched, cell)) return find(blocks_[block].unpinched_sheets, cell);
     return kCellSheets[codes_[code_at(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
+  /// Of an active cell's face. Only faces of joints are.
+  bool is_pinched(std::int32_t block, int cell, int face) const;
   /// Points of an active cell.
   int point_count(std::int32_t block, int cell) const {
     return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
@@ -153,6 +162,9 @@ class CellBlocks {
     return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;
   }
   const CellSheets* find_told(std::int32_t block, int cell) const;
+  static const CellSheets& find(const SheetsOfBlock& list, int cell);
+  Cell beside(std::int32_t block, int cell, int face) const;
+  void unpinch(RunContext& context);
   int joint_points(std::int32_t block, int cell) const {
     const CellSheets* told = told_sheets(block, cell);
     return told ? told->sheets : 1;
@@ -166,7 +178,7 @@ class CellBlocks {
   const CellGrid& grid_;
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
-  const std::span<const JointSheetsOfBlock> told_;
+  const std::span<const SheetsOfBlock> told_;
   std::vector<Block> blocks_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;

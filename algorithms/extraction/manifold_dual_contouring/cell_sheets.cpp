@@ -5,7 +5,7 @@ namespace {
 
 constexpr bool inside(int signs, int corner) { return (signs >> corner) & 1; }
 
-constexpr void cut_faces(int signs, CellSheets& cell) {
+constexpr void cut_faces(int signs, unsigned joined, CellSheets& cell) {
   for (auto& face : cell.partner) face.fill(CellSheets::kNone);
   for (int face = 0; face < 6; ++face) {
     const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
@@ -19,8 +19,9 @@ constexpr void cut_faces(int signs, CellSheets& cell) {
     if (count == 2) join(crossed[0], crossed[1]);
     if (count < 4) continue;
     cell.ambiguous_faces |= static_cast<std::uint8_t>(1 << face);
+    const bool cut_off = !((joined >> face) & 1);  // which of the corners are
     for (int i = 0; i < 4; ++i)
-      if (inside(signs, corners[i])) join(edges[(i + 3) % 4], edges[i]);
+      if (inside(signs, corners[i]) == cut_off) join(edges[(i + 3) % 4], edges[i]);
   }
 }
 
@@ -47,7 +48,7 @@ constexpr void number_loops(CellSheets& cell) {
 constexpr std::array<CellSheets, 256> all_cells() {
   std::array<CellSheets, 256> table{};
   for (int signs = 0; signs < 256; ++signs) {
-    cut_faces(signs, table[signs]);
+    cut_faces(signs, 0, table[signs]);
     number_loops(table[signs]);
   }
   return table;
@@ -56,5 +57,12 @@ constexpr std::array<CellSheets, 256> all_cells() {
 }  // namespace
 
 constinit const std::array<CellSheets, 256> kCellSheets = all_cells();
+
+CellSheets cell_sheets(int signs, unsigned joined_faces) {
+  CellSheets cell;
+  cut_faces(signs, joined_faces, cell);
+  number_loops(cell);
+  return cell;
+}
 
 }  // namespace hermesh

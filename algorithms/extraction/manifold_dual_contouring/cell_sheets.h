@@ -29,6 +29,11 @@ struct CellSheets {
 /// lie (but not at the corners): so the convex hulls of two loops never meet. The test tries all patterns.
 extern const std::array<CellSheets, 256> kCellSheets;
 
+/// The same, but on the ambiguous faces among `joined_faces`, a bit a face, the outside corners are cut off one by one and
+/// the inside is joined. The guarantee holds for these, too, unless every other corner is inside and several faces are
+/// joined. (Then none has all of its crossings in one loop, so nobody asks for it.)
+CellSheets cell_sheets(int signs, unsigned joined_faces);
+
 constexpr int edge_axis(int edge) { return edge >> 2; }
 /// Offset of an edge's first corner.
 constexpr std::array<int, 3> edge_offset(int edge) {

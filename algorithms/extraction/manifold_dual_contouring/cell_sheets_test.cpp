@@ -47,22 +47,45 @@ TEST(CellSheets, SegmentsCloseToLoopsOfCrossedEdges) {
 
 /// A cell and its neighbour read the same segments off the face between them.
 TEST(CellSheets, BothSidesOfAFaceCutItAlike) {
-  for (int axis = 0; axis < 3; ++axis)
-    for (int pattern = 0; pattern < 16; ++pattern) {
-      int below = 0, above = 0;  // signs of a cell with the face above it, and of the cell on its other side
-      for (int i = 0; i < 4; ++i) {
-        below |= ((pattern >> i) & 1) << face_corners(2 * axis + 1)[i];
-        above |= ((pattern >> i) & 1) << face_corners(2 * axis)[i];
+  for (const bool joined : {false, true})
+    for (int axis = 0; axis < 3; ++axis)
+      for (int pattern = 0; pattern < 16; ++pattern) {
+        const int lower = 2 * axis, upper = 2 * axis + 1;
+        int below = 0, above = 0;  // signs of a cell with the face above it, and of the cell on its other side
+        for (int i = 0; i < 4; ++i) {
+          below |= ((pattern >> i) & 1) << face_corners(upper)[i];
+          above |= ((pattern >> i) & 1) << face_corners(lower)[i];
+        }
+        const CellSheets sheets_below = cell_sheets(below, joined ? 1u << upper : 0);
+        const CellSheets sheets_above = cell_sheets(above, joined ? 1u << lower : 0);
+        const std::array<int, 4> top = face_edges(upper), bottom = face_edges(lower);
+        for (int i = 0; i < 4; ++i) {
+          const int a = sheets_below.partner[upper][top[i]], b = sheets_above.partner[lower][bottom[i]];
+          const int from_a = int(std::find(top.begin(), top.end(), a) - top.begin());
+          const int from_b = int(std::find(bottom.begin(), bottom.end(), b) - bottom.begin());
+          ASSERT_EQ(from_a, from_b) << axis << ' ' << pattern << ' ' << i;
+        }
       }
-      const std::array<int, 4> top = face_edges(2 * axis + 1), bottom = face_edges(2 * axis);
-      for (int i = 0; i < 4; ++i) {
-        const int a = kCellSheets[below].partner[2 * axis + 1][top[i]];
-        const int b = kCellSheets[above].partner[2 * axis][bottom[i]];
-        const int from_a = int(std::find(top.begin(), top.end(), a) - top.begin());
-        const int from_b = int(std::find(bottom.begin(), bottom.end(), b) - bottom.begin());
-        ASSERT_EQ(from_a, from_b) << axis << ' ' << pattern << ' ' << i;
-      }
+}
+
+bool has_one_sheet(const CellSheets& cell, int face) {
+  for (const int edge : face_edges(face))
+    if (cell.sheet_of[edge] != cell.sheet_of[face_edges(face)[0]]) return false;
+  return true;
+}
+
+TEST(CellSheets, JoiningAFaceOfOneSheetPartsThatAndNoOther) {
+  int faces = 0;
+  for (int signs = 0; signs < 256; ++signs)
+    for (int face = 0; face < 6; ++face) {
+      const CellSheets& cell = kCellSheets[signs];
+      if (!((cell.ambiguous_faces >> face) & 1) || !has_one_sheet(cell, face)) continue;
+      ++faces;
+      const CellSheets joined = cell_sheets(signs, 1u << face);
+      EXPECT_EQ(joined.sheets, cell.sheets + 1) << signs << " face " << face;
+      EXPECT_FALSE(has_one_sheet(joined, face)) << signs << " face " << face;
     }
+  EXPECT_EQ(faces, 36);
 }
 
 /// Twice the plane's coefficients: normal and offset.
@@ -84,29 +107,35 @@ int side(int edge, const Plane& plane) {
   return 0;
 }
 
+bool are_separated(const CellSheets& cell, int a, int b) {
+  for (int n = 0; n < 27; ++n)
+    for (int offset = -6; offset <= 6; ++offset) {
+      const Plane plane{{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1}, offset};
+      bool all = true;
+      for (int edge = 0; edge < 12 && all; ++edge) {
+        if (cell.sheet_of[edge] == a) all = side(edge, plane) == 1;
+        if (cell.sheet_of[edge] == b) all = side(edge, plane) == -1;
+      }
+      if (all) return true;
+    }
+  return false;
+}
+
 /// The guarantee of the header.
 TEST(CellSheets, APlaneSeparatesEveryTwoLoops) {
-  int pairs = 0;
-  for (int signs = 0; signs < 256; ++signs) {
-    const CellSheets& cell = kCellSheets[signs];
-    for (int a = 0; a < cell.sheets; ++a)
-      for (int b = a + 1; b < cell.sheets; ++b) {
-        ++pairs;
-        bool separated = false;
-        for (int n = 0; n < 27 && !separated; ++n)
-          for (int offset = -6; offset <= 6 && !separated; ++offset) {
-            const Plane plane{{n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1}, offset};
-            bool all = true;
-            for (int edge = 0; edge < 12 && all; ++edge) {
-              if (cell.sheet_of[edge] == a) all = side(edge, plane) == 1;
-              if (cell.sheet_of[edge] == b) all = side(edge, plane) == -1;
-            }
-            separated = all;
-          }
-        EXPECT_TRUE(separated) << signs << ": " << a << " and " << b;
-      }
-  }
-  EXPECT_GT(pairs, 50);
+  int pairs = 0, patterns = 0;
+  for (int signs = 0; signs < 256; ++signs)
+    for (unsigned joined = 0; joined < 64; ++joined) {
+      if (joined & ~unsigned{kCellSheets[signs].ambiguous_faces}) continue;
+      if (joined && kCellSheets[signs].sheets == 4) continue;  // every other corner is inside: the header's exception
+      ++patterns;
+      const CellSheets cell = cell_sheets(signs, joined);
+      for (int a = 0; a < cell.sheets; ++a)
+        for (int b = a + 1; b < cell.sheets; ++b, ++pairs)
+          EXPECT_TRUE(are_separated(cell, a, b)) << signs << ", " << joined << ": " << a << " and " << b;
+    }
+  EXPECT_EQ(patterns, 656 - 2 * 63);
+  EXPECT_GT(pairs, 250);
 }
 
 }  // namespace

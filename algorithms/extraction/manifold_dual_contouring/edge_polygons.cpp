@@ -79,47 +79,6 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::v
   number_all(context);
 }
 
-bool EdgePolygons::can_be_flattened(const CellBlocks::Edge& edge) const {
-  const CellBlocks::Around around = cells_.around(edge);
-  for (int i = 0; i < 4; ++i)
-    if (is_explicit(around, i)) return false;
-  return true;
-}
-
-void EdgePolygons::flatten(const CellBlocks::Edge& edge, int diagonal) {
-  BlockEdges& edges = edges_[edge.block];
-  const std::uint64_t bit = std::uint64_t{1} << (edge.sample & 63);
-  const auto word = [&](BlockMask& mask) { return std::atomic_ref(mask[static_cast<std::size_t>(edge.sample >> 6)]); };
-  if (diagonal)
-    word(edges.second_diagonal[edge.axis]).fetch_or(bit, std::memory_order_relaxed);
-  else
-    word(edges.second_diagonal[edge.axis]).fetch_and(~bit, std::memory_order_relaxed);
-  word(edges.flattened[edge.axis]).fetch_or(bit, std::memory_order_relaxed);
-}
-
-void EdgePolygons::undo_flatten(const CellBlocks::Edge& edge) {
-  std::uint64_t& word = edges_[edge.block].flattened[edge.axis][static_cast<std::size_t>(edge.sample >> 6)];
-  std::atomic_ref(word).fetch_and(~(std::uint64_t{1} << (edge.sample & 63)), std::memory_order_relaxed);
-}
-
-void EdgePolygons::number_flattened(std::vector<Vector3d>& points, RunContext& context) {
-  std::size_t kept = cells_.point_count();
-  for (std::size_t b = 0; b < edges_.size(); ++b) {
-    const auto block = static_cast<std::int32_t>(b);
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(edges_[b].fanned[axis], [&](int sample) {
-        const CellBlocks::Edge edge{block, sample, axis};
-        if (is_fanned(edge)) points[kept++] = points[crossing_point(edge)];
-      });
-  }
-  points.resize(kept);
-  for (BlockEdges& edges : edges_)
-    for (int axis = 0; axis < 3; ++axis)
-      for (std::size_t word = 0; word < 8; ++word) edges.fanned[axis][word] &= ~edges.flattened[axis][word];
-  for (BlockEdges& edges : edges_) edges.flattened = {};
-  number_all(context);
-}
-
 std::uint64_t EdgePolygons::held_cells() const {
   std::uint64_t sum = 0;
   for (const BlockEdges& block : edges_) sum += static_cast<std::uint64_t>(count(block.held));

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -23,8 +22,8 @@ class EdgePolygons {
 
   /// Whether the cell would have explicit faces of its own if it were held to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
-  /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, tests of single
-  /// polygons cost much and rarely end well.
+  /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, a point finds no
+  /// room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
   bool is_held(const CellBlocks::Cell& cell) const { return test(edges_[cell.block].held, cell.cell); }
   /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
@@ -39,19 +38,8 @@ class EdgePolygons {
   std::uint32_t first_quad(std::int32_t block) const { return edges_[block].first_quad; }
   std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
 
-  bool is_fanned(const CellBlocks::Edge& edge) const {
-    const BlockEdges& edges = edges_[edge.block];
-    return has(edges.fanned[edge.axis], edge.sample) && !has(edges.flattened[edge.axis], edge.sample);
-  }
-  /// Whether a fanned edge might as well have a quad: no other edge has polygons with its crossing.
-  bool can_be_flattened(const CellBlocks::Edge& edge) const;
-  /// Makes a quad cut along that diagonal (0 or 1) of a fan; and a fan again. Whether it meets others is for the caller to
-  /// find out. Safe while other threads do so for other edges. Numbers of points stay as they are until number_flattened().
-  void flatten(const CellBlocks::Edge& edge, int diagonal);
-  void undo_flatten(const CellBlocks::Edge& edge);
-  /// Takes the crossings of flattened edges out of the points, and numbers the others and the polygons anew.
-  void number_flattened(std::vector<Eigen::Vector3d>& points, RunContext& context);
-  /// Of an edge that is or was fanned.
+  bool is_fanned(const CellBlocks::Edge& edge) const { return test(edges_[edge.block].fanned[edge.axis], edge.sample); }
+  /// Of a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
   /// Calls quad(Quad) or triangle(Triangle), counter-clockwise seen from outside (at a cut from the edge's second sample).
@@ -61,7 +49,7 @@ class EdgePolygons {
     const CellBlocks::Around around = cells_.around(edge);
     const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
     if (!is_fanned(edge)) {
-      const int d = has(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
+      const int d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
       Quad q = {around.points[d], around.points[d + 1], around.points[d + 2], around.points[(d + 3) % 4]};
       if (!outwards) std::swap(q[1], q[3]);
       quad(q);
@@ -88,16 +76,9 @@ class EdgePolygons {
  private:
   struct BlockEdges {
     std::array<BlockMask, 3> fanned{}, second_diagonal{};
-    std::array<BlockMask, 3> flattened{};  ///< of the fanned ones, by flatten()
     BlockMask held{};
     std::uint32_t first_crossing_point = 0, first_quad = 0, first_triangle = 0;
   };
-
-  /// As test(), while other bits of the word change.
-  static bool has(const BlockMask& mask, int sample) {
-    auto& word = const_cast<std::uint64_t&>(mask[static_cast<std::size_t>(sample >> 6)]);  // C++20 wants it so, to read
-    return (std::atomic_ref(word).load(std::memory_order_relaxed) >> (sample & 63)) & 1;
-  }
 
   bool is_explicit(const CellBlocks::Around& around, int i) const {
     return cells_.is_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));

@@ -20,10 +20,9 @@ struct PointWish {
 
 /// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but is
 /// not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one another
-/// (triangle_contact.h), so a mesh free of self-intersection stays so. Where the fans of its edges are in the way, because
-/// the crossings stay, they become quads. Wishes by block; places that are fulfilled already, and
+/// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already, and
 /// those of crowded cells, are passed over. The same result at any number of threads. @throws Cancelled
-void move_points(const CellBlocks& cells, EdgePolygons& polygons,
+void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
                  std::vector<Eigen::Vector3d>& points, RunContext& context);
 

@@ -174,6 +174,43 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
   }
 }
 
+/// Share of the cells that are held to their segments, of the last mesh made with the context.
+double share_held(const RunContext& context) {
+  const auto figure = [&](const std::string& name) {
+    return std::ranges::find(context.figures, name, [](const auto& entry) { return entry.first; })->second;
+  };
+  return figure("held_cells") / figure("cells");
+}
+
+TEST(ManifoldDualContouring, NeedsTheLastResortInHardlyACellOfWhiteNoise) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  auto access = grid->getAccessor();
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  for (int i = 0; i < 20 * 20 * 20; ++i) access.setValue({i / 400, i / 20 % 20, i % 20}, value(random));
+  RunContext context;
+  const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
+  manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
+  EXPECT_LT(share_held(context), 0.005);
+}
+
+/// Most cells have two sheets, beside many of their kind.
+TEST(ManifoldDualContouring, NeedsNoLastResortForAThinPlate) {
+  RunContext context;
+  const Vector3d across = Vector3d(3, 5, 2).normalized();
+  const AnalyticSurface surface = {
+      .value = [&](const Vector3d& p) { return std::max(std::abs(across.dot(p)) - 0.35, p.norm() - 12.0); },
+      .gradient =
+          [&](const Vector3d& p) {
+            return std::abs(across.dot(p)) - 0.35 > p.norm() - 12.0 ? Vector3d(across.dot(p) < 0 ? -across : across) : p;
+          },
+  };
+  const FloatHermite hermite = sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
+  manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
+  EXPECT_EQ(share_held(context), 0.0);
+}
+
 TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
   RunContext context;
   initialize_openvdb();

@@ -32,13 +32,15 @@ class Trials {
     });
   }
 
-  /// Cells with a face at which an edge would have four polygons.
+  /// Cells beside joints with a pinched face.
   Cells pinched(RunContext& context) const {
     std::vector<Cells> found(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       for_each_bit(cells_[block].active, [&](int cell) {
-        if (polygons_.can_be_held({block, cell}) && would_be_pinched(block, cell)) found[b].push_back({block, cell});
+        if (!polygons_.can_be_held({block, cell})) return;
+        for (int face = 0; face < 6; ++face)
+          if (cells_.is_pinched(block, cell, face)) return found[b].push_back({block, cell});
       });
     });
     return joined(found);
@@ -87,40 +89,24 @@ class Trials {
     untested_[edge.block][edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
   }
 
-  /// Whether both segments of an ambiguous face belong to one sheet in either cell beside it: then four polygons would meet
-  /// in the edge between the two cells' points. To hold one of the two is enough, so only upper faces are looked at.
-  bool would_be_pinched(std::int32_t block, int cell) const {
-    const CellSheets& own = cells_.sheets(block, cell);
-    for (int face = 1; face < 6; face += 2) {
-      if (!((own.ambiguous_faces >> face) & 1)) continue;
-      int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
-      ++at[face >> 1];
-      const CellBlocks::Cell there = cells_.locate(block, at[0], at[1], at[2]);
-      const auto has_one_sheet = [](const CellSheets& sheets, int f) {
-        const std::array<int, 4> edges = face_edges(f);
-        for (const int edge : edges)
-          if (sheets.sheet_of[edge] != sheets.sheet_of[edges[0]]) return false;
-        return true;
-      };
-      if (has_one_sheet(own, face) && has_one_sheet(cells_.sheets(there.block, there.cell), face ^ 1)) return true;
-    }
-    return false;
-  }
-
   bool is_joint_of_several(const CellBlocks::Cell& cell) const {
     return cells_.is_joint(cell.block, cell.cell) && cells_.point_count(cell.block, cell.cell) > 1;
   }
   bool is_tried(const CellBlocks::Cell& cell) const {
     return is_joint_of_several(cell) || (polygons_.can_be_held(cell) && !polygons_.is_held(cell));
   }
-  /// Those at the two edges, or if there are none the nearest ones.
+  /// Those around both edges; if there are none those around one, around the other, or the nearest ones.
   void add_tried(const CellBlocks::Edge& edge, const CellBlocks::Edge& other, Cells& found) const {
     const std::size_t before = found.size();
+    const auto at_edge = cells_.around(edge).cells, at_other = cells_.around(other).cells;
     const auto add = [&](const CellBlocks::Cell& cell) {
       if (is_tried(cell)) found.push_back(cell);
     };
-    for (const CellBlocks::Edge& at : {edge, other})
-      for (const CellBlocks::Cell& cell : cells_.around(at).cells) add(cell);
+    for (const CellBlocks::Cell& cell : at_edge)
+      if (std::ranges::any_of(at_other, [&](const CellBlocks::Cell& c) { return c.block == cell.block && c.cell == cell.cell; }))
+        add(cell);
+    for (const auto* cells : {&at_edge, &at_other})
+      if (found.size() == before) std::ranges::for_each(*cells, add);
     for (int steps = 1; found.size() == before && steps <= 2; ++steps)
       for (const CellBlocks::Edge& at : {edge, other}) cells_.for_each_about({at.block, at.sample}, steps, add);
   }

@@ -182,11 +182,10 @@ class Contourer {
     for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, context))
       mesh.meeting_joints.emplace_back(cell.block, cell.cell);
     mesh.held = polygons.held_cells();
-    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
-    polygons.number_flattened(mesh.points, context);
-    mesh.fanned_edges = polygons.fanned_edges();
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
+    mesh.fanned_edges = polygons.fanned_edges();
+    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
     count_escaped(mesh);
   }
 
