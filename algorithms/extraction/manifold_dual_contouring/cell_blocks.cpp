@@ -81,6 +81,8 @@ void CellBlocks::unpinch(RunContext& context) {
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(blocks_[b].active, [&](int cell) {
+      constexpr unsigned kUpperFaces = 0b101010;
+      if (!(sheets(block, cell).ambiguous_faces & kUpperFaces)) return;
       for (int face = 1; face < 6; face += 2)
         if (is_pinched(block, cell, face)) faces[b].push_back({block, cell, face});
     });
@@ -104,6 +106,7 @@ void CellBlocks::unpinch(RunContext& context) {
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     std::ranges::sort(joined[b]);
     for (const auto& [cell, which] : joined[b]) {
+      if (which == 0) continue;
       blocks_[b].unpinched[cell >> 6] |= std::uint64_t{1} << (cell & 63);
       blocks_[b].unpinched_sheets.emplace_back(
           cell, cell_sheets(codes_[code_at(static_cast<std::int32_t>(b), cell)], which));

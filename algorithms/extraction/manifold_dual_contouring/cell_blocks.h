@@ -43,7 +43,7 @@ class CellBlocks {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
     BlockMask joints{};  ///< of these, those with a cut
-    BlockMask unpinched{};      ///< of these, those with a face that was pinched
+    BlockMask unpinched{};  ///< of the active ones, those with a face that was pinched
     SheetsOfBlock unpinched_sheets;
     std::uint32_t first_point = 0, first_code = 0;
     std::array<std::uint32_t, 8> rank{};  ///< active cells before each word

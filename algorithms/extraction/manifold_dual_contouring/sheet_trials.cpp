@@ -24,34 +24,33 @@ class Trials {
  public:
   Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, RunContext& context)
       : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points), untested_(cells.size()) {
-    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
-        for (const CellBlocks::Cell& cell : cells_.around(edge).cells)
-          if (is_tried(cell)) mark(edge);
-      });
-    });
-  }
-
-  /// Cells beside joints with a pinched face.
-  Cells pinched(RunContext& context) const {
-    std::vector<Cells> found(cells_.size());
+    std::vector<Cells> tried(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       for_each_bit(cells_[block].active, [&](int cell) {
-        if (!polygons_.can_be_held({block, cell})) return;
-        for (int face = 0; face < 6; ++face)
-          if (cells_.is_pinched(block, cell, face)) return found[b].push_back({block, cell});
+        if (is_tried({block, cell})) tried[b].push_back({block, cell});
       });
     });
-    return joined(found);
+    tried_ = joined(tried);
+    for (const CellBlocks::Cell& cell : tried_) mark_edges(cell);
+  }
+
+  /// Cells beside joints with a pinched face.
+  Cells pinched() const {
+    Cells found;
+    std::ranges::copy_if(tried_, std::back_inserter(found), [&](const CellBlocks::Cell& cell) {
+      if (!polygons_.can_be_held(cell)) return false;
+      for (int face = 0; face < 6; ++face)
+        if (cells_.is_pinched(cell.block, cell.cell, face)) return true;
+      return false;
+    });
+    return found;
   }
 
   /// Holds them; the polygons of their edges are to be tested anew.
   void hold(const Cells& held, RunContext& context) {
     polygons_.hold(held, points_, context);
-    for (const CellBlocks::Cell& cell : held)
-      for (int edge = 0; edge < 12; ++edge)
-        if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at)) mark(at);
+    for (const CellBlocks::Cell& cell : held) mark_edges(cell);
   }
 
   /// Tried cells near polygons that meet. Those polygons are to be tested again next time, the others are not.
@@ -85,8 +84,10 @@ class Trials {
     for (const Cells& list : lists) all.insert(all.end(), list.begin(), list.end());
     return all;
   }
-  void mark(const CellBlocks::Edge& edge) {
-    untested_[edge.block][edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
+  void mark_edges(const CellBlocks::Cell& cell) {
+    for (int edge = 0; edge < 12; ++edge)
+      if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
+        untested_[at.block][at.axis][at.sample >> 6] |= std::uint64_t{1} << (at.sample & 63);
   }
 
   bool is_joint_of_several(const CellBlocks::Cell& cell) const {
@@ -134,6 +135,7 @@ class Trials {
   EdgePolygons& polygons_;
   const PolygonNeighbourhood mesh_;
   std::vector<Vector3d>& points_;
+  Cells tried_;                                     ///< all that were when this began
   std::vector<std::array<BlockMask, 3>> untested_;  ///< by block and axis: edges whose polygons may meet others
 };
 
@@ -151,7 +153,7 @@ Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, cons
                            std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "try sheets");
   Trials trials(cells, polygons, points, context);
-  Cells held = trials.pinched(context);
+  Cells held = trials.pinched();
   for (;;) {
     if (!held.empty()) trials.hold(held, context);
     trials.place_crossings(file, context);
