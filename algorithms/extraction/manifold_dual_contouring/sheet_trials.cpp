@@ -112,23 +112,24 @@ class Trials {
       for (const CellBlocks::Edge& at : {edge, other}) cells_.for_each_about({at.block, at.sample}, steps, add);
   }
 
-  /// Of two edges that are to be tested, the first one asks.
+  /// Whether a polygon of the edge meets another; the tried cells near the first that does. Of two edges that are to be tested
+  /// the first one asks.
   bool meets(const CellBlocks::Edge& edge, Cells& found) const {
-    bool meets = false;
+    bool any = false;
     mesh_.for_each_triangle(edge, [&](const Triangle& t) {
-      if (meets) return;
+      if (any) return;
       bool itself = false;
       mesh_.for_each_near(edge.block, mesh_.box_of(t), [&](const CellBlocks::Edge& other, const Triangle& u) {
-        if (meets || (other < edge && test(untested_[other.block][other.axis], other.sample))) return;
+        if (any || (other < edge && test(untested_[other.block][other.axis], other.sample))) return;
         if (t == u && !itself) {
           itself = true;
         } else if (!mesh_.apart(t, u)) {
           add_tried(edge, other, found);
-          meets = true;
+          any = true;
         }
       });
     });
-    return meets;
+    return any;
   }
 
   const CellBlocks& cells_;
