@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "algorithms/core/parallel.h"
 
@@ -13,6 +14,9 @@ bool has_one_sheet(const CellSheets& sheets, int face) {
   const std::array<int, 4> edges = face_edges(face);
   return std::ranges::all_of(edges, [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
 }
+
+/// Every other corner is inside: joining several faces could leave loops that no plane separates (cell_sheets.h).
+bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 
 }  // namespace
 
@@ -56,7 +60,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
     std::copy(found[b].begin(), found[b].end(), codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
-  unpinch(context);
+  cut_ambiguous_faces(context);
   parallel_blocks(n, context, [&](std::size_t b) {
     std::uint16_t later = 0;
     for_each_bit(blocks_[b].active, [&](int cell) {
@@ -71,20 +75,24 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
 }
 
-/// One face after the other, for what is done to one may help the next one of its cells.
-void CellBlocks::unpinch(RunContext& context) {
+/// First as the normals say, then those that are pinched the other way. One face after the other, for what is done to
+/// one may help the next one of its cells; and once is enough, for it parts sheets and joins none.
+void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   struct Face {
     std::int32_t block;
     int cell, face;
+    bool joined;  ///< by the normals
   };
   std::vector<std::vector<Face>> faces(blocks_.size());
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(blocks_[b].active, [&](int cell) {
-      constexpr unsigned kUpperFaces = 0b101010;
-      if (!(sheets(block, cell).ambiguous_faces & kUpperFaces)) return;
-      for (int face = 1; face < 6; face += 2)
-        if (is_pinched(block, cell, face)) faces[b].push_back({block, cell, face});
+      for (int face = 1; face < 6; face += 2) {
+        if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
+        const Cell upper = beside(block, cell, face);
+        if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell))
+          faces[b].push_back({block, cell, face, normals_join(block, cell, face)});
+      }
     });
   });
   std::vector<std::vector<std::pair<std::uint16_t, std::uint8_t>>> joined(blocks_.size());  // by block: cells, and faces
@@ -94,24 +102,54 @@ void CellBlocks::unpinch(RunContext& context) {
     if (found != list.end()) return found->second;
     return list.emplace_back(static_cast<std::uint16_t>(at.cell), std::uint8_t{0}).second;
   };
+  const auto code = [&](const Cell& at) { return codes_[code_at(at.block, at.cell)]; };
+  const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
+    joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
+    joined_faces(upper) ^= static_cast<std::uint8_t>(1 << (face ^ 1));
+  };
   for (const auto& list : faces)
-    for (const auto& [block, cell, face] : list) {
+    for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
-      if (is_joint(lower.block, lower.cell) || is_joint(upper.block, upper.cell)) continue;
-      const auto sheets_of = [&](const Cell& at) { return cell_sheets(codes_[code_at(at.block, at.cell)], joined_faces(at)); };
-      if (!has_one_sheet(sheets_of(lower), face) || !has_one_sheet(sheets_of(upper), face ^ 1)) continue;
-      joined_faces(lower) |= static_cast<std::uint8_t>(1 << face);
-      joined_faces(upper) |= static_cast<std::uint8_t>(1 << (face ^ 1));
+      if (join && !is_checkerboard(code(lower)) && !is_checkerboard(code(upper))) cut_the_other_way(lower, upper, face);
+    }
+  for (const auto& list : faces)
+    for (const auto& [block, cell, face, join] : list) {
+      const Cell lower{block, cell}, upper = beside(block, cell, face);
+      const auto sheets_of = [&](const Cell& at) { return cell_sheets(code(at), joined_faces(at)); };
+      if (has_one_sheet(sheets_of(lower), face) && has_one_sheet(sheets_of(upper), face ^ 1))
+        cut_the_other_way(lower, upper, face);
     }
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     std::ranges::sort(joined[b]);
     for (const auto& [cell, which] : joined[b]) {
       if (which == 0) continue;
-      blocks_[b].unpinched[cell >> 6] |= std::uint64_t{1} << (cell & 63);
-      blocks_[b].unpinched_sheets.emplace_back(
+      blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
+      blocks_[b].joined_sheets.emplace_back(
           cell, cell_sheets(codes_[code_at(static_cast<std::int32_t>(b), cell)], which));
     }
   });
+}
+
+/// Which of the two pairs of segments lies better in the planes through its ends: that of an edge or of a thin wall runs
+/// along it, whatever the distances along the lattice's edges are.
+bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
+  const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
+  std::array<Eigen::Vector3d, 4> points, normals;
+  for (int i = 0; i < 4; ++i) {
+    const Edge edge = edge_of_cell(block, cell, edges[i]);
+    const EdgeCrossing crossing = grid_.crossing(edge.block, edge.sample, edge.axis);
+    points[i] = crossing_point(edge, crossing);
+    normals[i] = {crossing.normal[0], crossing.normal[1], crossing.normal[2]};
+  }
+  const auto slant = [&](int i, int j) {
+    const Eigen::Vector3d along = (points[j] - points[i]).normalized();
+    return std::abs(normals[i].dot(along)) + std::abs(normals[j].dot(along));
+  };
+  const int inside = (codes_[code_at(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
+  const auto cut_off = [&](int corner) {
+    return slant((corner + 3) % 4, corner % 4) + slant((corner + 1) % 4, (corner + 2) % 4);
+  };
+  return cut_off(inside + 1) < cut_off(inside);
 }
 
 bool CellBlocks::is_pinched(std::int32_t block, int cell, int face) const {

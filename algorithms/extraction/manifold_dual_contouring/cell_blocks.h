@@ -43,8 +43,8 @@ class CellBlocks {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
     BlockMask joints{};  ///< of these, those with a cut
-    BlockMask unpinched{};  ///< of the active ones, those with a face that was pinched
-    SheetsOfBlock unpinched_sheets;
+    BlockMask joined{};  ///< of the active ones, those with an ambiguous face whose inside is joined
+    SheetsOfBlock joined_sheets;
     std::uint32_t first_point = 0, first_code = 0;
     std::array<std::uint32_t, 8> rank{};  ///< active cells before each word
     /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
@@ -83,12 +83,15 @@ class CellBlocks {
   /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
   /// it has one sheet (or none, all corners being inside) and no ambiguous face.
   ///
-  /// An ambiguous face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons
-  /// would meet in the edge between the two cells' points. There the inside is joined and the outside corners are cut off,
-  /// which parts each of the two sheets into two, and closes a tunnel of less than a voxel or opens a wall of less than one.
+  /// On an ambiguous face the corners of one kind are cut off one by one and those of the other kind are joined. Which is
+  /// which the normals of its four crossings tell, so that edges and thin walls of either kind stay whole; without
+  /// normals, at joints and beside cells of which every other corner is inside it is the inside corners that are cut off.
+  /// A face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons would meet
+  /// in the edge between the two cells' points. It is cut the other way, which parts each of the two sheets into two, and
+  /// closes a tunnel of less than a voxel or opens a wall of less than one.
   const CellSheets& sheets(std::int32_t block, int cell) const {
     if (const CellSheets* told = told_sheets(block, cell)) return *told;
-    if (test(blocks_[block].unpinched, cell)) return find(blocks_[block].unpinched_sheets, cell);
+    if (test(blocks_[block].joined, cell)) return find(blocks_[block].joined_sheets, cell);
     return kCellSheets[codes_[code_at(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
@@ -164,7 +167,8 @@ class CellBlocks {
   const CellSheets* find_told(std::int32_t block, int cell) const;
   static const CellSheets& find(const SheetsOfBlock& list, int cell);
   Cell beside(std::int32_t block, int cell, int face) const;
-  void unpinch(RunContext& context);
+  void cut_ambiguous_faces(RunContext& context);
+  bool normals_join(std::int32_t block, int cell, int face) const;
   int joint_points(std::int32_t block, int cell) const {
     const CellSheets* told = told_sheets(block, cell);
     return told ? told->sheets : 1;

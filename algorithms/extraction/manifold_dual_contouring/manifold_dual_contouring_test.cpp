@@ -112,6 +112,56 @@ double mean_distance_from_edges(const TurnedCube& cube, const PolygonMesh& mesh)
   return sum / places;
 }
 
+/// Of a closed mesh: twice the number of components without holes.
+std::int64_t euler_characteristic(const PolygonMesh& mesh) {
+  const auto triangles = static_cast<std::int64_t>(mesh.triangle_count());
+  return static_cast<std::int64_t>(mesh.points.size()) - triangles / 2;
+}
+
+/// A plate along a diagonal of the lattice whose samples touch one another across faces alone, and the same plate as a gap
+/// that cuts a box in two: either is whole.
+TEST(ManifoldDualContouring, ThinDiagonalPlatesAndGapsStayWhole) {
+  const auto distance_to = [](const Vector3d& half, const Vector3d& p) { return (p.cwiseAbs() - half).maxCoeff(); };
+  const Vector3d plate(9.3, 0.6, 6.3), box(9.3, 5.2, 6.3);
+  for (const bool gap : {false, true}) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(M_PI / 4, Vector3d::UnitZ()).matrix();
+    const Vector3d longer = plate + Vector3d(9, 0, 9);
+    const auto value = [=](const Vector3d& p) {
+      const Vector3d q = turn.transpose() * p;
+      return gap ? std::max(distance_to(box, q), -distance_to(longer, q)) : distance_to(plate, q);
+    };
+    const auto gradient = [=](const Vector3d& p) {
+      Vector3d g;
+      for (int a = 0; a < 3; ++a) {
+        const Vector3d step = 1e-5 * Vector3d::Unit(a);
+        g[a] = value(p + step) - value(p - step);
+      }
+      return g;
+    };
+    RunContext context;
+    const FloatHermite hermite = sample_function({.value = value, .gradient = gradient, .lipschitz = 1.0}, IndexToWorld(),
+                                                 {-16, -16, -16}, {16, 16, 16}, 1e-9, context);
+    EXPECT_EQ(euler_characteristic(contour(hermite, 0.0)), gap ? 4 : 2) << gap;
+    EXPECT_EQ(euler_characteristic(contour(hermite, 0.25)), gap ? 4 : 2) << gap;
+  }
+}
+
+/// Inside corners of a convex solid that touch across a face belong together: cut off one by one they would leave notches
+/// in the cube's edges.
+TEST(ManifoldDualContouring, TurnedCubeHasNoNotches) {
+  for (const double angle : {0.1, 0.35, 0.6, 0.7854}) {
+    TurnedCube cube;
+    cube.turn = (Eigen::AngleAxisd(0.7854, Vector3d::UnitZ()) * Eigen::AngleAxisd(angle, Vector3d::UnitX())).matrix();
+    const PolygonMesh mesh = contour(cube.hermite(), 0.0);
+    double farthest = 0;
+    for (const Triangle& t : triangulated(mesh)) {
+      const Vector3d middle = (mesh.world(t[0]) + mesh.world(t[1]) + mesh.world(t[2])) / 3.0;
+      farthest = std::max(farthest, std::abs((cube.turn.transpose() * middle).cwiseAbs().maxCoeff() - TurnedCube::kHalf));
+    }
+    EXPECT_LT(farthest, 0.03) << angle;
+  }
+}
+
 TEST(ManifoldDualContouring, TurnedCubeKeepsItsEdges) {
   TurnedCube cube;
   cube.turn = (Eigen::AngleAxisd(0.7, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()) *
