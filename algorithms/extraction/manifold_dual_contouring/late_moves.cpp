@@ -27,8 +27,8 @@ constexpr int kSweeps = 2;
 /// The point of one cell with the triangles around it and those nearby.
 class Star {
  public:
-  Star(const CellBlocks& cells, const EdgePolygons& polygons, std::vector<Vector3d>& points)
-      : cells_(cells), mesh_(cells, polygons, points), points_(points) {}
+  Star(const CellBlocks& cells, const PolygonNeighbourhood& mesh, std::vector<Vector3d>& points)
+      : cells_(cells), mesh_(mesh), points_(points) {}
 
   /// With the box of all places that it might move to.
   void gather(std::int32_t block, int cell, std::initializer_list<Vector3d> places) {
@@ -89,7 +89,7 @@ class Star {
   }
 
   const CellBlocks& cells_;
-  const PolygonNeighbourhood mesh_;
+  const PolygonNeighbourhood& mesh_;
   std::vector<Vector3d>& points_;
   std::int32_t block_ = 0;
   std::uint32_t point_ = 0;
@@ -104,6 +104,7 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
                  std::vector<Vector3d>& points, RunContext& context) {
   Stage stage(context, "move points");
+  const PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
   // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most six samples away,
   // and have their points in cells at most seven away. So blocks of one parity, eight apart, do not see one another's moves.
   for (int sweep = 0; sweep < kSweeps; ++sweep)
@@ -113,7 +114,7 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
         const auto block = static_cast<std::int32_t>(b);
         const auto& lower = cells.grid().blocks()[b].lower;
         if (((lower[0] >> 3 & 1) | (lower[1] >> 3 & 1) << 1 | (lower[2] >> 3 & 1) << 2) != parity) return;
-        Star star(cells, polygons, points);
+        Star star(cells, mesh, points);
         for (const PointWish& wish : wishes[b]) {
           const Vector3d from = points[cells.point(block, wish.cell, 0)];
           if ((wish.place - from).norm() < kFulfilled || polygons.is_crowded({block, wish.cell})) continue;

@@ -22,8 +22,9 @@ bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
 
 class Trials {
  public:
-  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, RunContext& context)
-      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points), points_(points), untested_(cells.size()) {
+  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, double farthest,
+         RunContext& context)
+      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points, farthest), points_(points), untested_(cells.size()) {
     std::vector<Cells> tried(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
@@ -50,6 +51,7 @@ class Trials {
   /// Holds them; the polygons of their edges are to be tested anew.
   void hold(const Cells& held, RunContext& context) {
     polygons_.hold(held, points_, context);
+    mesh_.forget();
     for (const CellBlocks::Cell& cell : held) mark_edges(cell);
   }
 
@@ -134,7 +136,7 @@ class Trials {
 
   const CellBlocks& cells_;
   EdgePolygons& polygons_;
-  const PolygonNeighbourhood mesh_;
+  PolygonNeighbourhood mesh_;
   std::vector<Vector3d>& points_;
   Cells tried_;                                     ///< all that were when this began
   std::vector<std::array<BlockMask, 3>> untested_;  ///< by block and axis: edges whose polygons may meet others
@@ -151,9 +153,9 @@ Cells without_repeats(Cells cells) {
 }  // namespace
 
 Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
-                           std::vector<Vector3d>& points, RunContext& context) {
+                           std::vector<Vector3d>& points, double farthest, RunContext& context) {
   Stage stage(context, "try sheets");
-  Trials trials(cells, polygons, points, context);
+  Trials trials(cells, polygons, points, farthest, context);
   Cells held = trials.pinched();
   for (;;) {
     if (!held.empty()) trials.hold(held, context);

@@ -19,9 +19,11 @@ namespace hermesh {
 ///
 /// Joints of several sheets are tried, too, but cannot be held. Returns those near polygons that still meet when
 /// nothing is left to be held, each once; nearly always none.
+/// @param farthest from its cell along an axis that any point is, voxels
 /// @throws Cancelled
 std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons,
                                                    const FilePoints& file,
-                                                   std::vector<Eigen::Vector3d>& points, RunContext& context);
+                                                   std::vector<Eigen::Vector3d>& points, double farthest,
+                                                   RunContext& context);
 
 }  // namespace hermesh

@@ -114,13 +114,15 @@ class Contourer {
       });
   }
 
-  void count_escaped(UniformMesh& mesh) const {
+  /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather be outside.
+  template <class F>
+  void for_each_wisher(const UniformMesh& mesh, F&& f) const {
     for (std::size_t b = 0; b < cells_.size(); ++b)
       for (const PointWish& wish : wishes_[b]) {
         const auto block = static_cast<std::int32_t>(b);
         const Vector3d from_middle =
             mesh.points[cells_.point(block, wish.cell, 0)] - cells_.corner(block, wish.cell) - Vector3d::Constant(0.5);
-        mesh.escaped += from_middle.cwiseAbs().maxCoeff() > 0.5;
+        f(from_middle.cwiseAbs().maxCoeff() - 0.5);
       }
   }
 
@@ -179,14 +181,16 @@ class Contourer {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, mesh.points, context);
     }();
-    for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, context))
+    double farthest = 0;
+    for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
+    for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
       mesh.meeting_joints.emplace_back(cell.block, cell.cell);
     mesh.held = polygons.held_cells();
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     mesh.fanned_edges = polygons.fanned_edges();
     move_points(cells_, polygons, wishes_, file_, mesh.points, context);
-    count_escaped(mesh);
+    for_each_wisher(mesh, [&](double outside) { mesh.escaped += outside > 0; });
   }
 
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
