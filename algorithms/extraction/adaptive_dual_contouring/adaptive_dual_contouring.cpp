@@ -1,6 +1,7 @@
 #include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "algorithms/core/large_array.h"
@@ -62,7 +63,8 @@ class Contourer {
         field_(field, hermite.placement),
         view_(make_view(hermite, context)),
         input_{hermite, view_, options_, field_},
-        blocks_(view_.blocks().size()) {}
+        blocks_(view_.blocks().size()),
+        groups_((blocks_ + kGroup - 1) / kGroup) {}
 
   PolygonMesh run() {
     PolygonMesh mesh;
@@ -76,6 +78,7 @@ class Contourer {
   }
 
  private:
+  static constexpr std::size_t kGroup = 64;
   using View = decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>()));
 
   static View make_view(const FloatHermite& hermite, RunContext& context) {
@@ -83,23 +86,20 @@ class Contourer {
     return view_of(hermite, context);
   }
 
-  /// `places_` gets the points, with room for one an active cell.
+  /// Groups of blocks keep their points until it is known how many there are before them: far fewer than active cells.
   void merge() {
     Stage stage(context_, "merge cells");
-    first_place_.resize(blocks_);
-    LargeArray<BlockCells> cells(blocks_);
-    parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      cells[b] = BlockCells(input_, static_cast<std::int32_t>(b));
-      first_place_[b] = static_cast<std::uint64_t>(count(cells[b].active));
-    });
-    places_.resize(exclusive_scan(first_place_, "points"));
     mask_.numbers.resize(512 * blocks_);
     results_.resize(blocks_);
-    parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      std::uint16_t* mask = mask_.numbers.data() + 512 * b;
-      if (field_.leaves_out_outside()) std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
-      results_[b] =
-          merge_block(input_, static_cast<std::int32_t>(b), cells[b], mask, places_.data() + first_place_[b]);
+    places_.resize(groups_);
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      std::array<Eigen::Vector3f, 512> points;
+      for_each_block(g, [&](std::size_t b) {
+        std::uint16_t* mask = mask_.numbers.data() + 512 * b;
+        if (field_.leaves_out_outside()) std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
+        results_[b] = merge_block(input_, static_cast<std::int32_t>(b), mask, points.data());
+        places_[g].insert(places_[g].end(), points.begin(), points.begin() + results_[b].points);
+      });
     });
   }
 
@@ -109,38 +109,39 @@ class Contourer {
     for (std::size_t b = 0; b < blocks_; ++b) mask_.first[b] = results_[b].points;
     mesh.points.resize(exclusive_scan(mask_.first, "points"));
     const IndexToWorld& placement = hermite_.placement;
-    parallel_blocks(blocks_, context_, [&](std::size_t b) {
-      Eigen::Vector3d lower;
-      for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
-      for (std::uint32_t i = 0; i < results_[b].points; ++i)
-        mesh.points[mask_.first[b] + i] =
-            placement.local(lower + places_[first_place_[b] + i].cast<double>()).cast<float>();
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      const Eigen::Vector3f* place = places_[g].data();
+      for_each_block(g, [&](std::size_t b) {
+        Eigen::Vector3d lower;
+        for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
+        for (std::uint32_t i = 0; i < results_[b].points; ++i)
+          mesh.points[mask_.first[b] + i] = placement.local(lower + (place++)->cast<double>()).cast<float>();
+      });
     });
     places_ = {};
   }
 
-  /// Groups of blocks keep their polygons until it is known how many there are before them: far fewer than crossing edges.
+  /// And their polygons: far fewer than crossing edges.
   void connect(PolygonMesh& mesh) {
     Stage stage(context_, "connect");
-    constexpr std::size_t kGroup = 64;
-    const std::size_t groups = (blocks_ + kGroup - 1) / kGroup;
-    std::vector<std::vector<Quad>> quads(groups);
-    std::vector<std::vector<Triangle>> triangles(groups);
-    std::vector<std::uint64_t> first_quad(groups), first_triangle(groups);
-    parallel_blocks(groups, context_, [&](std::size_t g) {
-      for (std::size_t b = g * kGroup; b < std::min(blocks_, (g + 1) * kGroup); ++b)
+    std::vector<std::vector<Quad>> quads(groups_);
+    std::vector<std::vector<Triangle>> triangles(groups_);
+    std::vector<std::uint64_t> first_quad(groups_), first_triangle(groups_);
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      for_each_block(g, [&](std::size_t b) {
         for_each_polygon(b, [&](const Quad& polygon, int corners) {
           if (corners == 4)
             quads[g].push_back(polygon);
           else
             triangles[g].push_back({polygon[0], polygon[1], polygon[2]});
         });
+      });
       first_quad[g] = quads[g].size();
       first_triangle[g] = triangles[g].size();
     });
     mesh.quads.resize(exclusive_scan(first_quad, "quads"));
     mesh.triangles.resize(exclusive_scan(first_triangle, "triangles"));
-    parallel_blocks(groups, context_, [&](std::size_t g) {
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
       std::copy(quads[g].begin(), quads[g].end(), mesh.quads.begin() + static_cast<std::ptrdiff_t>(first_quad[g]));
       std::copy(triangles[g].begin(), triangles[g].end(),
                 mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first_triangle[g]));
@@ -169,6 +170,11 @@ class Contourer {
     }
   }
 
+  template <class F>
+  void for_each_block(std::size_t group, F&& f) const {
+    for (std::size_t b = group * kGroup; b < std::min(blocks_, (group + 1) * kGroup); ++b) f(b);
+  }
+
   void report() const {
     const auto sum = [&](auto&& of) {
       return std::accumulate(results_.begin(), results_.end(), 0.0,
@@ -189,9 +195,8 @@ class Contourer {
   const FieldEvaluator field_;
   const View view_;
   const RegionInput input_;
-  const std::size_t blocks_;
-  std::vector<std::uint64_t> first_place_;  ///< by block
-  LargeArray<Eigen::Vector3f> places_;      ///< voxels from the block's first sample
+  const std::size_t blocks_, groups_;
+  std::vector<std::vector<Eigen::Vector3f>> places_;  ///< by group, of its blocks one after another: voxels from the block's first sample
   MaskGrid mask_;
   std::vector<BlockResult> results_;
 };

@@ -138,8 +138,13 @@ struct Level {
 
 class BlockMerger {
  public:
-  BlockMerger(const RegionInput& input, std::int32_t block, const BlockCells& cells)
-      : input_(input), block_(input.view.blocks()[block]), lattice_(cells.lattice), active_(cells.active) {}
+  BlockMerger(const RegionInput& input, std::int32_t block)
+      : input_(input),
+        block_(input.view.blocks()[block]),
+        lattice_(parts_of(input, block_)),
+        active_(lattice_.active_cells()) {
+    if (input.field.leaves_out_outside()) active_ = input.field.inside(block_.lower, active_);
+  }
 
   BlockResult merge(std::uint16_t* mask, Eigen::Vector3f* points) {
     sum_cells();
@@ -313,8 +318,8 @@ class BlockMerger {
 
   const RegionInput& input_;
   const HermiteView::Block& block_;
-  const SignLattice& lattice_;
-  const BlockMask& active_;
+  const SignLattice lattice_;
+  BlockMask active_;
   BlockResult result_;
   int cells_ = 0, plane_count_ = 0;
   std::array<std::uint16_t, 512> slots_;  ///< by cell: where its sum is
@@ -329,14 +334,8 @@ class BlockMerger {
 
 }  // namespace
 
-BlockCells::BlockCells(const RegionInput& input, std::int32_t block)
-    : lattice(parts_of(input, input.view.blocks()[block])), active(lattice.active_cells()) {
-  if (input.field.leaves_out_outside()) active = input.field.inside(input.view.blocks()[block].lower, active);
-}
-
-BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint16_t* mask,
-                        Eigen::Vector3f* points) {
-  return BlockMerger(input, block, cells).merge(mask, points);
+BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points) {
+  return BlockMerger(input, block).merge(mask, points);
 }
 
 }  // namespace hermesh

@@ -30,19 +30,9 @@ struct BlockResult {
   float largest_plane_distance = 0.0f;  ///< voxels
 };
 
-/// The block's signs, and its cells whose corners differ in sign, less those that the field leaves out.
-struct BlockCells {
-  BlockCells() = default;
-  BlockCells(const RegionInput& input, std::int32_t block);
-
-  SignLattice lattice;
-  BlockMask active;
-};
-
 /// Merges, writes for each active one of the 512 cells the number of its point within the block to `mask`, whose other
-/// entries stay as they are, and that many points, relative to the block's first sample, to `points`; there is room for
-/// one an active cell.
-BlockResult merge_block(const RegionInput& input, std::int32_t block, const BlockCells& cells, std::uint16_t* mask,
-                        Eigen::Vector3f* points);
+/// entries stay as they are, and that many points, voxels from the block's first sample, to `points`, which has room for
+/// 512. Cells are active whose corners differ in sign, less those that the field leaves out.
+BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points);
 
 }  // namespace hermesh
