@@ -1,6 +1,11 @@
 #include "algorithms/extraction/manifold_dual_contouring/fine_mesh.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -9,26 +14,50 @@
 
 namespace hermesh {
 
+namespace {
+
+/// Calls f(first, end) for ranges of the points, side by side. Each is to read all triangles for the sake of its own points:
+/// that is cheap, for they are read in order, and what is done about a point is done in the same order by any number of threads.
+template <class F>
+void for_each_range(std::size_t points, F&& f) {
+  constexpr std::size_t kLeast = 1 << 13;
+  const std::size_t threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t ranges = std::clamp<std::size_t>(points / kLeast, 1, threads);
+  tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t i) {
+    f(static_cast<std::uint32_t>(points * i / ranges), static_cast<std::uint32_t>(points * (i + 1) / ranges));
+  });
+}
+
+}  // namespace
+
 FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
   if (triangles_.size() > kNone / 3)
     throw Error("the surface has " + std::to_string(triangles_.size()) +
                 " triangles, more than can be merged; use larger voxels or tolerance 0");
-  for (const Triangle& t : triangles_)
-    if (t[0] != kNone)
-      for (const std::uint32_t p : t) ++first_[p + 1];
-  for (std::size_t p = 0; p < points_.size(); ++p) first_[p + 1] += first_[p];
   normals_.resize(triangles_.size());
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    if (triangles_[t][0] == kNone) continue;
-    const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
-    normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
-  }
-  around_.resize(3 * triangles_.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles_.size(), 1024), [&](const auto& range) {
+    for (std::size_t t = range.begin(); t < range.end(); ++t) {
+      if (triangles_[t][0] == kNone) continue;
+      const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
+      normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
+    }
+  });
+  const auto for_each_corner = [&](std::uint32_t first, std::uint32_t end, auto&& f) {
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+      if (triangles_[t][0] != kNone)
+        for (const std::uint32_t p : triangles_[t])
+          if (p >= first && p < end) f(p, t);
+  };
+  for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
+    for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t) { ++first_[p + 1]; });
+  });
+  for (std::size_t p = 0; p < points_.size(); ++p) first_[p + 1] += first_[p];
+  around_.resize(first_.back());
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for (std::uint32_t t = 0; t < triangles_.size(); ++t)
-    if (triangles_[t][0] != kNone)
-      for (const std::uint32_t p : triangles_[t]) around_[next[p]++] = t;
+  for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
+    for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t t) { around_[next[p]++] = t; });
+  });
 }
 
 std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {

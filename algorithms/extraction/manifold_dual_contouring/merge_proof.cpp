@@ -48,12 +48,14 @@ class MergeProof {
         proofs_(fine.triangles().size()),
         bold_(forest.size()),
         overlays_([&fine] { return TriangleOverlay(fine.triangles().size()); }) {
-    for (std::uint32_t t = 0; t < fine_.triangles().size(); ++t) {
-      if (fine_.triangles()[t][0] == FineMesh::kNone) continue;
-      open_.push_back(t);
-      proofs_[t] = stays(t) ? kStays | kOpen : kOpen;
-      if (!stays(t)) continue;
-      merged_.origin.push_back(t);
+    parallel_blocks(proofs_.size(), context_, [&](std::size_t i) {
+      const auto t = static_cast<std::uint32_t>(i);
+      if (fine_.triangles()[t][0] != FineMesh::kNone) proofs_[t] = stays(t) ? kStays | kOpen : kOpen;
+    });
+    open_.reserve(proofs_.size());
+    for (std::uint32_t t = 0; t < proofs_.size(); ++t) {
+      if (proofs_[t] & kOpen) open_.push_back(t);
+      if (proofs_[t] & kStays) merged_.origin.push_back(t);
     }
     build();
   }
@@ -81,23 +83,31 @@ class MergeProof {
   }
   std::uint32_t merged_point(std::uint32_t p) const { return merged_.number[forest_.leader(p)]; }
 
+  /// Points are numbered in the order of the fine ones that they go by.
   void build() {
     merged_.number.assign(fine_.points().size(), kNone);
+    const auto for_each_corner = [&](auto&& f) {
+      parallel_blocks(merged_.origin.size(), context_, [&](std::size_t i) {
+        const Triangle& fine = fine_.triangles()[merged_.origin[i]];
+        for (int corner = 0; corner < 3; ++corner) f(i, corner, forest_.leader(fine[corner]));
+      });
+    };
+    for_each_corner([&](std::size_t, int, std::uint32_t leader) {
+      std::atomic_ref(merged_.number[leader]).store(0, std::memory_order_relaxed);
+    });
     merged_.leaders.clear();
-    std::vector<Vector3d> points;
-    std::vector<Triangle> triangles(merged_.origin.size());
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      triangles[i] = fine_.triangles()[merged_.origin[i]];
-      for (std::uint32_t& p : triangles[i]) {
-        const std::uint32_t set = forest_.set_of(p), leader = set == kNone ? p : forest_.node(set).first;
-        if (merged_.number[leader] == kNone) {
-          merged_.number[leader] = static_cast<std::uint32_t>(points.size());
-          points.push_back(set == kNone ? fine_.points()[p] : forest_.node(set).place);
-          merged_.leaders.push_back(leader);
-        }
-        p = merged_.number[leader];
-      }
+    for (std::uint32_t p = 0; p < merged_.number.size(); ++p) {
+      if (merged_.number[p] == kNone) continue;
+      merged_.number[p] = static_cast<std::uint32_t>(merged_.leaders.size());
+      merged_.leaders.push_back(p);
     }
+    std::vector<Vector3d> points(merged_.leaders.size());
+    parallel_blocks(points.size(), context_, [&](std::size_t i) {
+      const std::uint32_t set = forest_.set_of(merged_.leaders[i]);
+      points[i] = set == kNone ? fine_.points()[merged_.leaders[i]] : forest_.node(set).place;
+    });
+    std::vector<Triangle> triangles(merged_.origin.size());
+    for_each_corner([&](std::size_t i, int corner, std::uint32_t leader) { triangles[i][corner] = merged_.number[leader]; });
     merged_.mesh.emplace(std::move(points), std::move(triangles));
   }
 
