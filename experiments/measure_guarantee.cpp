@@ -1,14 +1,21 @@
 // What manifold dual contouring promises, judged on the files that it writes: models, clean and dirty, noise,
 // and patterns of signs.
+#include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <random>
 #include <sstream>
 #include <tuple>
+#include <utility>
 
 #include "algorithms/core/mesh_file.h"
 #include "experiments/cell.h"
@@ -33,6 +40,7 @@ constexpr double kRounding = 1e-4;
 
 /// Certifying the distance takes minutes beyond.
 constexpr int kFinestCertified = 200;
+constexpr int kLargestNoiseCertified = 32;
 
 struct Contender {
   const char* name;
@@ -82,8 +90,9 @@ std::vector<double> numbers(const std::string& text) {
 /// The mesh as its file holds it: rounding on the way is part of the promise.
 MeshFile as_written(const PolygonMesh& mesh, RunContext& context) {
   if (mesh.empty()) return {};
-  const auto path =
-      std::filesystem::temp_directory_path() / ("hermesh-guarantee-" + std::to_string(getpid()) + ".ply");
+  static std::atomic<int> files = 0;
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("hermesh-guarantee-" + std::to_string(getpid()) + "-" + std::to_string(files++) + ".ply");
   struct Removal {
     std::filesystem::path path;
     ~Removal() {
@@ -132,7 +141,20 @@ struct Subject {
 struct Sum {
   std::int64_t meshes = 0, triangles = 0, self_intersections = 0, violations = 0, beyond = 0;
   double seconds = 0.0, largest_share = 0.0;
+
+  void add(const Sum& other) {
+    meshes += other.meshes;
+    triangles += other.triangles;
+    self_intersections += other.self_intersections;
+    violations += other.violations;
+    beyond += other.beyond;
+    seconds += other.seconds;
+    largest_share = std::max(largest_share, other.largest_share);
+  }
 };
+
+/// By kind of subject, extractor and tolerance (−1 for extractors that have none).
+using Sums = std::map<std::tuple<std::string, std::string, double>, Sum>;
 
 /// What becomes of one subject at all tolerances, and of the others.
 struct Overview {
@@ -175,58 +197,36 @@ struct Overview {
   }
 };
 
-class Guarantee {
+/// The meshes of one subject after another.
+class SubjectMeasurement {
  public:
-  explicit Guarantee(const MeasurementInput& input)
+  explicit SubjectMeasurement(const MeasurementInput& input)
       : input_(input), tolerances_(numbers(input.parameters.text("tolerances"))) {}
 
-  std::vector<MeasuredRow> run() {
-    for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) measure_model(name);
-    for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) measure_noise(i);
-    for (int i = 0; i < int(input_.parameters.number("pattern_fields")); ++i) measure_patterns(i);
-    summarise();
-    return std::move(rows_);
-  }
+  std::vector<MeasuredRow> rows;
+  Sums sums;
 
- private:
-  /// The rows that the filter throws away need not be made: subjects are left out here and not after hours.
-  bool wanted(const std::string& kind, const std::string& label) const {
-    return ("guarantee/" + kind + "/" + label).find(input_.filter) != std::string::npos;
-  }
-
-  void measure_model(const std::string& name) {
-    if (!wanted("models", name)) return;
-    const LoadedCase loaded = input_.tables.load(name, input_.context);
+  void measure_model(const std::string& name, double resolution) {
+    RunContext child = child_context(input_.context, false);
+    const LoadedCase loaded = input_.tables.load(name, child);
     const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, "hermesh");
     const std::string label = name + (loaded.origin.starts_with("stand-in") ? ", stand-in" : "");
-    const bool certify = input_.parameters.is("certify", "yes");
-    std::vector<double> resolutions = numbers(input_.parameters.text("resolutions"));
-    if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
-    for (const double resolution : resolutions) {
-      input_.context.progress(name + " at " + readable(resolution), 0.0);
-      const double size = bounds(loaded.mesh).size().maxCoeff() / resolution;
-      RunContext child = child_context(input_.context, false);
-      const VoxelizationInput what = {.mesh = loaded.mesh,
-                                      .voxel_size = size,
-                                      .context = child,
-                                      .options = Options(voxelizer.name, voxelizer.options, {})};
-      std::optional<LevelSet> level_set;
-      if (const auto failure = attempt([&] { level_set = voxelizer.voxelize(what); }))
-        rows_.push_back({"models", label, {{"resolution", int(resolution)}}, {*failure}});
-      else
-        measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, size,
-                     certify && resolution <= kFinestCertified});
-    }
+    const double size = bounds(loaded.mesh).size().maxCoeff() / resolution;
+    const VoxelizationInput what = {.mesh = loaded.mesh,
+                                    .voxel_size = size,
+                                    .context = child,
+                                    .options = Options(voxelizer.name, voxelizer.options, {})};
+    std::optional<LevelSet> level_set;
+    if (const auto failure = attempt([&] { level_set = voxelizer.voxelize(what); }))
+      rows.push_back({"models", label, {{"resolution", int(resolution)}}, {*failure}});
+    else
+      measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, size,
+                   input_.parameters.is("certify", "yes") && resolution <= kFinestCertified});
   }
 
   /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; outside all
-  /// around. Every pair of them has the next one of the sizes.
-  void measure_noise(int number) {
-    const std::vector<double> sizes = numbers(input_.parameters.text("noise_sizes"));
-    const int n = int(sizes[std::size_t(number / 2) % sizes.size()]);
-    const std::string label = (number % 2 == 0 ? "uniform " : "whole ") + three_digits(number);
-    if (!wanted("noise", label)) return;
-    input_.context.progress("noise " + label, 0.0);
+  /// around.
+  void measure_noise(int number, int n, const std::string& label) {
     // Of each field its own, so that a field that breaks a promise can be made again alone.
     std::mt19937_64 random(input_.seed + std::uint64_t(number));
     std::uniform_real_distribution<float> value(-1.0f, 1.0f);
@@ -236,33 +236,24 @@ class Guarantee {
                              [&](int, int, int) {
                                return number % 2 == 0 ? value(random) : static_cast<float>(whole(random));
                              }),
-                 n});
+                 n, nullptr, 1.0, input_.parameters.is("certify", "yes") && n <= kLargestNoiseCertified});
   }
 
   /// The first field has the 256 patterns of one cell's corners, some twice; the others random ones of 2 × 2
   /// × 2 cells.
-  void measure_patterns(int number) {
-    const std::string label = (number == 0 ? "cells " : "random ") + three_digits(number);
-    if (!wanted("patterns", label)) return;
-    input_.context.progress("patterns " + label, 0.0);
+  void measure_patterns(int number, const std::string& label) {
     const int given = int(input_.parameters.number("patterns_per_axis"));
     const int per_axis = number == 0 ? 7 : given;  // 7³ is the first cube above 256
     std::mt19937 random(std::uint32_t(input_.seed) + std::uint32_t(number));
     const auto pattern = [&](int i) {
       return number == 0 ? std::uint32_t(i % 256) : std::uint32_t(random());
     };
-    measure_all({"patterns", label, make_patterns(per_axis, number == 0 ? 2 : 3, pattern, random), per_axis});
+    measure_all({"patterns", label, make_patterns(per_axis, number == 0 ? 2 : 3, pattern, random), per_axis,
+                 nullptr, 1.0, input_.parameters.is("certify", "yes")});
   }
 
-  static std::string three_digits(int number) {
-    const std::string digits = std::to_string(number);
-    return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
-  }
-
-  void measure_all(Subject subject) {
-    subject.certify = subject.certify || (!subject.source && input_.parameters.is("certify", "yes"));
-    reference_ = {};
-    reference_report_.reset();
+ private:
+  void measure_all(const Subject& subject) {
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
@@ -273,7 +264,7 @@ class Guarantee {
     if (input_.parameters.is("others", "yes"))
       for (const Contender& other : others())
         overview.add_other(other.name, add_row(subject, other, std::nullopt).values);
-    rows_.push_back(overview.row());
+    rows.push_back(overview.row());
   }
 
   static std::string readable_exactly(double number) {
@@ -295,8 +286,8 @@ class Guarantee {
     add_to_sum(subject.kind, row, tolerance, !violations.empty());
     // The others promise less; their defects are figures.
     if (tolerance) row.broken = std::move(violations);
-    rows_.push_back(std::move(row));
-    return rows_.back();
+    rows.push_back(std::move(row));
+    return rows.back();
   }
 
   void fill(Json& values, const Subject& subject, const Contender& contender,
@@ -345,7 +336,7 @@ class Guarantee {
 
   void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
                   bool violates) {
-    Sum& sum = sums_[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
+    Sum& sum = sums[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
     ++sum.meshes;
     sum.violations += violates;
     sum.triangles += row.values.value("triangles", std::int64_t(0));
@@ -357,9 +348,103 @@ class Guarantee {
     sum.beyond += row.values.value("lower", 0.0) > *tolerance + kRounding;
   }
 
-  void summarise() {
+  static inline const std::vector<std::string> kFigures = {"cells", "several_sheets", "held_cells",
+                                                           "fanned_edges", "escaped"};
+
+  const MeasurementInput& input_;
+  const std::vector<double> tolerances_;
+  MeshFile reference_;  ///< the subject's uniform mesh
+  std::optional<validation::MeshReport> reference_report_;
+};
+
+/// Subjects side by side, for most of what is done to one is not parallel. Their rows come in the order of subjects.
+class Guarantee {
+ public:
+  explicit Guarantee(const MeasurementInput& input) : input_(input) {}
+
+  std::vector<MeasuredRow> run() {
+    list_models();
+    list_noise();
+    list_patterns();
+    std::vector<SubjectMeasurement> results(work_.size(), SubjectMeasurement(input_));
+    std::atomic<std::size_t> next = 0, done = 0;
+    tbb::task_group group;
+    for (int worker = 0; worker < tbb::this_task_arena::max_concurrency(); ++worker)
+      group.run([&] {
+        for (std::size_t i; (i = next++) < work_.size();) {
+          input_.context.check();
+          // Isolated, so that a thread that waits for a part of one subject begins no other one meanwhile.
+          tbb::this_task_arena::isolate([&] { work_[i].measure(results[i]); });
+          report(work_[i].name, ++done);
+        }
+      });
+    group.wait();
+    std::vector<MeasuredRow> rows;
+    Sums sums;
+    for (SubjectMeasurement& result : results) {
+      std::ranges::move(result.rows, std::back_inserter(rows));
+      for (const auto& [key, sum] : result.sums) sums[key].add(sum);
+    }
+    summarise(sums, rows);
+    return rows;
+  }
+
+ private:
+  struct Work {
+    std::string name;
+    std::function<void(SubjectMeasurement&)> measure;
+  };
+
+  void list_models() {
+    for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) {
+      if (!wanted("models", name)) continue;
+      std::vector<double> resolutions = numbers(input_.parameters.text("resolutions"));
+      if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
+      for (const double resolution : resolutions)
+        work_.push_back({name + " at " + readable(resolution),
+                         [=](SubjectMeasurement& subject) { subject.measure_model(name, resolution); }});
+    }
+  }
+
+  /// Every pair of fields has the next one of the sizes.
+  void list_noise() {
+    const std::vector<double> sizes = numbers(input_.parameters.text("noise_sizes"));
+    for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) {
+      const std::string label = (i % 2 == 0 ? "uniform " : "whole ") + three_digits(i);
+      const int n = int(sizes[std::size_t(i / 2) % sizes.size()]);
+      if (wanted("noise", label))
+        work_.push_back(
+            {"noise " + label, [=](SubjectMeasurement& subject) { subject.measure_noise(i, n, label); }});
+    }
+  }
+
+  void list_patterns() {
+    for (int i = 0; i < int(input_.parameters.number("pattern_fields")); ++i) {
+      const std::string label = (i == 0 ? "cells " : "random ") + three_digits(i);
+      if (wanted("patterns", label))
+        work_.push_back(
+            {"patterns " + label, [=](SubjectMeasurement& subject) { subject.measure_patterns(i, label); }});
+    }
+  }
+
+  /// The rows that the filter throws away need not be made: subjects are left out here and not after hours.
+  bool wanted(const std::string& kind, const std::string& label) const {
+    return ("guarantee/" + kind + "/" + label).find(input_.filter) != std::string::npos;
+  }
+
+  static std::string three_digits(int number) {
+    const std::string digits = std::to_string(number);
+    return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+  }
+
+  void report(const std::string& name, std::size_t done) {
+    const std::lock_guard lock(progress_);
+    input_.context.progress(name + " (" + std::to_string(done) + " of " + std::to_string(work_.size()) + ")", 1.0);
+  }
+
+  static void summarise(const Sums& sums, std::vector<MeasuredRow>& rows) {
     std::int64_t violations = 0, meshes = 0;
-    for (const auto& [key, sum] : sums_) {
+    for (const auto& [key, sum] : sums) {
       const auto& [kind, extractor, tolerance] = key;
       MeasuredRow row{"summary", kind + ", " + extractor};
       row.values = {{"meshes", sum.meshes},
@@ -372,21 +457,15 @@ class Guarantee {
       if (sum.largest_share > 0) row.values["beyond"] = sum.beyond;
       if (tolerance >= 0) meshes += sum.meshes;
       if (tolerance >= 0) violations += sum.violations;
-      rows_.push_back(std::move(row));
+      rows.push_back(std::move(row));
     }
-    rows_.push_back(
+    rows.push_back(
         {"summary", std::string("all of ") + kGuaranteed, {{"meshes", meshes}, {"violations", violations}}});
   }
 
-  static inline const std::vector<std::string> kFigures = {"cells", "several_sheets", "held_cells",
-                                                           "fanned_edges", "escaped"};
-
   const MeasurementInput& input_;
-  std::vector<double> tolerances_;
-  MeshFile reference_;  ///< the subject's uniform mesh
-  std::optional<validation::MeshReport> reference_report_;
-  std::map<std::tuple<std::string, std::string, double>, Sum> sums_;
-  std::vector<MeasuredRow> rows_;
+  std::vector<Work> work_;
+  std::mutex progress_;
 };
 
 }  // namespace
