@@ -105,8 +105,8 @@ class Run {
  private:
   /// Every table of a measurement has columns of its own.
   void measure() {
-    rows_ = run_measurement(experiment_, tier_, tables_, out_, settings_.filter, head_, context_);
-    for (const Json& row : rows_) append_row(out_ / "rows.jsonl", row);
+    rows_ = run_measurement(experiment_, tier_, tables_, out_, settings_.filter, head_, context_,
+                            [&](const Json& row) { append_row(out_ / "rows.jsonl", row); });
     for (const RowGroup& group : latest_groups(rows_)) {
       write_markdown(group, table_);
       write_legend(group.rows, table_);

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <deque>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -357,7 +357,7 @@ class SubjectMeasurement {
   std::optional<validation::MeshReport> reference_report_;
 };
 
-/// Subjects side by side, for most of what is done to one is not parallel. Their rows come in the order of subjects.
+/// Subjects side by side, for most of what is done to one is not parallel. Their rows are emitted in the order of subjects.
 class Guarantee {
  public:
   explicit Guarantee(const MeasurementInput& input) : input_(input) {}
@@ -366,25 +366,34 @@ class Guarantee {
     list_models();
     list_noise();
     list_patterns();
-    std::vector<SubjectMeasurement> results(work_.size(), SubjectMeasurement(input_));
-    std::atomic<std::size_t> next = 0, done = 0;
+    for (std::size_t i = 0; i < work_.size(); ++i) results_.emplace_back(input_);
+    std::vector<std::atomic<bool>> ready(work_.size());
+    std::atomic<std::size_t> next = 0;
+    std::size_t emitted = 0;
     tbb::task_group group;
     for (int worker = 0; worker < tbb::this_task_arena::max_concurrency(); ++worker)
       group.run([&] {
         for (std::size_t i; (i = next++) < work_.size();) {
           input_.context.check();
           // Isolated, so that a thread that waits for a part of one subject begins no other one meanwhile.
-          tbb::this_task_arena::isolate([&] { work_[i].measure(results[i]); });
-          report(work_[i].name, ++done);
+          tbb::this_task_arena::isolate([&] { work_[i].measure(results_[i]); });
+          ready[i] = true;
+          const std::lock_guard lock(output_);
+          for (; emitted < work_.size() && ready[emitted]; ++emitted) emit(emitted);
+          input_.context.progress(work_[i].name, double(++done_) / double(work_.size()));
         }
       });
-    group.wait();
+    try {
+      group.wait();
+    } catch (...) {  // what is ready is not lost because something before it is not
+      for (; emitted < work_.size(); ++emitted)
+        if (ready[emitted]) emit(emitted);
+      throw;
+    }
     std::vector<MeasuredRow> rows;
     Sums sums;
-    for (SubjectMeasurement& result : results) {
-      std::ranges::move(result.rows, std::back_inserter(rows));
+    for (const SubjectMeasurement& result : results_)
       for (const auto& [key, sum] : result.sums) sums[key].add(sum);
-    }
     summarise(sums, rows);
     return rows;
   }
@@ -437,10 +446,7 @@ class Guarantee {
     return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
   }
 
-  void report(const std::string& name, std::size_t done) {
-    const std::lock_guard lock(progress_);
-    input_.context.progress(name + " (" + std::to_string(done) + " of " + std::to_string(work_.size()) + ")", 1.0);
-  }
+  void emit(std::size_t i) { input_.emit(std::exchange(results_[i].rows, {})); }
 
   static void summarise(const Sums& sums, std::vector<MeasuredRow>& rows) {
     std::int64_t violations = 0, meshes = 0;
@@ -465,7 +471,9 @@ class Guarantee {
 
   const MeasurementInput& input_;
   std::vector<Work> work_;
-  std::mutex progress_;
+  std::deque<SubjectMeasurement> results_;
+  std::mutex output_;
+  std::size_t done_ = 0;
 };
 
 }  // namespace

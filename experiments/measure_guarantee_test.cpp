@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -11,25 +13,29 @@
 namespace hermesh {
 namespace {
 
+const std::map<std::string, std::string> kSmall = {
+    {"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_sizes", "8"}};
+
 std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters,
-                          const std::string& filter = "") {
+                          const std::string& filter = "", const std::atomic<bool>* cancel = nullptr,
+                          const std::function<void(const Json&)>& keep = {}) {
   Tables tables;
   tables.extractors = all_extractors();
   tables.voxelizers = all_voxelizers();
   tables.load = load_case;
   tables.measurements = {guarantee_measurement()};
   RunContext context;
+  context.cancel = cancel;
   Experiment experiment;
   experiment.measurement = "guarantee";
   experiment.seed = 5;
   Tier tier;
   tier.parameters = parameters;
-  return run_measurement(experiment, tier, tables, {}, filter, Json::object(), context);
+  return run_measurement(experiment, tier, tables, {}, filter, Json::object(), context, keep);
 }
 
 TEST(GuaranteeMeasurement, FindsNoViolation) {
-  const std::vector<Json> rows =
-      rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_sizes", "8"}});
+  const std::vector<Json> rows = rows_of(kSmall);
   // Two tolerances and the uniform mesh, and four others, and an overview, of a model, four fields of noise
   // and two of patterns; the sums of the three kinds; and the total.
   ASSERT_EQ(rows.size(), 8u * (1 + 4 + 2) + 7u * 3 + 1);
@@ -44,10 +50,25 @@ TEST(GuaranteeMeasurement, FindsNoViolation) {
   EXPECT_EQ(rows.back()["values"]["violations"], 0);
 }
 
+/// A run of hours that is cut short has kept what it had.
+TEST(GuaranteeMeasurement, KeepsRowsThatWereReadyBeforeItWasCancelled) {
+  const std::vector<Json> all = rows_of(kSmall, "noise");
+  std::atomic<bool> cancel = false;
+  std::vector<Json> kept;
+  EXPECT_THROW(rows_of(kSmall, "noise", &cancel,
+                       [&](const Json& row) {
+                         kept.push_back(row);
+                         cancel = true;
+                       }),
+               Cancelled);
+  ASSERT_GE(kept.size(), 1u);
+  ASSERT_LT(kept.size(), all.size());
+  EXPECT_EQ(kept[0]["variant"], all[0]["variant"]);
+}
+
 TEST(GuaranteeMeasurement, SeesTheDefectsOfThoseThatPromiseLess) {
   std::int64_t defects = 0;
-  for (const Json& row :
-       rows_of({{"cases", "turned-cube"}, {"resolutions", "30"}, {"noise_sizes", "8"}}, "uniform"))
+  for (const Json& row : rows_of(kSmall, "uniform"))
     if (text_at(row, "/values/extractor") == "dual-contouring")
       defects += std::int64_t(number_at(row, "/values/non_manifold_edges")) +
                  std::int64_t(number_at(row, "/values/self_intersections"));

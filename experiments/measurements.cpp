@@ -1,6 +1,7 @@
 #include "experiments/measurements.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "experiments/cell.h"
 #include "experiments/experiment_file.h"
@@ -70,7 +71,8 @@ std::span<const Measurement> all_measurements() {
 
 std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
                                   const std::filesystem::path& out, const std::string& filter,
-                                  const Json& head, RunContext& context) {
+                                  const Json& head, RunContext& context,
+                                  const std::function<void(const Json&)>& keep) {
   const Measurement& measurement = find_measurement(tables.measurements, experiment.measurement);
   const Options parameters(measurement.name, measurement.parameters, tier.parameters);
   Json full_head = head;
@@ -78,28 +80,36 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
       {"name", measurement.name}, {"parameters", parameters.canonical()}, {"seed", experiment.seed}};
   full_head["load"] = load_averages();
 
+  std::vector<Json> rows;
+  const auto add = [&](Json row) {
+    if (keep) keep(row);
+    rows.push_back(std::move(row));
+  };
+  const auto start = std::chrono::steady_clock::now();
+  const auto take = [&](const std::vector<MeasuredRow>& measured) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    full_head["measurement"]["seconds"] = elapsed.count();
+    for (const MeasuredRow& each : measured) {
+      const MeasuredTable& table = table_of(each, measurement);
+      if ((measurement.name + "/" + each.table + "/" + each.label).find(filter) == std::string::npos) continue;
+      Json row = row_json(full_head, each.table, each.label);
+      row["table"] = to_json(table);
+      row["values"] = each.values.is_null() ? Json::object() : each.values;
+      if (!each.broken.empty()) row["broken"] = each.broken;
+      add(std::move(row));
+    }
+  };
   std::vector<MeasuredRow> measured;
-  double seconds = 0.0;
   const auto failure = attempt([&] {
-    seconds = timed([&] {
-      measured = measurement.measure({parameters, experiment.seed, tables, out, context, filter});
-    });
+    measured = measurement.measure({parameters, experiment.seed, tables, out, context, filter, take});
   });
   if (failure) {
     Json row = row_json(full_head, measurement.name, measurement.name);
     row["failed"] = *failure;
-    return {row};
+    add(std::move(row));
+    return rows;
   }
-  full_head["measurement"]["seconds"] = seconds;
-  std::vector<Json> rows;
-  for (const MeasuredRow& each : measured) {
-    const MeasuredTable& table = table_of(each, measurement);
-    if ((measurement.name + "/" + each.table + "/" + each.label).find(filter) == std::string::npos) continue;
-    rows.push_back(row_json(full_head, each.table, each.label));
-    rows.back()["table"] = to_json(table);
-    rows.back()["values"] = each.values.is_null() ? Json::object() : each.values;
-    if (!each.broken.empty()) rows.back()["broken"] = each.broken;
-  }
+  take(measured);
   return rows;
 }
 

@@ -38,6 +38,9 @@ struct MeasurementInput {
   RunContext& context;
   /// Rows whose "measurement/table/label" does not contain it are thrown away; to make them would be in vain.
   std::string filter = {};
+  /// Takes rows that are ready, before those that measure() returns, so that what takes hours can be cut short and
+  /// loses nothing; from one thread at a time.
+  std::function<void(std::vector<struct MeasuredRow>)> emit = {};
 };
 
 /// A line of one of its tables.
@@ -60,7 +63,7 @@ struct MeasuredTable {
   std::string first_column;  ///< header of the labels
   std::vector<MeasuredColumn> columns;
   bool printed = true;  ///< false for rows that are only there to be plotted
-  /// Whether rows of a later run under other labels, with another filter, join those of earlier runs: of
+  /// Whether rows of a later run under other labels or of other resolutions join those of earlier runs: of
   /// tables that take hours, and whose rows need not be of one run because their times are not compared.
   bool additive = false;
 };
@@ -80,11 +83,12 @@ std::vector<std::string> case_choices();
 std::span<const Measurement> all_measurements();
 
 /// The measurement that the experiment names, as rows for rows.jsonl that begin with `head`; only those whose
-/// "measurement/table/label" contains the filter. A failure is a row, too.
+/// "measurement/table/label" contains the filter. A failure is a row, too. `keep` gets each as soon as it is ready.
 /// @throws Cancelled; Error for a row of a table or a value of a column that the measurement did not declare.
 std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
                                   const std::filesystem::path& out, const std::string& filter,
-                                  const Json& head, RunContext& context);
+                                  const Json& head, RunContext& context,
+                                  const std::function<void(const Json&)>& keep = {});
 
 // Those that there are, each in its measure_….cpp.
 

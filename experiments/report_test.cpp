@@ -133,6 +133,11 @@ TEST(Groups, RunsOfAnAdditiveTableAddUp) {
   EXPECT_EQ(groups[0].rows[1]["run"], "2");
   EXPECT_EQ(groups[0].rows[2]["run"], "3");
   EXPECT_EQ(groups[0].earlier_runs, 0);
+
+  Json coarse = row("1", "a"), fine = row("2", "a");
+  coarse["values"]["resolution"] = 50;
+  fine["values"]["resolution"] = 400;
+  EXPECT_EQ(latest_groups({coarse, fine})[0].rows.size(), 2u);
 }
 
 TEST(Latex, EscapesWhatLatexWouldRead) {

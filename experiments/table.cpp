@@ -205,6 +205,10 @@ std::vector<std::string> alarms(const RowGroup& group) {
 std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
   std::vector<std::string> order;
   std::map<std::string, std::vector<std::pair<std::string, RowGroup>>> runs;
+  const auto resolution = [](const Json& row) {
+    const Json* value = find(row, "/values/resolution");
+    return value ? *value : Json();
+  };
   for (const Json& row : rows) {
     std::string key;
     for (const char* part :
@@ -220,7 +224,8 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
       group = groups.insert(groups.end(), {run, std::move(before)});
     }
     std::erase_if(group->second.rows, [&](const Json& old) {
-      return text_at(old, "/run") != run && text_at(old, "/variant/label") == text_at(row, "/variant/label");
+      return text_at(old, "/run") != run && text_at(old, "/variant/label") == text_at(row, "/variant/label") &&
+             resolution(old) == resolution(row);
     });
     group->second.rows.push_back(row);
   }
