@@ -40,7 +40,8 @@ constexpr double kRounding = 1e-4;
 
 /// Certifying the distance takes minutes beyond.
 constexpr int kFinestCertified = 200;
-constexpr int kLargestNoiseCertified = 32;
+/// Volumes of noise and patterns up to so many samples along a side.
+constexpr int kLargestCertified = 32;
 
 struct Contender {
   const char* name;
@@ -236,7 +237,7 @@ class SubjectMeasurement {
                              [&](int, int, int) {
                                return number % 2 == 0 ? value(random) : static_cast<float>(whole(random));
                              }),
-                 n, nullptr, 1.0, input_.parameters.is("certify", "yes") && n <= kLargestNoiseCertified});
+                 n, nullptr, 1.0, input_.parameters.is("certify", "yes") && n <= kLargestCertified});
   }
 
   /// The first field has the 256 patterns of one cell's corners, some twice; the others random ones of 2 × 2
@@ -248,8 +249,9 @@ class SubjectMeasurement {
     const auto pattern = [&](int i) {
       return number == 0 ? std::uint32_t(i % 256) : std::uint32_t(random());
     };
-    measure_all({"patterns", label, make_patterns(per_axis, number == 0 ? 2 : 3, pattern, random), per_axis,
-                 nullptr, 1.0, input_.parameters.is("certify", "yes")});
+    const int size = number == 0 ? 2 : 3;
+    measure_all({"patterns", label, make_patterns(per_axis, size, pattern, random), per_axis, nullptr, 1.0,
+                 input_.parameters.is("certify", "yes") && per_axis * (size + 1) <= kLargestCertified});
   }
 
  private:

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -87,12 +88,16 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
 
 std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const {
   constexpr int kMostSteps = 16;
+  constexpr double kNormalRounding = 1e-4;  // over the few voxels that p is away
   squared = std::numeric_limits<double>::infinity();
   const auto ask = [&](std::uint32_t t) {
     const Corners c = corners(t);
     // Most are ruled out by their boxes.
     const Eigen::Vector3d below = c[0].cwiseMin(c[1]).cwiseMin(c[2]) - p, above = p - c[0].cwiseMax(c[1]).cwiseMax(c[2]);
     if (below.cwiseMax(above).cwiseMax(0.0).squaredNorm() >= squared) return;
+    // Then by their planes; the normals are of single precision.
+    const double height = std::abs(normals_[t].cast<double>().dot(p - c[0])) - kNormalRounding;
+    if (height > 0 && height * height >= squared) return;
     const double there = squared_distance(p, c[0], c[1], c[2]);
     if (there < squared) squared = there, triangle = t;
   };
