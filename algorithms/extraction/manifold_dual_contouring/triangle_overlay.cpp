@@ -23,8 +23,8 @@ ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
     int outside = 0;
     for (int i = 0; i < size; ++i) outside += corners[i][side] > 0;
     if (outside == 0) continue;
-    before = corners;
     const int n = std::exchange(size, 0);
+    std::copy_n(corners.begin(), n, before.begin());
     for (int i = 0; i < n; ++i) {
       const Place &a = before[i], &b = before[(i + 1) % n];
       if (a[side] <= 0) corners[size++] = a;
