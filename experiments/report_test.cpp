@@ -137,7 +137,9 @@ TEST(Groups, RunsOfAnAdditiveTableAddUp) {
   Json coarse = row("1", "a"), fine = row("2", "a");
   coarse["values"]["resolution"] = 50;
   fine["values"]["resolution"] = 400;
-  EXPECT_EQ(latest_groups({coarse, fine})[0].rows.size(), 2u);
+  const std::vector<RowGroup> sorted = latest_groups({coarse, row("1", "b"), fine});
+  ASSERT_EQ(sorted[0].rows.size(), 3u);
+  EXPECT_EQ(sorted[0].rows[1], fine);
 }
 
 TEST(Latex, EscapesWhatLatexWouldRead) {

@@ -200,6 +200,13 @@ std::vector<std::string> alarms(const RowGroup& group) {
   return sentences;
 }
 
+/// In the order in which labels first appear, whichever run their rows are of.
+void put_labels_together(std::vector<Json>& rows) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < rows.size(); ++i) first.emplace(text_at(rows[i], "/variant/label"), i);
+  std::ranges::stable_sort(rows, {}, [&](const Json& row) { return first[text_at(row, "/variant/label")]; });
+}
+
 }  // namespace
 
 std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
@@ -230,7 +237,10 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
     group->second.rows.push_back(row);
   }
   std::vector<RowGroup> result;
-  for (const std::string& key : order) result.push_back(std::move(runs[key].back().second));
+  for (const std::string& key : order) {
+    result.push_back(std::move(runs[key].back().second));
+    if (find(result.back().rows.front(), "/table/additive")) put_labels_together(result.back().rows);
+  }
   return result;
 }
 
