@@ -31,7 +31,7 @@ extern const std::array<CellSheets, 256> kCellSheets;
 
 /// The same, but on the ambiguous faces among `joined_faces`, a bit a face, the outside corners are cut off one by one and
 /// the inside is joined. The guarantee holds for these, too, unless every other corner is inside and several faces are
-/// joined. (Then none has all of its crossings in one loop, so nobody asks for it.)
+/// joined. (CellBlocks joins none of theirs.)
 CellSheets cell_sheets(int signs, unsigned joined_faces);
 
 constexpr int edge_axis(int edge) { return edge >> 2; }

@@ -18,7 +18,7 @@
 //                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
 //                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
 //                  This is the last resort where polygons of such cells without it meet others (sheet_trials.h), and is counted.
-//                  An ambiguous face is cut the other way where an edge would have four polygons (CellBlocks::sheets()).
+//                  How an ambiguous face is cut the normals tell (CellBlocks::sheets()).
 //
 // Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
 // only where the mesh as it is then shows that nothing meets (late_moves.h).
