@@ -196,7 +196,8 @@ class Contourer {
   const View view_;
   const RegionInput input_;
   const std::size_t blocks_, groups_;
-  std::vector<std::vector<Eigen::Vector3f>> places_;  ///< by group, of its blocks one after another: voxels from the block's first sample
+  /// By group, of its blocks one after another: voxels from the block's first sample.
+  std::vector<std::vector<Eigen::Vector3f>> places_;
   MaskGrid mask_;
   std::vector<BlockResult> results_;
 };

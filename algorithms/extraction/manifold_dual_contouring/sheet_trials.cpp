@@ -24,7 +24,11 @@ class Trials {
  public:
   Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, double farthest,
          RunContext& context)
-      : cells_(cells), polygons_(polygons), mesh_(cells, polygons, points, farthest), points_(points), untested_(cells.size()) {
+      : cells_(cells),
+        polygons_(polygons),
+        mesh_(cells, polygons, points, farthest),
+        points_(points),
+        untested_(cells.size()) {
     std::vector<Cells> tried(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
