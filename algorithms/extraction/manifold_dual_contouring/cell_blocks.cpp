@@ -95,13 +95,8 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
       }
     });
   });
-  std::vector<std::vector<std::pair<std::uint16_t, std::uint8_t>>> joined(blocks_.size());  // by block: cells, and faces
-  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& {
-    auto& list = joined[static_cast<std::size_t>(at.block)];
-    const auto found = std::ranges::find(list, at.cell, [](const auto& entry) { return int(entry.first); });
-    if (found != list.end()) return found->second;
-    return list.emplace_back(static_cast<std::uint16_t>(at.cell), std::uint8_t{0}).second;
-  };
+  std::vector<std::uint8_t> joined(codes_.size());  // faces, by active cell
+  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& { return joined[code_at(at.block, at.cell)]; };
   const auto code = [&](const Cell& at) { return codes_[code_at(at.block, at.cell)]; };
   const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
     joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
@@ -120,13 +115,13 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
         cut_the_other_way(lower, upper, face);
     }
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
-    std::ranges::sort(joined[b]);
-    for (const auto& [cell, which] : joined[b]) {
-      if (which == 0) continue;
+    std::size_t number = blocks_[b].first_code;
+    for_each_bit(blocks_[b].active, [&](int cell) {
+      const std::size_t at = number++;
+      if (joined[at] == 0) return;
       blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
-      blocks_[b].joined_sheets.emplace_back(
-          cell, cell_sheets(codes_[code_at(static_cast<std::int32_t>(b), cell)], which));
-    }
+      blocks_[b].joined_sheets.emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));
+    });
   });
 }
 
