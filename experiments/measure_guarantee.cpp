@@ -267,6 +267,7 @@ class SubjectMeasurement {
       for (const Contender& other : others())
         overview.add_other(other.name, add_row(subject, other, std::nullopt).values);
     rows.push_back(overview.row());
+    reference_ = {};  // of hundreds of subjects it would be gigabytes
   }
 
   static std::string readable_exactly(double number) {
