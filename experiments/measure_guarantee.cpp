@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -255,11 +256,14 @@ class SubjectMeasurement {
   }
 
  private:
-  void measure_all(const Subject& subject) {
+  void measure_all(Subject subject) {
+    // Rows of the two ways to merge stand side by side.
+    if (input_.parameters.is("merging", "regions")) subject.label += ", regions";
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
-      const Contender ours = {kGuaranteed, {{"tolerance", readable_exactly(tolerance)}}};
+      const Contender ours = {kGuaranteed,
+                              {{"tolerance", readable_exactly(tolerance)}, {"merging", input_.parameters.text("merging")}}};
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
@@ -373,25 +377,34 @@ class Guarantee {
     std::vector<std::atomic<bool>> ready(work_.size());
     std::atomic<std::size_t> next = 0;
     std::size_t emitted = 0;
+    std::exception_ptr failure;
+    const auto work = [&] {
+      for (std::size_t i; (i = next++) < work_.size();) {
+        input_.context.check();
+        // Isolated, so that a thread that waits for a part of one subject begins no other one meanwhile.
+        tbb::this_task_arena::isolate([&] { work_[i].measure(results_[i]); });
+        ready[i] = true;
+        const std::lock_guard lock(output_);
+        for (; emitted < work_.size() && ready[emitted]; ++emitted) emit(emitted);
+        input_.context.progress(work_[i].name, double(++done_) / double(work_.size()));
+      }
+    };
     tbb::task_group group;
     for (int worker = 0; worker < tbb::this_task_arena::max_concurrency(); ++worker)
       group.run([&] {
-        for (std::size_t i; (i = next++) < work_.size();) {
-          input_.context.check();
-          // Isolated, so that a thread that waits for a part of one subject begins no other one meanwhile.
-          tbb::this_task_arena::isolate([&] { work_[i].measure(results_[i]); });
-          ready[i] = true;
+        // An exception that the group saw would end the loops of other subjects halfway, without a word to them.
+        try {
+          work();
+        } catch (...) {
           const std::lock_guard lock(output_);
-          for (; emitted < work_.size() && ready[emitted]; ++emitted) emit(emitted);
-          input_.context.progress(work_[i].name, double(++done_) / double(work_.size()));
+          if (!failure) failure = std::current_exception();
         }
       });
-    try {
-      group.wait();
-    } catch (...) {  // what is ready is not lost because something before it is not
+    group.wait();
+    if (failure) {  // what is ready is not lost because something before it is not
       for (; emitted < work_.size(); ++emitted)
         if (ready[emitted]) emit(emitted);
-      throw;
+      std::rethrow_exception(failure);
     }
     std::vector<MeasuredRow> rows;
     Sums sums;
@@ -498,6 +511,7 @@ Measurement guarantee_measurement() {
             "0.1 1",
             "of the adaptive meshes, in voxels",
             {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2"}},
+           {"merging", "collapses", "option of the extractor", {"collapses", "regions"}},
            {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
            {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
            {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},

@@ -77,6 +77,7 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
     block.leaf = static_cast<std::int32_t>(i);
     block.inside = leaves[i].inside;
     block.crossing = crossing_edges(leaves[i]);
+    block.count_before();
     blocks_below(leaves[i], block.crossing, below[i]);
   });
   std::vector<Lower> added;

@@ -21,8 +21,24 @@ class HermiteView {
     std::int32_t leaf = -1;               ///< number among the leaves that own crossings; −1 for none
     BlockMask inside{};
     std::array<BlockMask, 3> crossing{};  ///< by axis: samples whose up-wind edge is crossed
+    std::array<std::array<std::uint16_t, 8>, 3> before{};  ///< by axis and word: crossing edges of the block before it
     /// By neighbour_slot(); a block's number, or −1 where there is none.
     std::array<std::int32_t, 27> neighbours{};
+
+    /// Of a crossing edge among those of the block, by axis and then by sample.
+    std::uint32_t rank(int axis, int sample) const {
+      const int word = sample >> 6;
+      return before[axis][word] +
+             static_cast<std::uint32_t>(bits_in(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+    }
+    void count_before() {
+      int sum = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        for (int word = 0; word < 8; ++word) {
+          before[axis][word] = static_cast<std::uint16_t>(sum);
+          sum += bits_in(crossing[axis][word]);
+        }
+    }
   };
 
   virtual ~HermiteView() = default;
@@ -50,10 +66,7 @@ class SparseView : public HermiteView {
 
   EdgeCrossing crossing(std::int32_t number, int sample, int axis) const override {
     const Block& block = blocks()[number];
-    std::uint32_t rank = hermite_.leaves[block.leaf].first;
-    for (int a = 0; a < axis; ++a) rank += static_cast<std::uint32_t>(count(block.crossing[a]));
-    rank += rank_in(block.crossing[axis], sample);
-    return read_(hermite_.crossings[rank]);
+    return read_(hermite_.crossings[hermite_.leaves[block.leaf].first + block.rank(axis, sample)]);
   }
 
  private:

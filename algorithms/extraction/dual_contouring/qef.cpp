@@ -20,7 +20,27 @@ double Qef::error(const Eigen::Vector3d& x) const {
   return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
 }
 
+/// Where the planes are nearly parallel, as in most cells, two singular values are dropped for certain, and the third one's
+/// vector is found by a few products: whatever a start along the largest column has of the others shrinks by
+/// truncation² / 2 in each.
+bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const {
+  int largest = 0;
+  ata_.diagonal().maxCoeff(&largest);
+  axis = ata_.col(largest);
+  for (int i = 0; i < 3; ++i) {
+    const double size = axis.norm();
+    if (!(size > 0)) return false;
+    axis = ata_ * (axis / size);
+  }
+  axis.normalize();
+  value = axis.dot(ata_ * axis);
+  return ata_.trace() - value < 0.5 * truncation * truncation * value;
+}
+
 Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncation) const {
+  Eigen::Vector3d axis;
+  double value;
+  if (is_flat(truncation, axis, value)) return start + axis.dot(atb_ - ata_ * (start - anchor_)) / value * axis;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
   const Eigen::Vector3d& values = solver.eigenvalues();  // squares of the singular values of A, ascending
   const Eigen::Vector3d residual = solver.eigenvectors().transpose() * (atb_ - ata_ * (start - anchor_));

@@ -32,6 +32,8 @@ class Qef {
   double error(const Eigen::Vector3d& x) const;  ///< E(x), never negative
 
  private:
+  bool is_flat(double truncation, Eigen::Vector3d& axis, double& value) const;
+
   Eigen::Vector3d anchor_, sum_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d ata_ = Eigen::Matrix3d::Zero();
   Eigen::Vector3d atb_ = Eigen::Vector3d::Zero();

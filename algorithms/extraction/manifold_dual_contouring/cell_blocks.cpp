@@ -22,6 +22,7 @@ bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 
 CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     : grid_(grid),
+      source_(grid.blocks()),
       margin_(margin_for_rounding()),
       cuts_(grid.cuts()),
       told_(grid.joint_sheets()),
@@ -165,7 +166,7 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
 bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
   for (int d = 1; d < 8; ++d) {
     const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
-    if (there >= 0 && grid_.blocks()[there].leaf >= 0) return (grid_.blocks()[there].inside[0] & 1) != 0;
+    if (there >= 0 && source_[there].leaf >= 0) return (source_[there].inside[0] & 1) != 0;
   }
   return false;
 }
@@ -175,7 +176,7 @@ BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
   static constexpr BlockMask kNone{};
   BlockMask cells{};
   if (cuts_.empty()) return cells;
-  const HermiteView::Block& block = grid_.blocks()[b];
+  const HermiteView::Block& block = source_[b];
   for (int corner = 0; corner < 7; ++corner)
     for (int axis = 0; axis < 3; ++axis) {
       if ((corner >> axis) & 1) continue;
@@ -192,12 +193,12 @@ BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
 /// Signs of every cell's corners, from its first corner's and the crossings on the way that are no cuts.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   static constexpr BlockMask kNone{};
-  const HermiteView::Block& block = grid_.blocks()[b];
+  const HermiteView::Block& block = source_[b];
   const auto crossed = [&](int axis, int dx, int dy, int dz) {
     return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) -> BlockMask {
       const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
       if (there < 0) return kNone;
-      BlockMask edges = grid_.blocks()[there].crossing[axis];
+      BlockMask edges = source_[there].crossing[axis];
       if (!cuts_.empty())
         for (int word = 0; word < 8; ++word) edges[word] &= ~cuts_[there][axis][word];
       return edges;
@@ -217,7 +218,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
 double CellBlocks::margin_for_rounding() const {
   const IndexToWorld& placement = grid_.placement();
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
-  for (const HermiteView::Block& block : grid_.blocks())
+  for (const HermiteView::Block& block : source_)
     for (int corner = 0; corner < 8; ++corner) {
       Eigen::Vector3d index;
       for (int a = 0; a < 3; ++a) index[a] = block.lower[a] - placement.base[a] + 8 * ((corner >> a) & 1);
@@ -249,7 +250,7 @@ std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const 
 }
 
 Eigen::Vector3d CellBlocks::corner(std::int32_t block, int sample) const {
-  const auto& lower = grid_.blocks()[block].lower;
+  const auto& lower = source_[block].lower;
   const auto& base = grid_.placement().base;
   return {double(lower[0] - base[0] + (sample >> 6)), double(lower[1] - base[1] + ((sample >> 3) & 7)),
           double(lower[2] - base[2] + (sample & 7))};
@@ -303,7 +304,7 @@ bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
 
 bool CellBlocks::comes_first(const Edge& a, const Edge& b) const {
   const auto place = [&](const Edge& edge) {
-    const auto& lower = grid_.blocks()[edge.block].lower;
+    const auto& lower = source_[edge.block].lower;
     return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7), lower[2] + (edge.sample & 7),
                       std::int32_t(edge.axis)};
   };

@@ -9,7 +9,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -77,7 +79,15 @@ class CellBlocks {
   std::size_t size() const { return blocks_.size(); }
   const Block& operator[](std::int32_t block) const { return blocks_[block]; }
   const CellGrid& grid() const { return grid_; }
+  const HermiteView::Block& source(std::int32_t block) const { return source_[static_cast<std::size_t>(block)]; }
   std::size_t point_count() const { return points_; }
+  std::size_t cell_count() const { return codes_.size(); }
+  /// Of an active cell, from 0, ascending by block and cell.
+  std::uint32_t cell_number(std::int32_t block, int cell) const {
+    return static_cast<std::uint32_t>(code_at(block, cell));
+  }
+  /// Inside bits of the corners of the cell of that number.
+  int corner_signs(std::uint32_t number) const { return codes_[number]; }
 
   /// By the inside bits of the corners, but for those joints of which the lattice tells them. Of other joints
   /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
@@ -105,7 +115,7 @@ class CellBlocks {
   /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;
   Cell locate(std::int32_t block, int x, int y, int z) const {
-    return {grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
+    return {source_[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
             sample_index(x & 7, y & 7, z & 7)};
   }
   /// Calls f(Cell) for the active cells at most so many steps from one along each axis, that one included.
@@ -118,9 +128,39 @@ class CellBlocks {
           if (at.block >= 0 && test(blocks_[at.block].active, at.cell)) f(at);
         }
   }
+  /// Calls f(block, cell, steps, number of its first point) for the active cells of a cube within a block and of those at
+  /// most so many steps from it.
+  template <class F>
+  void for_each_about_cube(std::int32_t block, int first_cell, int side, int most_steps, F&& f) const {
+    const int lower[3] = {first_cell >> 6, (first_cell >> 3) & 7, first_cell & 7};
+    const auto begin = [&](int a, int shift) { return std::max(0, lower[a] - most_steps - 8 * shift); };
+    const auto end = [&](int a, int shift) { return std::min(8, lower[a] + side + most_steps - 8 * shift); };
+    const auto off = [&](int a, int at) { return std::max({0, lower[a] - at, at - lower[a] - side + 1}); };
+    for (int slot = 0; slot < 27; ++slot) {
+      const int shift[3] = {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1};
+      if (begin(0, shift[0]) >= end(0, shift[0]) || begin(1, shift[1]) >= end(1, shift[1]) ||
+          begin(2, shift[2]) >= end(2, shift[2]))
+        continue;
+      const std::int32_t there = source_[block].neighbours[slot];
+      if (there < 0) continue;
+      const std::uint64_t row = ((1u << end(2, shift[2])) - 1) & ~((1u << begin(2, shift[2])) - 1);
+      std::uint64_t rows = 0;
+      for (int y = begin(1, shift[1]); y < end(1, shift[1]); ++y) rows |= row << (8 * y);
+      const Block& own = blocks_[there];
+      for (int x = begin(0, shift[0]); x < end(0, shift[0]); ++x) {
+        std::uint32_t number = own.first_point + own.rank[x];
+        for (std::uint64_t word = own.active[x]; word != 0; word &= word - 1, ++number) {
+          const int bit = std::countr_zero(word);
+          if (!((rows >> bit) & 1)) continue;
+          const int steps = std::max({off(0, x + 8 * shift[0]), off(1, (bit >> 3) + 8 * shift[1]), off(2, (bit & 7) + 8 * shift[2])});
+          f(there, 64 * x + bit, steps, number);
+        }
+      }
+    }
+  }
   Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
   bool is_crossed(const Edge& edge) const {
-    return edge.block >= 0 && test(grid_.blocks()[edge.block].crossing[edge.axis], edge.sample);
+    return edge.block >= 0 && test(source_[edge.block].crossing[edge.axis], edge.sample);
   }
   Eigen::Vector3d crossing_point(const Edge& edge) const {
     return crossing_point(edge, grid_.crossing(edge.block, edge.sample, edge.axis));
@@ -143,7 +183,7 @@ class CellBlocks {
   template <class F>
   void for_each_crossing_edge(std::int32_t block, F&& f) const {
     for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(grid_.blocks()[block].crossing[axis], [&](int sample) { f(Edge{block, sample, axis}); });
+      for_each_bit(source_[block].crossing[axis], [&](int sample) { f(Edge{block, sample, axis}); });
   }
 
  private:
@@ -180,6 +220,7 @@ class CellBlocks {
   double margin_for_rounding() const;
 
   const CellGrid& grid_;
+  const std::vector<HermiteView::Block>& source_;  ///< the grid's blocks
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;

@@ -1,48 +1,12 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 
-#include <cmath>
-#include <optional>
-
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/manifold_dual_contouring/envelope.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-
-/// Of an area or a determinant whose terms are of the order of one, far above rounding: what is called positive.
-constexpr double kPositive = 1e-5;
-
-/// The corner of a quad in the edge's own frame: along (axis+1) % 3, (axis+2) % 3 and the axis, from the edge's start.
-struct Corner {
-  double u, v, h;
-};
-
-/// Where the edge passes through the two triangles of diagonal (d, d+2), if both lie in the envelope. The diagonal
-/// passes the edge on one side, through the half-plane of the corner k there. If it passes through the triangle of the
-/// edge with k, the triangle on that side is within the two tetrahedra of k; if, besides, the edge passes through the
-/// other triangle, that one is within all four.
-std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
-  constexpr double kMargin = 1e-4;
-  const auto cross = [](const Corner& a, const Corner& b) { return a.u * b.v - a.v * b.u; };
-  for (int i = 0; i < 4; ++i)
-    if (cross(r[i], r[(i + 1) % 4]) < kPositive) return std::nullopt;
-  const Corner &a = r[d], &c = r[d + 2];
-  const bool left = cross(a, c) > 0;  // the edge is on the left of the diagonal, and so is corner d+3
-  const Corner &beyond = r[left ? d + 1 : (d + 3) % 4], &other = r[left ? (d + 3) % 4 : d + 1];
-  // Where the diagonal meets the half-plane of `beyond`: at `share` of the way to it from the edge.
-  const double from_a = cross(beyond, a), from_c = cross(beyond, c);
-  const double t = from_a / (from_a - from_c);
-  const Corner q = {a.u + t * (c.u - a.u), a.v + t * (c.v - a.v), a.h + t * (c.h - a.h)};
-  const double share = (q.u * beyond.u + q.v * beyond.v) / (beyond.u * beyond.u + beyond.v * beyond.v);
-  if (!(share > -kMargin && share < 1 - kMargin)) return std::nullopt;
-  if (!(q.h > share * beyond.h + kMargin && q.h < 1 - share * (1 - beyond.h) - kMargin)) return std::nullopt;
-  const double wa = cross(c, other), wc = cross(other, a), wo = cross(a, c), sum = wa + wc + wo;
-  if (std::abs(sum) < kPositive) return std::nullopt;
-  const double height = (wa * a.h + wc * c.h + wo * other.h) / sum;
-  if (!(height > kMargin && height < 1 - kMargin)) return std::nullopt;
-  return height;
-}
 
 void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} << (sample & 63); }
 
@@ -138,26 +102,13 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector
 int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, const CellBlocks::Around& around,
                                 const std::vector<Vector3d>& points) const {
   const Vector3d start = cells_.corner(edge.block, edge.sample);
-  std::array<Corner, 4> r;
+  std::array<EnvelopeCorner, 4> r;
   for (int i = 0; i < 4; ++i) {
     const Vector3d p = points[around.points[i]] - start;
     r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
   }
-  const double hit = cells_.grid().crossing(edge.block, edge.sample, edge.axis).offset;
-  std::array<std::optional<double>, 2> off;  // of the surface from the crossing, in voxels along the edge
-  for (int d = 0; d < 2; ++d)
-    if (const std::optional<double> height = height_if_safe(r, d)) off[d] = std::abs(*height - hit);
-  if (!off[0] && !off[1]) return -1;
-  if (!off[0] || !off[1]) return off[1] ? 1 : 0;
-  // The split must follow a crease. The crossing itself lies on the surface, so the diagonal is right whose triangles
-  // pass nearer to it; where both do, the shorter one makes the better triangles.
-  constexpr double kAlike = 1e-4;
-  if (std::abs(*off[0] - *off[1]) > kAlike) return *off[1] < *off[0];
-  const auto squared = [&](int i, int j) {
-    const double du = r[i].u - r[j].u, dv = r[i].v - r[j].v, dh = r[i].h - r[j].h;
-    return du * du + dv * dv + dh * dh;
-  };
-  return squared(1, 3) < squared(0, 2);
+  const EnvelopeCut cut = cut_quad(r, cells_.grid().crossing(edge.block, edge.sample, edge.axis).offset);
+  return cut.fanned ? -1 : cut.diagonal;
 }
 
 std::uint32_t EdgePolygons::crossing_point(const CellBlocks::Edge& edge) const {

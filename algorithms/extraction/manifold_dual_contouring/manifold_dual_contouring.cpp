@@ -7,6 +7,7 @@
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/manifold_dual_contouring/certified_decimation.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_mesh.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {
@@ -35,14 +36,12 @@ PolygonMesh in_world(const std::vector<Eigen::Vector3d>& points, std::vector<Tri
   return result;
 }
 
-std::vector<Triangle> all_triangles(UniformMesh& mesh) {
-  std::vector<Triangle> triangles = std::move(mesh.triangles);
-  triangles.reserve(triangles.size() + 2 * mesh.quads.size());
-  for (const Quad& q : mesh.quads) {
+std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads) {
+  triangles.reserve(triangles.size() + 2 * quads.size());
+  for (const Quad& q : quads) {
     triangles.push_back({q[0], q[1], q[2]});
     triangles.push_back({q[0], q[2], q[3]});
   }
-  mesh.quads = {};
   return triangles;
 }
 
@@ -89,42 +88,85 @@ class FieldAtPoints {
   const std::array<std::int32_t, 3> base_;
 };
 
+/// Places of points, and polygons between them.
+struct Polygons {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Triangle> triangles;
+  LargeArray<Quad> quads;
+};
+
+std::vector<float> tolerances(const std::vector<Eigen::Vector3d>& points, const FieldAtPoints& field, double tolerance,
+                              const RunContext& context) {
+  std::vector<float> result(points.size());
+  parallel_blocks(points.size(), context, [&](std::size_t i) { result[i] = field.tolerance(points[i], tolerance); });
+  return result;
+}
+
+Polygons as_they_are(UniformMesh uniform) {
+  return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads)};
+}
+
+Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions& options, const FieldAtPoints& field,
+                    const FilePoints& file, RunContext& context) {
+  Polygons result;
+  with_uniform_cells(grid, options.uniform, file, context,
+                     [&](const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh) {
+                       report(mesh, context);
+                       const std::vector<float> asked = tolerances(mesh.points, field, options.tolerance, context);
+                       RegionMesh merged = merge_regions(cells, polygons, mesh.points, asked, file, context);
+                       result = {std::move(merged.points), std::move(merged.triangles), std::move(merged.quads)};
+                     });
+  return result;
+}
+
+Polygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
+                      RunContext& context) {
+  const FineMesh fine(std::move(uniform.points),
+                      all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})));
+  const std::vector<float> asked = tolerances(fine.points(), field, tolerance, context);
+  CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context);
+  return {std::move(coarse.points), std::move(coarse.triangles), {}};
+}
+
+Polygons polygons_of(const HermiteView& grid, ManifoldDualContouringOptions options, const FieldAtPoints& field,
+                     const FilePoints& file, RunContext& context) {
+  const bool regions = options.merging == ManifoldDualContouringOptions::Merging::regions;
+  if (regions) options.uniform.reach = 0;
+  if (regions && options.tolerance > 0) return by_regions(grid, options, field, file, context);
+  UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
+  report(uniform, context);
+  if (uniform.points.empty() || options.tolerance <= 0) return as_they_are(std::move(uniform));
+  return by_collapses(std::move(uniform), field, options.tolerance, file, context);
+}
+
+/// Only the triangles that the field does not leave out, and their points.
+Polygons within(const FieldAtPoints& field, Polygons all) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<std::uint32_t> number(all.points.size(), kNone);
+  Polygons result;
+  for (Triangle t : all_triangles(std::move(all.triangles), std::move(all.quads))) {
+    if (field.leaves_out((all.points[t[0]] + all.points[t[1]] + all.points[t[2]]) / 3.0)) continue;
+    for (std::uint32_t& p : t) {
+      if (number[p] == kNone) {
+        number[p] = static_cast<std::uint32_t>(result.points.size());
+        result.points.push_back(all.points[p]);
+      }
+      p = number[p];
+    }
+    result.triangles.push_back(t);
+  }
+  return result;
+}
+
 }  // namespace
 
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context) {
   const FilePoints file(grid.placement());
   const FieldAtPoints at_points(field, grid.placement());
-  UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
-  report(uniform, context);
-  const bool whole = !field || field->outside != AdaptivityField::Outside::nothing;
-  if (uniform.points.empty() || (options.tolerance <= 0 && whole))
-    return in_world(uniform.points, uniform.triangles, uniform.quads, file, context);
-
-  const FineMesh fine(std::move(uniform.points), all_triangles(uniform));
-  std::vector<float> asked(fine.points().size());
-  parallel_blocks(asked.size(), context, [&](std::size_t i) {
-    asked[i] = at_points.tolerance(fine.points()[i], options.tolerance);
-  });
-  CertifiedMesh coarse;
-  if (options.tolerance > 0) coarse = decimate_certified(fine, asked, {}, file, context);
-  const std::vector<Eigen::Vector3d>& places = options.tolerance > 0 ? coarse.points : fine.points();
-  constexpr std::uint32_t kNone = 0xffffffffu;
-  std::vector<std::uint32_t> number(places.size(), kNone);
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Triangle> triangles;
-  for (Triangle t : options.tolerance > 0 ? coarse.triangles : fine.triangles()) {
-    if (!whole && at_points.leaves_out((places[t[0]] + places[t[1]] + places[t[2]]) / 3.0)) continue;
-    for (std::uint32_t& p : t) {
-      if (number[p] == kNone) {
-        number[p] = static_cast<std::uint32_t>(points.size());
-        points.push_back(places[p]);
-      }
-      p = number[p];
-    }
-    triangles.push_back(t);
-  }
-  return in_world(points, std::move(triangles), {}, file, context);
+  Polygons polygons = polygons_of(grid, options, at_points, file, context);
+  if (field && field->outside == AdaptivityField::Outside::nothing) polygons = within(at_points, std::move(polygons));
+  return in_world(polygons.points, std::move(polygons.triangles), std::move(polygons.quads), file, context);
 }
 
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
@@ -133,6 +175,7 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   options.tolerance = input.options.number("tolerance");
   if (const double world = input.options.number("tolerance_world"); world > 0)
     options.tolerance = world / input.level_set.voxel_size();
+  if (input.options.is("merging", "regions")) options.merging = ManifoldDualContouringOptions::Merging::regions;
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
   return manifold_dual_contouring(view_of(hermite, input.context), options, input.field, input.context);
@@ -151,6 +194,12 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
                   .fallback = "0",
                   .help = "the same in world units, instead of tolerance where it is greater than 0",
                   .maximum = 1e30});
+  options.insert(options.begin() + 2,
+                 {.name = "merging",
+                  .fallback = "collapses",
+                  .help = "collapses: fewest polygons; regions: cubes of cells become one point each, many times as fast, "
+                          "with points held in their cells (reach=0) and distances below one voxel",
+                  .choices = {"collapses", "regions"}});
   return options;
 }
 

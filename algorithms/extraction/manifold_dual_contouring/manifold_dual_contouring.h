@@ -13,6 +13,11 @@ struct ManifoldDualContouringOptions {
   /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer polygons.
   /// 0 gives the uniform mesh itself.
   double tolerance = 0.1;
+  enum class Merging {
+    collapses,  ///< any points of the uniform mesh: the fewest polygons (certified_decimation.h)
+    regions     ///< those of cubes of 2³, 4³ and 8³ cells: many times as fast (region_mesh.h). Points stay within their cells.
+  };
+  Merging merging = Merging::collapses;
   DualContouringOptions uniform;  ///< placement of the uniform mesh's points
 };
 

@@ -37,6 +37,14 @@ class OverTriangle {
   const Eigen::Vector3d& normal() const { return normal_; }
   Place operator()(const Eigen::Vector3d& p) const { return axes_ * (p - origin_) - offsets_; }
 
+  /// What that is computed from.
+  struct Frame {
+    const Eigen::Matrix<double, 4, 3>& axes;
+    const Eigen::Vector3d& origin;
+    const Place& offsets;
+  };
+  Frame frame() const { return {axes_, origin_, offsets_}; }
+
  private:
   Eigen::Matrix<double, 4, 3> axes_;
   Eigen::Vector3d origin_, normal_;

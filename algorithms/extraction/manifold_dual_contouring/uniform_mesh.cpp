@@ -21,6 +21,9 @@ using Eigen::Vector3d;
 /// square: next to a feature that passes outside.
 constexpr double kWorthLeaving = 0.03;
 
+/// As near to the planes any place within the cell will do.
+constexpr double kGoodEnough = 0.005;
+
 /// Of a determinant whose terms are of the order of one, far above rounding: what is called positive.
 constexpr double kPositive = 1e-5;
 
@@ -35,11 +38,12 @@ class Contourer {
       : numbers_(numbers), cells_(grid, context), options_(options),
         reach_(std::min(options.reach, kFarthestFromCell)), file_(file), wishes_(cells_.size()) {}
 
-  UniformMesh run(RunContext& context) {
+  /// Polygons are made unless `use` is given.
+  UniformMesh run(RunContext& context, const CellUser* use = nullptr) {
     UniformMesh mesh;
     place_points(mesh, context);
     let_points_leave(mesh, context);
-    connect(mesh, context);
+    connect(mesh, context, use);
     return mesh;
   }
 
@@ -89,7 +93,10 @@ class Contourer {
 
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
-    const Vector3d held = qef.minimiser_within(corner + margin, corner + Vector3d::Ones() - margin, options_.truncation);
+    const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
+    const Vector3d nearest = qef.minimiser(options_.truncation).cwiseMax(lower).cwiseMin(upper);
+    if (qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return nearest;
+    const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
     if (reach_ > 0 && qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes()) {
       const auto is_near = [&](const Vector3d& p) {
         return (p - corner - Vector3d::Constant(0.5)).cwiseAbs().maxCoeff() <= 0.5 + reach_;
@@ -176,7 +183,7 @@ class Contourer {
     return true;
   }
 
-  void connect(UniformMesh& mesh, RunContext& context) {
+  void connect(UniformMesh& mesh, RunContext& context, const CellUser* use) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, mesh.points, context);
@@ -186,11 +193,12 @@ class Contourer {
     for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
       mesh.meeting_joints.emplace_back(cell.block, cell.cell);
     mesh.held = polygons.held_cells();
-    fill(polygons, mesh, context);
+    if (!use) fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     mesh.fanned_edges = polygons.fanned_edges();
     move_points(cells_, polygons, wishes_, file_, mesh.points, context);
     for_each_wisher(mesh, [&](double outside) { mesh.escaped += outside > 0; });
+    if (use) (*use)(cells_, polygons, mesh);
   }
 
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
@@ -256,6 +264,12 @@ class HermiteCells : public CellGrid {
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context) {
   return uniform_mesh(HermiteCells(grid), options, file, context);
+}
+
+void with_uniform_cells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+                        RunContext& context, const CellUser& use) {
+  const HermiteCells cells(grid);
+  Contourer(cells, options, file, context, nullptr).run(context, &use);
 }
 
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,

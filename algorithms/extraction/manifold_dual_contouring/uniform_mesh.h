@@ -34,12 +34,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+#include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
 #include "algorithms/hermite/hermite_view.h"
 
@@ -66,6 +68,11 @@ struct UniformMesh {
 /// @throws Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context);
+
+/// The same, but its polygons are not made: `use` gets what they would be made of, and the mesh with all but them. It may take the points.
+using CellUser = std::function<void(const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh)>;
+void with_uniform_cells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+                        RunContext& context, const CellUser& use);
 
 /// The edge that each polygon belongs to, numbered by block, axis and sample among the crossing edges.
 struct PolygonEdges {

@@ -1,0 +1,131 @@
+#include "algorithms/extraction/manifold_dual_contouring/region_mesh.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+FloatHermite sample(const AnalyticSurface& surface) {
+  RunContext context;
+  return sample_function(surface, IndexToWorld(), {-24, -24, -24}, {24, 24, 24}, 1e-9, context);
+}
+FloatHermite sphere(double radius) {
+  return sample({.value = [=](const Vector3d& p) { return p.norm() - radius; }, .gradient = [](const Vector3d& p) { return p; }});
+}
+
+PolygonMesh contour(const FloatHermite& hermite, double tolerance) {
+  RunContext context;
+  return manifold_dual_contouring(
+      view_of(hermite, context),
+      {.tolerance = tolerance, .merging = ManifoldDualContouringOptions::Merging::regions, .uniform = {}}, nullptr, context);
+}
+
+TEST(RegionMesh, FewPointsThatAreNearASphere) {
+  constexpr double kRadius = 20.0, kTolerance = 0.5;
+  const FloatHermite hermite = sphere(kRadius);
+  const PolygonMesh fine = contour(hermite, 0.0), coarse = contour(hermite, kTolerance);
+  EXPECT_LT(coarse.points.size(), fine.points.size() / 6);
+  // The uniform mesh is within 0.05 voxel of the sphere: a chord of at most 3 voxels is 0.056 deep.
+  for (const Triangle& t : triangulated(coarse))
+    for (const Vector3d& weights : {Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0), Vector3d(Vector3d(1, 1, 1) / 3.0)})
+      EXPECT_NEAR((weights[0] * coarse.world(t[0]) + weights[1] * coarse.world(t[1]) + weights[2] * coarse.world(t[2])).norm(),
+                  kRadius, kTolerance + 0.06);
+}
+
+/// V − E + F of triangles that are closed.
+std::int64_t euler_characteristic(const PolygonMesh& mesh) {
+  return std::int64_t(mesh.points.size()) - std::int64_t(mesh.triangle_count()) / 2;
+}
+
+TEST(RegionMesh, HasTheUniformMeshesTopology) {
+  // A torus whose tube is two voxels thick, so that the walls of one cube are near one another.
+  const auto value = [](const Vector3d& p) { return std::hypot(std::hypot(p[0], p[1]) - 14.0, p[2]) - 2.0; };
+  const FloatHermite hermite = sample({.value = value, .gradient = [](const Vector3d& p) {
+                                         const double ring = std::hypot(p[0], p[1]);
+                                         return Vector3d(p[0] * (1 - 14.0 / ring), p[1] * (1 - 14.0 / ring), p[2]);
+                                       }});
+  const PolygonMesh fine = contour(hermite, 0.0);
+  EXPECT_EQ(euler_characteristic(fine), 0);
+  for (const double tolerance : {0.3, 1.0}) {
+    const PolygonMesh coarse = contour(hermite, tolerance);
+    EXPECT_LT(coarse.points.size(), fine.points.size());
+    EXPECT_EQ(euler_characteristic(coarse), 0) << tolerance;
+  }
+}
+
+TEST(RegionMesh, ToleranceOfZeroIsTheUniformMeshWithPointsInTheirCells) {
+  const FloatHermite hermite = sphere(9.3);
+  RunContext context;
+  ManifoldDualContouringOptions options{.tolerance = 0, .uniform = {}};
+  options.uniform.reach = 0;
+  EXPECT_TRUE(contour(hermite, 0) == manifold_dual_contouring(view_of(hermite, context), options, nullptr, context));
+}
+
+/// A sphere with waves of some fifteen voxels, on which cubes of all sizes stay.
+FloatHermite waves() {
+  return sample({.value = [](const Vector3d& p) { return p.norm() - 18 - std::sin(p[0] / 2.5) * std::cos(p[1] / 3.0); },
+                 .gradient = [](const Vector3d& p) {
+                   const Vector3d slope(std::cos(p[0] / 2.5) * std::cos(p[1] / 3.0) / 2.5,
+                                        -std::sin(p[0] / 2.5) * std::sin(p[1] / 3.0) / 3.0, 0);
+                   return Vector3d(p.normalized() - slope);
+                 }});
+}
+
+TEST(RegionMesh, SameBytesAtAnyThreadCount) {
+  const FloatHermite hermite = waves();
+  std::vector<PolygonMesh> meshes;
+  for (const std::size_t threads : {1, 2, 7}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    meshes.push_back(contour(hermite, 0.3));
+  }
+  EXPECT_LT(meshes[0].points.size(), contour(hermite, 0).points.size() / 2);
+  EXPECT_TRUE(meshes[0] == meshes[1]);
+  EXPECT_TRUE(meshes[0] == meshes[2]);
+}
+
+/// Proposals that are good for one tolerance are all taken back where another one is asked for, which none can keep: the
+/// proof does not rest on what was proposed.
+TEST(RegionProof, SplitsWhatIsNotNear) {
+  const FloatHermite hermite = sphere(12.0);
+  RunContext context;
+  const auto view = view_of(hermite, context);
+  const FilePoints file(view.placement());
+  with_uniform_cells(view, {.reach = 0}, file, context,
+                     [&](const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh) {
+                       const std::vector<float> wide(mesh.points.size(), 1.0f), narrow(mesh.points.size(), 1e-4f);
+                       Regions regions(cells, mesh.points, wide, file, context);
+                       EXPECT_GT(regions.cube_count(), 100u);
+                       prove_regions(regions, polygons, mesh.points, narrow, context);
+                       std::size_t cubes = 0;
+                       for (std::size_t b = 0; b < cells.size(); ++b)
+                         regions.for_each(static_cast<std::int32_t>(b), [&](const Region&) { ++cubes; }, [](int) {});
+                       EXPECT_EQ(cubes, 0u);
+                     });
+}
+
+/// A plane's cubes all stay, and each region has but its share of the polygons.
+TEST(RegionProof, KeepsWhatIsFlat) {
+  const FloatHermite hermite =
+      sample({.value = [](const Vector3d& p) { return std::max(p.cwiseAbs().maxCoeff() - 20.4, -1e3); },
+              .gradient = [](const Vector3d& p) {
+                int axis;
+                p.cwiseAbs().maxCoeff(&axis);
+                return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
+              }});
+  // Six faces of 41² cells: at most the cells near the twelve edges stay alone.
+  EXPECT_LT(contour(hermite, 0.1).points.size(), contour(hermite, 0.0).points.size() / 5);
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,60 @@
+// Whether a merged polygon is near the uniform mesh, and that near it.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
+#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+
+namespace hermesh {
+
+/// Of merged polygons T beside the uniform mesh S: a shell about T (Jiang et al. 2020).
+///
+/// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between the corners of a
+/// triangle directions are interpolated; over each triangle stands a prism, as far up and down its pillars as the tolerance, and
+/// prisms of neighbours share a wall. It is shown that
+///   - pillars rise over their triangles, by 30 degrees at least;
+///   - all triangles of S that reach into a prism face up along its pillars, and stay between its lid and its bottom;
+///   - S is there: at a corner that is a point of S as well, or somewhere in the middle.
+/// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at all, because the
+/// lines that do are an open and a closed set: S has no border, and leaves by the walls alone. So each point of T has one of S
+/// no farther away than the tolerance. And as S comes to T's neighbours' prisms through the walls, all of it is in prisms: each
+/// point of S has one of T no farther away. Where no cell is merged T is S, and the point that a line meets is its own.
+class RegionShell {
+ public:
+  /// Farther than this nothing is shown, whatever the tolerance, in voxels.
+  static constexpr double kFarthest = 2.0;
+
+  /// @param tolerance by the cells' points, voxels
+  RegionShell(const Regions& regions, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
+              std::span<const float> tolerance, RunContext& context);
+
+  /// Safe to call for several polygons at once.
+  bool holds(const RegionPolygon& polygon) const;
+
+ private:
+  struct Scratch;
+
+  void gather(const RegionPolygon& polygon, Scratch& scratch) const;
+  bool holds(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
+
+  const Regions& regions_;
+  const CellBlocks& cells_;
+  const EdgePolygons& polygons_;
+  const std::vector<Eigen::Vector3d>& points_;
+  const std::span<const float> tolerance_;
+  std::vector<std::uint32_t> first_;  ///< by block: the quad of its first crossing edge
+  double rounding_ = 0;               ///< what single precision makes of a distance, at most
+  LargeArray<std::array<float, 4>> quick_points_;
+  LargeArray<Quad> quads_;            ///< by crossing edge, as EdgePolygons cuts it; of a fanned one the cells' points
+};
+
+}  // namespace hermesh
