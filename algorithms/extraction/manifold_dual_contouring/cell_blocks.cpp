@@ -28,6 +28,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       told_(grid.joint_sheets()),
       blocks_(grid.blocks().size()) {
   Stage stage(context, "find cells");
+  for (std::size_t signs = 0; signs < 256; ++signs)
+    plain_[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
   parallel_blocks(n, context, [&](std::size_t b) {

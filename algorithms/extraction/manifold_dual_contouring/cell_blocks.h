@@ -9,9 +9,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -128,36 +126,6 @@ class CellBlocks {
           if (at.block >= 0 && test(blocks_[at.block].active, at.cell)) f(at);
         }
   }
-  /// Calls f(block, cell, steps, number of its first point) for the active cells of a cube within a block and of those at
-  /// most so many steps from it.
-  template <class F>
-  void for_each_about_cube(std::int32_t block, int first_cell, int side, int most_steps, F&& f) const {
-    const int lower[3] = {first_cell >> 6, (first_cell >> 3) & 7, first_cell & 7};
-    const auto begin = [&](int a, int shift) { return std::max(0, lower[a] - most_steps - 8 * shift); };
-    const auto end = [&](int a, int shift) { return std::min(8, lower[a] + side + most_steps - 8 * shift); };
-    const auto off = [&](int a, int at) { return std::max({0, lower[a] - at, at - lower[a] - side + 1}); };
-    for (int slot = 0; slot < 27; ++slot) {
-      const int shift[3] = {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1};
-      if (begin(0, shift[0]) >= end(0, shift[0]) || begin(1, shift[1]) >= end(1, shift[1]) ||
-          begin(2, shift[2]) >= end(2, shift[2]))
-        continue;
-      const std::int32_t there = source_[block].neighbours[slot];
-      if (there < 0) continue;
-      const std::uint64_t row = ((1u << end(2, shift[2])) - 1) & ~((1u << begin(2, shift[2])) - 1);
-      std::uint64_t rows = 0;
-      for (int y = begin(1, shift[1]); y < end(1, shift[1]); ++y) rows |= row << (8 * y);
-      const Block& own = blocks_[there];
-      for (int x = begin(0, shift[0]); x < end(0, shift[0]); ++x) {
-        std::uint32_t number = own.first_point + own.rank[x];
-        for (std::uint64_t word = own.active[x]; word != 0; word &= word - 1, ++number) {
-          const int bit = std::countr_zero(word);
-          if (!((rows >> bit) & 1)) continue;
-          const int steps = std::max({off(0, x + 8 * shift[0]), off(1, (bit >> 3) + 8 * shift[1]), off(2, (bit & 7) + 8 * shift[2])});
-          f(there, 64 * x + bit, steps, number);
-        }
-      }
-    }
-  }
   Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
   bool is_crossed(const Edge& edge) const {
     return edge.block >= 0 && test(source_[edge.block].crossing[edge.axis], edge.sample);
@@ -167,6 +135,24 @@ class CellBlocks {
   }
   Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
   Around around(const Edge& edge) const;
+
+  /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint, has several sheets or
+  /// an ambiguous face.
+  bool plain_points(const Edge& edge, std::array<std::uint32_t, 4>& points) const {
+    for (std::size_t i = 0; i < 4; ++i) {
+      int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
+      at[(edge.axis + 1) % 3] += kAround[i][0];
+      at[(edge.axis + 2) % 3] += kAround[i][1];
+      const Cell cell = locate(edge.block, at[0], at[1], at[2]);
+      const Block& block = blocks_[cell.block];
+      const std::size_t number = code_at(cell.block, cell.cell);
+      if (!plain_[codes_[number]] || test(block.joints, cell.cell)) return false;
+      points[i] = block.first_point + static_cast<std::uint32_t>(number - block.first_code);
+    }
+    return true;
+  }
+  /// Whether the cell with these corners, if it is no joint, has one sheet and no ambiguous face.
+  bool is_plain(int corner_signs) const { return plain_[static_cast<std::size_t>(corner_signs)]; }
 
   /// Whether the surface is held to the segments of the face between cells i and i+1 around an edge.
   bool is_explicit(const Around& around, int i) const {
@@ -225,6 +211,7 @@ class CellBlocks {
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;
   std::vector<Block> blocks_;
+  std::array<bool, 256> plain_;      ///< by signs of the corners
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;
 };

@@ -88,10 +88,14 @@ int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Aroun
 
 void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points) {
   BlockEdges& edges = edges_[edge.block];
-  const CellBlocks::Around around = cells_.around(edge);
+  std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
-  for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
-  const int diagonal = any_explicit ? -1 : safe_diagonal(edge, around, points);
+  if (!cells_.plain_points(edge, corners)) {
+    const CellBlocks::Around around = cells_.around(edge);
+    for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
+    corners = around.points;
+  }
+  const int diagonal = any_explicit ? -1 : safe_diagonal(edge, corners, points);
   if (diagonal < 0)
     set(edges.fanned[edge.axis], edge.sample);
   else if (diagonal == 1)
@@ -99,12 +103,12 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector
 }
 
 /// 0 or 1 for the diagonal to cut along; −1 if neither keeps the triangles in the envelope.
-int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, const CellBlocks::Around& around,
+int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, const std::array<std::uint32_t, 4>& corners,
                                 const std::vector<Vector3d>& points) const {
   const Vector3d start = cells_.corner(edge.block, edge.sample);
   std::array<EnvelopeCorner, 4> r;
-  for (int i = 0; i < 4; ++i) {
-    const Vector3d p = points[around.points[i]] - start;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vector3d p = points[corners[i]] - start;
     r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
   }
   const EnvelopeCut cut = cut_quad(r, cells_.grid().crossing(edge.block, edge.sample, edge.axis).offset);

@@ -46,15 +46,17 @@ class EdgePolygons {
   /// Of a segment that two fanned edges share, one of them has the two triangles.
   template <class OnQuad, class OnTriangle>
   void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle) const {
-    const CellBlocks::Around around = cells_.around(edge);
     const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
     if (!is_fanned(edge)) {
-      const int d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
-      Quad q = {around.points[d], around.points[d + 1], around.points[d + 2], around.points[(d + 3) % 4]};
+      std::array<std::uint32_t, 4> p;
+      if (!cells_.plain_points(edge, p)) p = cells_.around(edge).points;
+      const std::size_t d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
+      Quad q = {p[d], p[d + 1], p[d + 2], p[(d + 3) % 4]};
       if (!outwards) std::swap(q[1], q[3]);
       quad(q);
       return;
     }
+    const CellBlocks::Around around = cells_.around(edge);
     const std::uint32_t x = crossing_point(edge);
     const auto add = [&](std::uint32_t b, std::uint32_t c) {
       triangle(outwards ? Triangle{x, b, c} : Triangle{x, c, b});
@@ -86,7 +88,7 @@ class EdgePolygons {
   void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
   void decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points);
-  int safe_diagonal(const CellBlocks::Edge& edge, const CellBlocks::Around& around,
+  int safe_diagonal(const CellBlocks::Edge& edge, const std::array<std::uint32_t, 4>& corners,
                     const std::vector<Eigen::Vector3d>& points) const;
 
   const CellBlocks& cells_;

@@ -198,7 +198,7 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
                  {.name = "merging",
                   .fallback = "collapses",
                   .help = "collapses: fewest polygons; regions: cubes of cells become one point each, many times as fast, "
-                          "with points held in their cells (reach=0) and distances below one voxel",
+                          "with points held in their cells (reach=0) and distances of two voxels at most",
                   .choices = {"collapses", "regions"}});
   return options;
 }

@@ -14,20 +14,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-bool is_same(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
-  return a.block == b.block && a.sample == b.sample && a.axis == b.axis;
+/// Whether a side of one polygon lies between the two regions that a side of another one does.
+bool has_same_regions(const RegionPolygon& a, int i, const RegionPolygon& b, int j) {
+  const Region &a0 = a.regions[i], &a1 = a.regions[a.next(i)], &b0 = b.regions[j], &b1 = b.regions[b.next(j)];
+  return (a0 == b0 && a1 == b1) || (a0 == b1 && a1 == b0);
 }
 
 /// Counts per block, then fills.
 class Filling {
  public:
-  Filling(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points, const FilePoints& file,
-          RunContext& context)
+  Filling(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points, RunContext& context)
       : regions_(regions),
         cells_(regions.cells()),
         polygons_(polygons),
         points_(points),
-        file_(file),
         context_(context),
         number_(polygons.point_count()),
         cube_number_(regions.cube_count()),
@@ -61,9 +61,9 @@ class Filling {
           },
           [&](const RegionPolygon& polygon) {
             fans_[b].push_back({key(polygon.crossing), at});
-            mesh.points[at++] = file_.rounded(polygon.middle());
+            mesh.points[at++] = polygon.middle;
             for (int i = 0; i < polygon.corners; ++i)
-              if (owns(polygon, i)) mesh.points[at++] = file_.rounded(polygon.sides[i].place);
+              if (owns(polygon, i)) mesh.points[at++] = polygon.sides[i].place;
           });
     });
     parallel_blocks(n, context_, [&](std::size_t b) {
@@ -154,7 +154,7 @@ class Filling {
         } else {
           const RegionPolygon other = *polygon_of(regions_, polygon.sides[i].partner);
           for (int side = 0; side < other.corners; ++side)
-            if (owns(other, side) && is_same(other.sides[side].partner, polygon.crossing)) number = number_of_side(other, side);
+            if (owns(other, side) && has_same_regions(polygon, i, other, side)) number = number_of_side(other, side);
         }
       }
     }
@@ -172,7 +172,6 @@ class Filling {
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
   const std::vector<Vector3d>& points_;
-  const FilePoints& file_;
   RunContext& context_;
   std::vector<std::uint32_t> number_;       ///< by the uniform mesh's point
   std::vector<std::uint32_t> cube_number_;  ///< by cube
@@ -187,7 +186,7 @@ RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, 
   const std::size_t splits = prove_regions(regions, polygons, points, tolerance, context);
   context.figure("split_regions", double(splits));
   Stage stage(context, "connect regions");
-  return Filling(regions, polygons, points, file, context).run();
+  return Filling(regions, polygons, points, context).run();
 }
 
 }  // namespace hermesh

@@ -19,7 +19,7 @@ struct RegionMesh {
 };
 
 /// Closed, oriented, manifold and free of self-intersection if the uniform mesh is, and within the tolerance of that both
-/// ways, but never farther than a voxel (region_proof.h). The same bytes for every number of threads.
+/// ways, but never farther than RegionShell::kFarthest (region_proof.h). The same bytes for every number of threads.
 /// @param points of the uniform mesh: those of cells lie within their cells, and those of fanned edges are behind them
 /// @param tolerance by the cells' points, voxels
 /// @throws Error for more points or polygons than 32 bits can number; Cancelled

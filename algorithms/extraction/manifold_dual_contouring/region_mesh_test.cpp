@@ -4,8 +4,8 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
@@ -62,6 +62,25 @@ TEST(RegionMesh, HasTheUniformMeshesTopology) {
     EXPECT_LT(coarse.points.size(), fine.points.size());
     EXPECT_EQ(euler_characteristic(coarse), 0) << tolerance;
   }
+}
+
+/// One sample that is barely inside: two cubes may have four cells of it each, all in the face between them, and no third region
+/// around any edge.
+TEST(RegionMesh, NoSpeckVanishes) {
+  initialize_openvdb();
+  for (int place = 0; place < 8; ++place)
+    for (const float depth : {0.001f, 0.3f}) {
+      auto grid = openvdb::FloatGrid::create(1.0f);
+      auto access = grid->getAccessor();
+      for (int x = 0; x < 5; ++x)
+        for (int y = 0; y < 5; ++y)
+          for (int z = 0; z < 5; ++z) access.setValue({x, y, z}, 1.0f);
+      access.setValue({2 + (place & 1), 2 + (place >> 1 & 1), 2 + (place >> 2)}, -depth);
+      RunContext context;
+      const PolygonMesh mesh = contour(sample_level_set(make_level_set(grid), 0.0, context), 1.0);
+      EXPECT_FALSE(mesh.empty());
+      EXPECT_EQ(euler_characteristic(mesh), 2) << place << ' ' << depth;
+    }
 }
 
 TEST(RegionMesh, ToleranceOfZeroIsTheUniformMeshWithPointsInTheirCells) {

@@ -67,6 +67,7 @@ void hold_if_needed(const Regions& regions, RegionPolygon& polygon, int i) {
   for (const int axis : {p, q})
     side.place[axis] = std::clamp(side.place[axis], lower[axis] + kFarFromBorder * length,
                                   lower[axis] + (1.0 - kFarFromBorder) * length);
+  side.place = regions.file().rounded(side.place);
 }
 
 }  // namespace
@@ -142,12 +143,17 @@ std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks
   polygon.cut = polygon.corners == 4 ? cut_quad(r, hit / polygon.length)
                                      : cut_triangle({r[0], r[1], r[2]}, hit / polygon.length);
   for (int i = 0; i < polygon.corners; ++i) {
-    const Vector3d &a = polygon.points[i], &b = polygon.points[polygon.next(i)];
     RegionPolygon::Side& side = polygon.sides[i];
-    side.place = a + (polygon.start[side.across] - a[side.across]) / (b[side.across] - a[side.across]) * (b - a);
+    // From below the plane to above, so that the polygon on the other side of the face finds the same bits.
+    const Vector3d *a = &polygon.points[i], *b = &polygon.points[polygon.next(i)];
+    if ((*a)[side.across] > (*b)[side.across]) std::swap(a, b);
+    side.place = *a + (polygon.start[side.across] - (*a)[side.across]) / ((*b)[side.across] - (*a)[side.across]) * (*b - *a);
     hold_if_needed(regions, polygon, i);
   }
   if (polygon.cut.fanned) polygon.cut.height = hit / polygon.length;
+  polygon.middle = polygon.start;
+  polygon.middle[edge.axis] += polygon.cut.height * polygon.length;
+  if (polygon.cut.fanned) polygon.middle = regions.file().rounded(polygon.middle);
   return polygon;
 }
 

@@ -20,7 +20,7 @@ struct RegionPolygon {
   struct Side {
     int across;                           ///< axis
     bool held = false;                    ///< to a point of the face
-    Eigen::Vector3d place;                ///< where it passes from one to the other
+    Eigen::Vector3d place;                ///< where it passes from one to the other; rounded if held
     CellBlocks::Edge partner = {-1, 0, 0};  ///< if held: the crossing edge of the other polygon on this side
   };
   CellBlocks::Edge crossing;  ///< the lattice edge that is crossed
@@ -32,6 +32,7 @@ struct RegionPolygon {
   double length = 0;      ///< of it
   bool outwards = false;  ///< the outside is where the axis points to
   EnvelopeCut cut;
+  Eigen::Vector3d middle;  ///< where the surface passes through the edge; rounded for the file where it is a point of a fan
 
   bool any_merged() const {
     for (int i = 0; i < corners; ++i)
@@ -41,17 +42,10 @@ struct RegionPolygon {
   int next(int i) const { return i + 1 < corners ? i + 1 : 0; }
   int previous(int i) const { return i > 0 ? i - 1 : corners - 1; }
   int axis() const { return crossing.axis; }
-  /// Where the surface passes through the edge.
-  Eigen::Vector3d middle() const {
-    Eigen::Vector3d place = start;
-    place[axis()] += cut.height * length;
-    return place;
-  }
-
   static constexpr int kMiddle = 4, kFirstSide = 5;
   /// By a number that for_each_triangle() gives.
   Eigen::Vector3d place(int corner) const {
-    return corner < kMiddle ? points[corner] : corner == kMiddle ? middle() : sides[corner - kFirstSide].place;
+    return corner < kMiddle ? points[corner] : corner == kMiddle ? middle : sides[corner - kFirstSide].place;
   }
 
   /// Calls f(corner, corner, corner), counter-clockwise seen from outside; kMiddle is the crossing of a fanned polygon,

@@ -74,8 +74,19 @@ class RegionProof {
     return false;
   }
 
+  /// Else several polygons would share one envelope.
+  bool is_crossed_once(const RegionPolygon& polygon) const {
+    const int axis = polygon.axis(), length = static_cast<int>(polygon.length), sample = polygon.crossing.sample;
+    int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7}, crossings = 0;
+    at[axis] &= ~(length - 1);
+    for (int k = 0; k < length; ++k, ++at[axis])
+      crossings += cells_.is_crossed({polygon.crossing.block, sample_index(at[0], at[1], at[2]), axis});
+    return crossings == 1;
+  }
+
   /// Whether each two of its regions have one polygon more in common, and no other. A face of a single cell is not ambiguous.
   bool is_manifold(const RegionPolygon& polygon) const {
+    if (!is_crossed_once(polygon)) return false;
     for (int i = 0; i < polygon.corners; ++i)
       if (polygon.regions[i].merged() && polygon.regions[polygon.next(i)].merged() &&
           face_border(regions_, polygon, i).count != 2)

@@ -15,7 +15,7 @@ namespace hermesh {
 ///
 /// **Topology.** The cells of a cube are a disc of S (regions.h), which T shrinks to a point. That keeps the surface as it is if
 /// any two regions beside one another have one piece of border in common: if the border of the common part of their faces is
-/// crossed twice. Then each edge of T has two polygons, and as the border of a disc is one circle, so are the polygons around its
+/// crossed twice (and never not at all, see regions.h). Then each edge of T has two polygons, and as the border of a disc is one circle, so are the polygons around its
 /// point.
 ///
 /// **No two polygons of T meet.** A region's point lies within its cube, so it sees each point of the cube's faces once. The common

@@ -22,8 +22,6 @@ constexpr double kLeastCosine = 0.3;
 constexpr double kLow = 0.25;
 /// Of coordinates, in voxels, far above what doubles make of it.
 constexpr double kRounding = 1e-6;
-/// No two corners of a quad are farther apart, in voxels.
-constexpr float kLongest = 3.0f;
 
 using Plane = Eigen::Hyperplane<double, 3>;
 
@@ -39,21 +37,19 @@ struct Prism {
 
   Prism(const Corners& corners, const std::array<Vector3d, 3>& directions, double pillar_height)
       : over(corners), pillars(directions), height(pillar_height) {
-    if (!stands()) return;
+    if (over.degenerate()) return;
+    for (const Vector3d& pillar : pillars)
+      if (!(pillar.dot(over.normal()) >= kLeastCosine)) return;
     for (std::size_t side = 0; side < 3; ++side)
       for (std::size_t end = 0; end < 2; ++end) leans[side][end] = lean(pillars[(side + end) % 3], side);
     lid = through(corners, height);
     bottom = through(corners, -height);
     bottom.coeffs() = -bottom.coeffs();
     for (const Vector3d& pillar : pillars) least_lid = std::min(least_lid, pillar.dot(over.normal()));
+    stands_ = is_unfolded(corners) && keeps_its_corners(corners);
   }
-  /// Whether all pillars rise over the triangle. Nothing else may be asked if not.
-  bool stands() const {
-    if (over.degenerate()) return false;
-    for (const Vector3d& pillar : pillars)
-      if (!(pillar.dot(over.normal()) >= kLeastCosine)) return false;
-    return true;
-  }
+  /// Whether all pillars rise over the triangle, and do not meet or cross. Nothing else may be asked if not.
+  bool stands() const { return stands_; }
   /// How far beyond a side's wall, wherever between its two pillars that is.
   double beyond_wall(const OverTriangle::Place& place, std::size_t side) const {
     return place[static_cast<int>(side)] - std::max(leans[side][0] * place[3], leans[side][1] * place[3]);
@@ -63,10 +59,30 @@ struct Prism {
   double lean(const Vector3d& pillar, std::size_t side) const {
     return over.frame().axes.row(static_cast<int>(side)).dot(pillar) / pillar.dot(over.normal());
   }
+  /// The map from a point of the triangle and a height to a place turns nothing over: the triangle that the pillars make at
+  /// any height faces up along each of them. A quadratic function of the height, bounded by its coefficients.
+  bool is_unfolded(const Corners& corners) const {
+    const Vector3d e = corners[1] - corners[0], f = corners[2] - corners[0];
+    const Vector3d de = pillars[1] - pillars[0], df = pillars[2] - pillars[0];
+    const Vector3d constant = e.cross(f), linear = e.cross(df) + de.cross(f), square = de.cross(df);
+    return std::ranges::all_of(pillars, [&](const Vector3d& pillar) {
+      return constant.dot(pillar) - height * std::abs(linear.dot(pillar)) - height * height * std::abs(square.dot(pillar)) >
+             kRounding * (e.squaredNorm() + f.squaredNorm());
+    });
+  }
+  /// No pillar leans over the wall opposite.
+  bool keeps_its_corners(const Corners& corners) const {
+    for (std::size_t i = 0; i < 3; ++i)
+      for (const double up : {height, -height})
+        if (!(beyond_wall(over(corners[i] + up * pillars[i]), (i + 1) % 3) < -kRounding)) return false;
+    return true;
+  }
   Plane through(const Corners& corners, double up) const {
     // Eigen's planes face those that see the points clockwise.
     return Plane::Through(corners[0] + up * pillars[0], corners[2] + up * pillars[2], corners[1] + up * pillars[1]);
   }
+
+  bool stands_ = false;
 };
 
 struct FineTriangle {
@@ -183,11 +199,12 @@ class QuickPrism {
   bool is_between_lids(const Place& highest) const {
     return highest.first[3] < -rounding_ && highest.second[3] < -rounding_;
   }
+  static float size(float x, float y, float z) { return std::abs(x) + std::abs(y) + std::abs(z); }
   bool faces(Floats a, Floats b, Floats c) const {
     const Floats u = b - a, v = c - a;
     const float n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
     constexpr float kCertain = 0.01f;  // of the sizes' sum
-    const float least = kCertain * (std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]));
+    const float least = kCertain * size(n[0], n[1], n[2]) + rounding_ * (size(u[0], u[1], u[2]) + size(v[0], v[1], v[2]));
     bool all = true;
     for (const Floats& pillar : pillars_) all = all && n[0] * pillar[0] + n[1] * pillar[1] + n[2] * pillar[2] > least;
     return all;
@@ -215,8 +232,19 @@ struct RegionShell::Scratch {
   std::vector<std::uint32_t> quads;
   std::vector<Triangle> fans;
   std::array<Vector3d, RegionPolygon::kFirstSide + 4> pillars;
+  std::array<std::pair<Vector3d, Vector3d>, 4> cubes;  ///< of the polygon's regions
   double height;
   bool is_there;  ///< S has been found in a prism
+
+  /// Whether a cell with one of these points belongs to one of the regions: points lie in their cells.
+  bool is_own(const Corners& points, int regions) const {
+    for (int i = 0; i < regions; ++i)
+      for (const Vector3d& p : points)
+        if ((p.array() > cubes[static_cast<std::size_t>(i)].first.array()).all() &&
+            (p.array() < cubes[static_cast<std::size_t>(i)].second.array()).all())
+          return true;
+    return false;
+  }
 };
 
 RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
@@ -231,6 +259,7 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
   for (std::size_t b = 0; b < first.size(); ++b)
     for (const BlockMask& crossing : cells_.source(static_cast<std::int32_t>(b)).crossing) first[b] += static_cast<std::uint64_t>(count(crossing));
   quads_.resize(exclusive_scan(first, "edge crossings"));
+  reach_.resize(quads_.size());
   quick_points_.resize(points.size());
   double farthest = 0;
   for (const HermiteView::Block& block : cells_.grid().blocks())
@@ -243,17 +272,20 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
   });
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     first_[b] = static_cast<std::uint32_t>(first[b]);
-    Quad* quad = quads_.data() + first[b];
+    auto number = static_cast<std::size_t>(first[b]);
     cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
-      if (polygons_.is_fanned(edge)) *quad = {};
-      else polygons_.polygons_of(edge, [&](const Quad& q) { *quad = q; }, [](const Triangle&) {});
-      ++quad;
+      Quad quad{};
+      if (!polygons_.is_fanned(edge)) polygons_.polygons_of(edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {});
+      double reach = 0;
+      for (const std::uint32_t p : quad) reach = std::max(reach, (points[p] - points[quad[0]]).squaredNorm());
+      quads_[number] = quad;
+      reach_[number++] = static_cast<float>(std::sqrt(reach) * (1 + kRounding));
     });
   });
 }
 
 /// Polygons of S that may come near.
-void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
+void RegionShell::gather(const RegionPolygon& polygon, double height, Scratch& scratch) const {
   scratch.quads.clear();
   scratch.fans.clear();
   Vector3d lower = polygon.points[0], upper = lower;
@@ -266,8 +298,8 @@ void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
   });
   int from[3], to[3];  // samples whose edges touch a cell that the prisms may reach into
   for (int a = 0; a < 3; ++a) {
-    from[a] = static_cast<int>(std::floor(lower[a] - scratch.height));
-    to[a] = static_cast<int>(std::floor(upper[a] + scratch.height)) + 1;
+    from[a] = static_cast<int>(std::floor(lower[a] - height));
+    to[a] = static_cast<int>(std::floor(upper[a] + height)) + 1;
   }
   std::array<std::int32_t, 4 * 27> seen;
   int seen_count = 0;
@@ -311,13 +343,13 @@ void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
 
 bool RegionShell::holds(const RegionPolygon& polygon) const {
   thread_local Scratch scratch;
-  scratch.height = kFarthest;
-  scratch.is_there = false;
+  double most = kFarthest;
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
-    scratch.height = std::min(scratch.height, double(regions_.tolerance(region)));
+    most = std::min(most, double(regions_.tolerance(region)));
     scratch.pillars[static_cast<std::size_t>(i)] = regions_.normal(region);
-    scratch.is_there = scratch.is_there || !region.merged();
+    const Vector3d lower = cells_.corner(region.block, region.cell);
+    scratch.cubes[static_cast<std::size_t>(i)] = {lower, lower + Vector3d::Constant(region.side())};
   }
   if (polygon.cut.fanned) {
     const CellBlocks::Edge& edge = polygon.crossing;
@@ -327,20 +359,26 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
       scratch.pillars[static_cast<std::size_t>(RegionPolygon::kFirstSide + i)] =
           (scratch.pillars[static_cast<std::size_t>(i)] + scratch.pillars[static_cast<std::size_t>(polygon.next(i))]).normalized();
   }
-  // Where prisms are low there is less to look at. Neighbours may have prisms of different heights: on the wall between
-  // them each line meets S once in either.
-  const double most = scratch.height;
-  const bool is_there = scratch.is_there;
-  for (const double height : {std::min(kLow, most), most}) {
-    scratch.height = height;
-    scratch.is_there = is_there;
-    gather(polygon, scratch);
-    bool all = true;
-    polygon.for_each_triangle([&](int a, int b, int c) { all = all && holds(polygon, {a, b, c}, scratch); });
-    if (all && scratch.is_there) return true;
-    if (height == most) break;
+  // Where prisms are low there is less to look at, and small triangles have no high ones. Neighbours may have prisms of
+  // different heights: on the wall between them each line meets S once in either.
+  scratch.is_there = false;
+  unsigned open = ~0u;
+  for (const double highest : {std::min(kLow, most), most}) {
+    gather(polygon, highest, scratch);
+    unsigned number = 0, still_open = 0;
+    polygon.for_each_triangle([&](int a, int b, int c) {
+      const unsigned bit = 1u << number++;
+      if (!(open & bit)) return;
+      for (const double share : {1.0, 0.25}) {
+        scratch.height = share * highest;
+        if (holds(polygon, {a, b, c}, scratch)) return;
+      }
+      still_open |= bit;
+    });
+    open = still_open;
+    if (open == 0 || highest == most) break;
   }
-  return false;
+  return open == 0 && scratch.is_there;
 }
 
 bool RegionShell::holds(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const {
@@ -353,7 +391,8 @@ bool RegionShell::holds(const RegionPolygon& polygon, const std::array<int, 3>& 
   const auto look_at = [&](const Triangle& t) {
     const FineTriangle fine(prism, {points_[t[0]], points_[t[1]], points_[t[2]]}, double(tolerance_of(t)));
     const Meeting meeting = meet(prism, fine);
-    if (meeting == Meeting::good && !scratch.is_there) scratch.is_there = !extent_in(prism, fine, Walls::inner).empty();
+    if (meeting == Meeting::good && !scratch.is_there)
+      scratch.is_there = scratch.is_own(fine.corners, polygon.corners) && !extent_in(prism, fine, Walls::inner).empty();
     return meeting != Meeting::bad;
   };
   const auto height = static_cast<float>(scratch.height);
@@ -363,7 +402,7 @@ bool RegionShell::holds(const RegionPolygon& polygon, const std::array<int, 3>& 
     std::array<QuickPrism::Place, 4> places;
     points[0] = load(quick_points_[q[0]]);
     places[0] = quick.place(points[0]);
-    if (quick.is_beyond(places[0], kLongest)) continue;
+    if (quick.is_beyond(places[0], reach_[number])) continue;
     for (std::size_t i = 1; i < 4; ++i) {
       points[i] = load(quick_points_[q[i]]);
       places[i] = quick.place(points[i]);

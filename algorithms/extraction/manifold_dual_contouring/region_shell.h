@@ -21,9 +21,10 @@ namespace hermesh {
 /// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between the corners of a
 /// triangle directions are interpolated; over each triangle stands a prism, as far up and down its pillars as the tolerance, and
 /// prisms of neighbours share a wall. It is shown that
-///   - pillars rise over their triangles, by 30 degrees at least;
-///   - all triangles of S that reach into a prism face up along its pillars, and stay between its lid and its bottom;
-///   - S is there: at a corner that is a point of S as well, or somewhere in the middle.
+///   - pillars rise over their triangles and neither meet nor cross, so that a place in a prism lies on one line of it;
+///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and stay between its lid and
+///     its bottom;
+///   - S is there, a triangle of one of the cells that the polygon's regions are made of.
 /// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at all, because the
 /// lines that do are an open and a closed set: S has no border, and leaves by the walls alone. So each point of T has one of S
 /// no farther away than the tolerance. And as S comes to T's neighbours' prisms through the walls, all of it is in prisms: each
@@ -43,7 +44,7 @@ class RegionShell {
  private:
   struct Scratch;
 
-  void gather(const RegionPolygon& polygon, Scratch& scratch) const;
+  void gather(const RegionPolygon& polygon, double height, Scratch& scratch) const;
   bool holds(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
 
   const Regions& regions_;
@@ -54,6 +55,7 @@ class RegionShell {
   std::vector<std::uint32_t> first_;  ///< by block: the quad of its first crossing edge
   double rounding_ = 0;               ///< what single precision makes of a distance, at most
   LargeArray<std::array<float, 4>> quick_points_;
+  LargeArray<float> reach_;           ///< by crossing edge: from the first corner of its quad to the others, at most
   LargeArray<Quad> quads_;            ///< by crossing edge, as EdgePolygons cuts it; of a fanned one the cells' points
 };
 

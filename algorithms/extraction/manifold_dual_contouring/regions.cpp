@@ -172,7 +172,8 @@ class Regions::Proposals {
       sum.is_disc = sum.is_disc && sum.euler == 1 && sum.hangs_together();
       Vector3d place;
       const bool agree = sum.normal.norm() >= kLeastAgreement * sum.crossings;
-      if (sum.cells < 2 || !sum.is_disc || !agree || !find_place(sum, cube, level, place)) continue;
+      if (sum.cells < 2 || !sum.is_disc || !agree || !crosses_an_edge(cube, level) || !find_place(sum, cube, level, place))
+        continue;
       result.proposed[level - 1] |= std::uint64_t{1} << cube;
       cubes.push_back({place, sum.normal.normalized().cast<float>(), sum.tolerance});
     }
@@ -181,6 +182,24 @@ class Regions::Proposals {
   static int octant(const int at[3], int level) {
     const int bit = level - 1;
     return ((at[0] >> bit) & 1) << 2 | ((at[1] >> bit) & 1) << 1 | ((at[2] >> bit) & 1);
+  }
+
+  /// Else the border lies within one face, and beyond it is perhaps one other cube: with no third region around any edge there
+  /// would be no polygon at all.
+  bool crosses_an_edge(int cube, int level) const {
+    const int first = first_cell(cube, level), side = 1 << level;
+    const int lower[3] = {first >> 6, (first >> 3) & 7, first & 7};
+    for (int axis = 0; axis < 3; ++axis)
+      for (int corner = 0; corner < 4; ++corner)
+        for (int k = 0; k < side; ++k) {
+          int at[3] = {lower[0], lower[1], lower[2]};
+          at[axis] += k;
+          at[(axis + 1) % 3] += corner & 1 ? side : 0;
+          at[(axis + 2) % 3] += corner & 2 ? side : 0;
+          const CellBlocks::Cell sample = cells_.locate(block_, at[0], at[1], at[2]);
+          if (cells_.is_crossed({sample.block, sample.cell, axis})) return true;
+        }
+    return false;
   }
 
   bool find_place(const Sum& sum, int cube, int level, Vector3d& place) const {
@@ -212,7 +231,7 @@ class Regions::Proposals {
 
 Regions::Regions(const CellBlocks& cells, const std::vector<Vector3d>& points, std::span<const float> tolerance,
                  const FilePoints& file, RunContext& context)
-    : cells_(cells), points_(points), tolerance_(tolerance), blocks_(cells.size()) {
+    : cells_(cells), points_(points), tolerance_(tolerance), file_(file), blocks_(cells.size()) {
   Stage stage(context, "propose regions");
   const std::size_t n = cells.size();
   std::vector<BlockMask> special(n);

@@ -30,7 +30,7 @@ class Regions {
   static constexpr int kLevels = 3;
 
   /// A cube is proposed where the surface within it is one disc (by its Euler characteristic, and because those of its
-  /// octants are discs that hang together), none of its cells is fixed, and one place within it is near the planes of all
+  /// octants are discs that hang together) whose border crosses the cube's edges, none of its cells is fixed, and one place within it is near the planes of all
   /// its crossings for the tolerance.
   /// @param tolerance by the cells' points, voxels; where it is 0 or less a cell stays alone
   Regions(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, std::span<const float> tolerance,
@@ -95,6 +95,7 @@ class Regions {
   }
 
   const CellBlocks& cells() const { return cells_; }
+  const FilePoints& file() const { return file_; }
 
  private:
   struct BlockRegions {
@@ -123,6 +124,7 @@ class Regions {
   const CellBlocks& cells_;
   const std::vector<Eigen::Vector3d>& points_;
   const std::span<const float> tolerance_;
+  const FilePoints& file_;
   std::vector<BlockRegions> blocks_;
   std::vector<Cube> cubes_;
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -26,6 +27,17 @@ constexpr double kGoodEnough = 0.005;
 
 /// Of a determinant whose terms are of the order of one, far above rounding: what is called positive.
 constexpr double kPositive = 1e-5;
+
+/// By the signs of a cell's corners, a bit an edge.
+constexpr std::array<std::uint16_t, 256> kCrossedEdges = [] {
+  std::array<std::uint16_t, 256> result{};
+  for (int signs = 0; signs < 256; ++signs)
+    for (int edge = 0; edge < 12; ++edge) {
+      const int from = corner_number(edge_offset(edge)), to = from | 1 << edge_axis(edge);
+      if (((signs >> from) & 1) != ((signs >> to) & 1)) result[static_cast<std::size_t>(signs)] |= static_cast<std::uint16_t>(1 << edge);
+    }
+  return result;
+}();
 
 double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   return (b - a).cross(c - a).dot(d - a);
@@ -54,7 +66,14 @@ class Contourer {
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
+      std::uint32_t number = cells_[block].first_code;
       for_each_bit(cells_[block].active, [&](int cell) {
+        const int signs = cells_.corner_signs(number);
+        const std::uint32_t point = cells_[block].first_point + (number++ - cells_[block].first_code);
+        if (cells_.is_plain(signs) && !cells_.is_joint(block, cell)) {
+          mesh.points[point] = file_.rounded(place_plain(block, cell, signs));
+          return;
+        }
         const int sheets = cells_.point_count(block, cell);
         several[b] += sheets > 1;
         for (int sheet = 0; sheet < sheets; ++sheet)
@@ -66,6 +85,20 @@ class Contourer {
       mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
       mesh.several_sheets += several[b];
     }
+  }
+
+  /// Of a cell whose corners tell all.
+  Vector3d place_plain(std::int32_t block, int cell, int signs) {
+    const Vector3d corner = cells_.corner(block, cell);
+    Qef qef(corner + Vector3d::Constant(0.5));
+    for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
+      const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, std::countr_zero(edges));
+      const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
+      const auto& n = crossing.normal;
+      qef.add_plane(cells_.crossing_point(at, crossing), Vector3d(n[0], n[1], n[2]));
+    }
+    if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
+    return best_place(block, cell, qef, corner);
   }
 
   /// Within the cell, and noted if it would be better off outside. With several sheets the mean of the loop's crossings:
