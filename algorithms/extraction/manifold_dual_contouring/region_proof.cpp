@@ -62,6 +62,13 @@ class RegionProof {
     });
   }
 
+  /// Bits of a cube in each of its words of a mask.
+  static std::uint64_t rows_of(const Region& cube) {
+    std::uint64_t rows = 0;
+    for (int y = 0; y < cube.side(); ++y) rows |= ((std::uint64_t{1} << cube.side()) - 1) << ((cube.cell & 63) + 8 * y);
+    return rows;
+  }
+
   bool holds(const CellBlocks::Edge& edge) {
     const RegionRing ring = ring_of(regions_, edge);
     if (!ring.has_polygon() || !ring.any_merged) return true;
@@ -111,10 +118,7 @@ class RegionProof {
           [](int) {});
       for (const Region& cube : here) {
         regions_.split(cube);
-        const int x = cube.cell >> 6, side = cube.side();
-        for (int i = 0; i < side; ++i)
-          for (int y = 0; y < side; ++y)
-            fresh[b][static_cast<std::size_t>(x + i)] |= ((std::uint64_t{1} << side) - 1) << ((cube.cell & 63) + 8 * y);
+        for (int x = 0; x < cube.side(); ++x) fresh[b][static_cast<std::size_t>((cube.cell >> 6) + x)] |= rows_of(cube);
       }
       splits[b] = static_cast<std::uint32_t>(here.size());
     });
