@@ -81,7 +81,7 @@ class RegionProof {
     return false;
   }
 
-  /// Else several polygons would share one envelope.
+  /// Whether the edge that its envelope is made of is crossed once: else several polygons would share that.
   bool is_crossed_once(const RegionPolygon& polygon) const {
     const int axis = polygon.axis(), length = static_cast<int>(polygon.length), sample = polygon.crossing.sample;
     int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7}, crossings = 0;
