@@ -110,6 +110,11 @@ class CellBlocks {
     return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
   }
   std::uint32_t point(std::int32_t block, int cell, int sheet) const;
+  /// How many points a block's cells have: those of its active cells' first sheets, ascending, and then those of all others.
+  std::uint32_t points_in(std::int32_t block) const {
+    const auto next = static_cast<std::size_t>(block) + 1;
+    return (next < blocks_.size() ? blocks_[next].first_point : static_cast<std::uint32_t>(points_)) - blocks_[block].first_point;
+  }
   /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;
   Cell locate(std::int32_t block, int x, int y, int z) const {

@@ -31,46 +31,47 @@ class Filling {
         context_(context),
         number_(polygons.point_count()),
         cube_number_(regions.cube_count()),
-        fans_(cells_.size()) {}
+        made_(cells_.size()) {}
 
   RegionMesh run() {
     const std::size_t n = cells_.size();
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
     parallel_blocks(n, context_, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
-      for_each_point(block, [&](const Region&) { ++points[b]; }, [&](std::uint32_t) { ++points[b]; },
-                     [&](const RegionPolygon& polygon) { points[b] += static_cast<std::uint64_t>(1 + owned_sides(polygon)); });
-      for_each_polygon(block, false, [&](const Quad&) { ++quads[b]; }, [&](const Triangle&) { ++triangles[b]; });
+      for_each_cell_point(block, [&](const Region&) { ++points[b]; }, [&](std::uint32_t) { ++points[b]; });
+      for_each_polygon(
+          block, false, [&](const Quad&) { ++quads[b]; }, [&](const Triangle&) { ++triangles[b]; },
+          [&](const CellBlocks::Edge& edge) { made_[b].kept.push_back(polygons_.crossing_point(edge)); },
+          [&](const RegionPolygon& fan) { make_points(fan, made_[b]); });
+      points[b] += made_[b].kept.size() + made_[b].places.size();
     });
     RegionMesh mesh;
     mesh.points.resize(exclusive_scan(points, "points"));
     mesh.quads.resize(exclusive_scan(quads, "quads"));
     mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
     parallel_blocks(n, context_, [&](std::size_t b) {
-      const auto block = static_cast<std::int32_t>(b);
       auto at = static_cast<std::uint32_t>(points[b]);
-      for_each_point(
-          block,
+      const auto keep = [&](std::uint32_t point) {
+        number_[point] = at;
+        mesh.points[at++] = points_[point];
+      };
+      for_each_cell_point(
+          static_cast<std::int32_t>(b),
           [&](const Region& region) {
             cube_number_[regions_.number(region)] = at;
             mesh.points[at++] = regions_.point(region);
           },
-          [&](std::uint32_t point) {
-            number_[point] = at;
-            mesh.points[at++] = points_[point];
-          },
-          [&](const RegionPolygon& polygon) {
-            fans_[b].push_back({key(polygon.crossing), at});
-            mesh.points[at++] = polygon.middle;
-            for (int i = 0; i < polygon.corners; ++i)
-              if (owns(polygon, i)) mesh.points[at++] = polygon.sides[i].place;
-          });
+          keep);
+      for (const std::uint32_t point : made_[b].kept) keep(point);
+      for (Fan& fan : made_[b].fans) fan.first += at;
+      std::ranges::copy(made_[b].places, mesh.points.begin() + at);
     });
     parallel_blocks(n, context_, [&](std::size_t b) {
       Quad* quad = mesh.quads.data() + quads[b];
       Triangle* triangle = mesh.triangles.data() + triangles[b];
       for_each_polygon(
-          static_cast<std::int32_t>(b), true, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; });
+          static_cast<std::int32_t>(b), true, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; },
+          [](const CellBlocks::Edge&) {}, [](const RegionPolygon&) {});
     });
     return mesh;
   }
@@ -79,7 +80,13 @@ class Filling {
   /// A fan that the uniform mesh does not have: its middle's number, and behind it those of the sides' points that it owns.
   struct Fan {
     std::uint16_t key;
-    std::uint32_t first;
+    std::uint32_t first;  ///< among the block's, until these have numbers
+  };
+  /// Points on a block's edges.
+  struct Made {
+    std::vector<std::uint32_t> kept;  ///< those that the uniform mesh has, too
+    std::vector<Fan> fans;            ///< ascending by key
+    std::vector<Vector3d> places;     ///< of the fans' points
   };
   static std::uint16_t key(const CellBlocks::Edge& edge) { return static_cast<std::uint16_t>(edge.axis << 9 | edge.sample); }
 
@@ -87,26 +94,18 @@ class Filling {
   bool owns(const RegionPolygon& polygon, int side) const {
     return polygon.sides[side].held && cells_.comes_first(polygon.crossing, polygon.sides[side].partner);
   }
-  int owned_sides(const RegionPolygon& polygon) const {
-    int sum = 0;
-    for (int i = 0; i < polygon.corners; ++i) sum += owns(polygon, i);
-    return sum;
+  void make_points(const RegionPolygon& fan, Made& made) const {
+    made.fans.push_back({key(fan.crossing), static_cast<std::uint32_t>(made.places.size())});
+    made.places.push_back(fan.middle);
+    for (int i = 0; i < fan.corners; ++i)
+      if (owns(fan, i)) made.places.push_back(fan.sides[i].place);
   }
 
-  /// Calls cube(Region), kept(point of the uniform mesh) and fan(RegionPolygon).
-  template <class Cube, class Kept, class OnFan>
-  void for_each_point(std::int32_t block, Cube&& cube, Kept&& kept, OnFan&& fan) const {
+  /// Calls cube(Region) and kept(point of the uniform mesh).
+  template <class Cube, class Kept>
+  void for_each_cell_point(std::int32_t block, Cube&& cube, Kept&& kept) const {
     regions_.for_each(block, cube, [&](int cell) {
       for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet) kept(cells_.point(block, cell, sheet));
-    });
-    regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) {
-      const RegionRing ring = ring_of(regions_, edge);
-      if (!ring.has_polygon()) return;
-      if (!ring.any_merged) {
-        if (polygons_.is_fanned(edge)) kept(polygons_.crossing_point(edge));
-      } else if (const RegionPolygon polygon = *polygon_of(regions_, edge); polygon.cut.fanned) {
-        fan(polygon);
-      }
     });
   }
 
@@ -115,7 +114,7 @@ class Filling {
                            : number_[cells_.point(region.block, region.cell, 0)];
   }
   std::uint32_t middle_of(const CellBlocks::Edge& edge) const {
-    return std::ranges::lower_bound(fans_[static_cast<std::size_t>(edge.block)], key(edge), {}, &Fan::key)->first;
+    return std::ranges::lower_bound(made_[static_cast<std::size_t>(edge.block)].fans, key(edge), {}, &Fan::key)->first;
   }
   std::uint32_t number_of_side(const RegionPolygon& polygon, int side) const {
     std::uint32_t number = middle_of(polygon.crossing);
@@ -123,9 +122,10 @@ class Filling {
     return number;
   }
 
-  /// `numbered` is false as long as there are no numbers, and polygons are only counted.
-  template <class OnQuad, class OnTriangle>
-  void for_each_polygon(std::int32_t block, bool numbered, OnQuad&& quad, OnTriangle&& triangle) const {
+  /// `numbered` is false as long as there are no numbers, and polygons are only counted. Calls kept_fan(edge) for the edges that are
+  /// fanned as in the uniform mesh, and fan(RegionPolygon) for those that are otherwise.
+  template <class OnQuad, class OnTriangle, class OnKept, class OnFan>
+  void for_each_polygon(std::int32_t block, bool numbered, OnQuad&& quad, OnTriangle&& triangle, OnKept&& kept_fan, OnFan&& fan) const {
     const auto all_numbered = [&](auto polygon) {
       if (numbered)
         for (std::uint32_t& p : polygon) p = number_[p];
@@ -134,7 +134,12 @@ class Filling {
     regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) {
       const RegionRing ring = ring_of(regions_, edge);
       if (!ring.has_polygon()) return;
-      if (ring.any_merged) return add(*polygon_of(regions_, edge), numbered, quad, triangle);
+      if (ring.any_merged) {
+        const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
+        if (polygon.cut.fanned) fan(polygon);
+        return add(polygon, numbered, quad, triangle);
+      }
+      if (polygons_.is_fanned(edge)) kept_fan(edge);
       polygons_.polygons_of(
           edge, [&](const Quad& q) { quad(all_numbered(q)); }, [&](const Triangle& t) { triangle(all_numbered(t)); });
     });
@@ -175,7 +180,7 @@ class Filling {
   RunContext& context_;
   std::vector<std::uint32_t> number_;       ///< by the uniform mesh's point
   std::vector<std::uint32_t> cube_number_;  ///< by cube
-  std::vector<std::vector<Fan>> fans_;      ///< by block, ascending
+  std::vector<Made> made_;                  ///< by block
 };
 
 }  // namespace

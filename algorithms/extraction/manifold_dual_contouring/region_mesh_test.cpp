@@ -1,11 +1,13 @@
 #include "algorithms/extraction/manifold_dual_contouring/region_mesh.h"
 
 #include <gtest/gtest.h>
+#include <stdlib.h>
 #include <tbb/global_control.h>
 
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/simd_level.h"
 #include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
@@ -111,6 +113,19 @@ TEST(RegionMesh, SameBytesAtAnyThreadCount) {
   EXPECT_LT(meshes[0].points.size(), contour(hermite, 0).points.size() / 2);
   EXPECT_TRUE(meshes[0] == meshes[1]);
   EXPECT_TRUE(meshes[0] == meshes[2]);
+}
+
+TEST(RegionMesh, SameBytesAtEverySimdLevel) {
+  const FloatHermite hermite = waves();
+  for (const double tolerance : {0.0, 0.3}) {
+    std::vector<PolygonMesh> meshes;
+    for (const SimdLevel level : available_simd_levels()) {
+      setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+      meshes.push_back(contour(hermite, tolerance));
+      EXPECT_TRUE(meshes.back() == meshes.front()) << name(level);
+    }
+  }
+  unsetenv("HERMESH_SIMD");
 }
 
 /// Proposals that are good for one tolerance are all taken back where another one is asked for, which none can keep: the

@@ -11,25 +11,6 @@ using Eigen::Vector3d;
 /// Cells around an edge, as steps along the two other axes, counter-clockwise.
 constexpr int kSteps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
 
-std::array<Region, 4> regions_around(const Regions& regions, const CellBlocks::Edge& edge) {
-  std::array<Region, 4> result;
-  for (int i = 0; i < 4; ++i) {
-    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
-    at[(edge.axis + 1) % 3] += kSteps[i][0];
-    at[(edge.axis + 2) % 3] += kSteps[i][1];
-    const CellBlocks::Cell cell = regions.cells().locate(edge.block, at[0], at[1], at[2]);
-    result[i] = regions.at(cell.block, cell.cell);
-  }
-  return result;
-}
-
-/// Which of the four differ from the one before them.
-int distinct(const std::array<Region, 4>& around) {
-  int bits = 0;
-  for (int i = 0; i < 4; ++i) bits |= !(around[i] == around[(i + 3) % 4]) << i;
-  return bits;
-}
-
 bool is_same(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
   return a.block == b.block && a.sample == b.sample && a.axis == b.axis;
 }
@@ -95,39 +76,45 @@ FaceBorder face_border(const Regions& regions, const RegionPolygon& polygon, int
 }
 
 RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
-  const std::array<Region, 4> around = regions_around(regions, edge);
-  RegionRing ring;
-  const int kept = distinct(around);
-  for (int i = 0; i < 4; ++i) {
-    if ((kept >> i) & 1) ring.regions[ring.corners++] = around[i];
-    ring.any_merged = ring.any_merged || around[i].merged();
+  const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
+  std::array<Region, 4> around;
+  for (std::size_t i = 0; i < 4; ++i) {
+    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
+    at[u] += kSteps[i][0];
+    at[v] += kSteps[i][1];
+    const CellBlocks::Cell cell = regions.cells().locate(edge.block, at[0], at[1], at[2]);
+    around[i] = regions.at(cell.block, cell.cell);
   }
+  RegionRing ring;
+  int last_across = u;
+  for (std::size_t i = 0; i < 4; ++i) {
+    ring.any_merged = ring.any_merged || around[i].merged();
+    const std::size_t before = (i + 3) % 4;  // the step from it to i crosses a plane of constant u if it is even
+    if (around[i] == around[before]) continue;
+    (ring.corners > 0 ? ring.across[static_cast<std::size_t>(ring.corners - 1)] : last_across) = before % 2 == 0 ? u : v;
+    ring.regions[static_cast<std::size_t>(ring.corners++)] = around[i];
+    ring.least_level = std::min(ring.least_level, int(around[i].level));
+  }
+  if (ring.corners > 0) ring.across[static_cast<std::size_t>(ring.corners - 1)] = last_across;
   return ring;
 }
 
-std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge) {
+std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring) {
+  if (!ring.has_polygon()) return std::nullopt;
   const CellBlocks& cells = regions.cells();
-  const std::array<Region, 4> around = regions_around(regions, edge);
+  const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
   RegionPolygon polygon;
   polygon.crossing = edge;
-  const int kept = distinct(around), u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
-  int level = Regions::kLevels, last_across = u;
-  for (int i = 0; i < 4; ++i) {
-    if (!((kept >> i) & 1)) continue;
-    const int before = (i + 3) % 4;  // the step from it to i crosses a plane of constant u if it is even
-    (polygon.corners > 0 ? polygon.sides[polygon.corners - 1].across : last_across) = before % 2 == 0 ? u : v;
-    polygon.regions[polygon.corners++] = around[i];
-    level = std::min(level, int(around[i].level));
-  }
-  if (polygon.corners < 3) return std::nullopt;
-  polygon.sides[polygon.corners - 1].across = last_across;
+  polygon.corners = ring.corners;
+  polygon.regions = ring.regions;
+  for (std::size_t i = 0; i < 4; ++i) polygon.sides[i].across = ring.across[i];
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
     if (!region.merged() && cells.sheets(region.block, region.cell).sheets != 1) return std::nullopt;
     polygon.points[i] = regions.point(region);
   }
   const int along = edge.axis == 0 ? edge.sample >> 6 : edge.axis == 1 ? (edge.sample >> 3) & 7 : edge.sample & 7;
-  const int before = along & ((1 << level) - 1);
+  const int level = ring.least_level, before = along & ((1 << level) - 1);
   polygon.start = cells.corner(edge.block, edge.sample);
   polygon.start[edge.axis] -= before;
   polygon.length = 1 << level;

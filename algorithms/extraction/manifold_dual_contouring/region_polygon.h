@@ -25,7 +25,7 @@ struct RegionPolygon {
   };
   CellBlocks::Edge crossing;  ///< the lattice edge that is crossed
   int corners = 0;            ///< 3 or 4, counter-clockwise seen against the edge's axis
-  std::array<Region, 4> regions;
+  std::array<Region, 4> regions{};
   std::array<Eigen::Vector3d, 4> points;
   std::array<Side, 4> sides;
   Eigen::Vector3d start;  ///< of the edge, as it is between the regions
@@ -78,16 +78,21 @@ struct FaceBorder {
 };
 FaceBorder face_border(const Regions& regions, const RegionPolygon& polygon, int side);
 
-/// None where fewer than three regions are around the edge, or where one of them is a cell of several sheets.
-std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge);
-
-/// Only the regions around an edge, from corner to corner: fewer than three if there is no polygon.
+/// The regions around an edge, from corner to corner: fewer than three if there is no polygon.
 struct RegionRing {
   int corners = 0;
-  std::array<Region, 4> regions;
+  std::array<Region, 4> regions{};
+  std::array<int, 4> across{};  ///< axis of the step from each to the next
+  int least_level = Regions::kLevels;
   bool any_merged = false;
   bool has_polygon() const { return corners >= 3; }
 };
 RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge);
+
+/// None where fewer than three regions are around the edge, or where one of them is a cell of several sheets.
+std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring);
+inline std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge) {
+  return polygon_of(regions, edge, ring_of(regions, edge));
+}
 
 }  // namespace hermesh

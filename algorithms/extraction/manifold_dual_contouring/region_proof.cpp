@@ -33,6 +33,10 @@ class RegionProof {
         any_bold_(cells_.size()) {
     parallel_blocks(cells_.size(), context_,
                     [&](std::size_t b) { open_[b] = regions_.outer_edges(static_cast<std::int32_t>(b)); });
+    for (std::size_t b = 0; b < cells_.size(); ++b) {
+      const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
+      turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 | ((lower[2] >> 3) & 1))].push_back(static_cast<std::uint32_t>(b));
+    }
   }
 
   std::size_t run() {
@@ -52,14 +56,18 @@ class RegionProof {
   }
 
   void look_at_polygons() {
-    parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-      for (int axis = 0; axis < 3; ++axis)
-        for (int word = 0; word < 8; ++word) {
-          std::uint64_t& open = open_[b][axis][word];
-          for (std::uint64_t bits = open; bits != 0; bits &= bits - 1)
-            if (holds({static_cast<std::int32_t>(b), 64 * word + std::countr_zero(bits), axis})) open &= ~(bits & -bits);
-        }
-    });
+    // A cube has polygons in its own block and those next to it, and of these no two in one turn: what is split does not depend
+    // on threads.
+    for (const std::vector<std::uint32_t>& turn : turns_)
+      parallel_blocks(turn.size(), context_, [&](std::size_t i) {
+        const std::size_t b = turn[i];
+        for (int axis = 0; axis < 3; ++axis)
+          for (int word = 0; word < 8; ++word) {
+            std::uint64_t& open = open_[b][axis][word];
+            for (std::uint64_t bits = open; bits != 0; bits &= bits - 1)
+              if (holds({static_cast<std::int32_t>(b), 64 * word + std::countr_zero(bits), axis})) open &= ~(bits & -bits);
+          }
+      });
   }
 
   /// Bits of a cube in each of its words of a mask.
@@ -69,10 +77,13 @@ class RegionProof {
     return rows;
   }
 
+  /// A polygon of a cube that is split anyway is not looked at.
   bool holds(const CellBlocks::Edge& edge) {
     const RegionRing ring = ring_of(regions_, edge);
     if (!ring.has_polygon() || !ring.any_merged) return true;
-    const std::optional<RegionPolygon> polygon = polygon_of(regions_, edge);
+    for (int i = 0; i < ring.corners; ++i)
+      if (const Region& region = ring.regions[static_cast<std::size_t>(i)]; region.merged() && bold_[regions_.number(region)]) return false;
+    const std::optional<RegionPolygon> polygon = polygon_of(regions_, edge, ring);
     if (polygon && is_manifold(*polygon) && shell_.holds(*polygon)) return true;
     Region largest = ring.regions[0];
     for (int i = 1; i < ring.corners; ++i)
@@ -146,6 +157,7 @@ class RegionProof {
   std::vector<std::uint8_t> bold_;              ///< by cube: to be split
   std::vector<std::array<BlockMask, 3>> open_;  ///< by block and axis: edges whose polygons are not known to be near
   std::vector<std::uint8_t> any_bold_;          ///< by block
+  std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };
 

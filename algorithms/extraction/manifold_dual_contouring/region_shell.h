@@ -11,8 +11,10 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
+#include "algorithms/extraction/manifold_dual_contouring/kernels/shell_kernels.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
 
 namespace hermesh {
 
@@ -42,21 +44,26 @@ class RegionShell {
   bool holds(const RegionPolygon& polygon) const;
 
  private:
+  struct Nearby;
   struct Scratch;
+  enum class Answer { yes, no, perhaps };
 
-  void gather(const RegionPolygon& polygon, double height, Scratch& scratch) const;
-  bool holds(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
+  void describe(std::int32_t block, std::uint64_t first_quad);
+  void gather(const RegionPolygon& polygon, double height, Nearby& nearby) const;
+  void gather(std::int32_t block, const Eigen::Vector3d& corner, const int (&from)[3], const int (&to)[3], Nearby& nearby) const;
+  Answer look(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
+  Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
   const Regions& regions_;
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
   const std::vector<Eigen::Vector3d>& points_;
   const std::span<const float> tolerance_;
-  std::vector<std::uint32_t> first_;  ///< by block: the quad of its first crossing edge
-  double rounding_ = 0;               ///< what single precision makes of a distance, at most
-  LargeArray<std::array<float, 4>> quick_points_;
-  LargeArray<float> reach_;           ///< by crossing edge: from the first corner of its quad to the others, at most
-  LargeArray<Quad> quads_;            ///< by crossing edge, as EdgePolygons cuts it; of a fanned one the cells' points
+  float least_tolerance_;
+  std::vector<std::uint32_t> first_quad_;       ///< by block: that of its first crossing edge
+  LargeArray<Quad> quads_;                      ///< by crossing edge, as EdgePolygons cuts it; undefined for a fanned one
+  std::array<LargeArray<float>, 3> in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
+  shell_kernels::Classify* const classify_ = shell_kernels::chosen();
 };
 
 }  // namespace hermesh

@@ -297,10 +297,10 @@ std::array<BlockMask, 3> Regions::outer_edges(std::int32_t block) const {
 Vector3d Regions::normal(const Region& region) const {
   if (region.merged()) return cubes_[number(region)].normal.cast<double>();
   Vector3d sum = Vector3d::Zero();
-  for (int edge = 0; edge < 12; ++edge) {
-    const CellBlocks::Edge at = cells_.edge_of_cell(region.block, region.cell, edge);
-    if (!cells_.is_crossed(at)) continue;
-    const auto& n = cells_.grid().crossing(at.block, at.sample, at.axis).normal;
+  const int signs = cells_.corner_signs(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints
+  for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
+    const CellBlocks::Edge at = cells_.edge_of_cell(region.block, region.cell, std::countr_zero(edges));
+    const auto n = cells_.grid().crossing(at.block, at.sample, at.axis).normal;
     sum += Vector3d(n[0], n[1], n[2]);
   }
   return sum.normalized();

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/late_moves.h"
@@ -28,20 +29,47 @@ constexpr double kGoodEnough = 0.005;
 /// Of a determinant whose terms are of the order of one, far above rounding: what is called positive.
 constexpr double kPositive = 1e-5;
 
-/// By the signs of a cell's corners, a bit an edge.
-constexpr std::array<std::uint16_t, 256> kCrossedEdges = [] {
-  std::array<std::uint16_t, 256> result{};
-  for (int signs = 0; signs < 256; ++signs)
-    for (int edge = 0; edge < 12; ++edge) {
-      const int from = corner_number(edge_offset(edge)), to = from | 1 << edge_axis(edge);
-      if (((signs >> from) & 1) != ((signs >> to) & 1)) result[static_cast<std::size_t>(signs)] |= static_cast<std::uint16_t>(1 << edge);
-    }
-  return result;
-}();
-
 double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   return (b - a).cross(c - a).dot(d - a);
 }
+
+/// The crossings about a block's cells as the vector code wants them. One for many blocks.
+class CellRecords {
+ public:
+  /// False where a normal is none.
+  bool read(const CellBlocks& cells, std::int32_t block) {
+    for (const int number : written_) std::fill_n(records_[static_cast<std::size_t>(number)].data(), 4, 0.0f);
+    written_.clear();
+    bool all_unit = true;
+    for (int slot = 0; slot < 8; ++slot) {
+      const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
+      const std::int32_t there = cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(d[0], d[1], d[2]))];
+      if (there < 0) continue;
+      const std::uint64_t rows = (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
+      for (int axis = 0; axis < 3; ++axis) {
+        if (d[axis]) continue;
+        for (int x = 0; x < (d[0] ? 1 : 8); ++x)
+          for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0; word &= word - 1) {
+            const int bit = std::countr_zero(word);
+            const EdgeCrossing crossing = cells.grid().crossing(there, 64 * x + bit, axis);
+            const auto& n = crossing.normal;
+            const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1], (bit & 7) + 8 * d[2]);
+            written_.push_back(number);
+            records_[static_cast<std::size_t>(number)] = {
+                static_cast<float>(std::clamp(double(crossing.offset), cells.margin(), 1.0 - cells.margin())), n[axis], n[(axis + 1) % 3],
+                n[(axis + 2) % 3]};
+            all_unit = all_unit && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0.5f;
+          }
+      }
+    }
+    return all_unit;
+  }
+  const float (*data() const)[4] { return reinterpret_cast<const float(*)[4]>(records_.data()); }
+
+ private:
+  std::vector<std::array<float, 4>> records_ = std::vector<std::array<float, 4>>(leaf_kernels::RecordCube::kAll);
+  std::vector<int> written_;
+};
 
 class Contourer {
  public:
@@ -66,11 +94,13 @@ class Contourer {
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
+      const BlockMask placed = place_flat_cells(block, mesh.points);
       std::uint32_t number = cells_[block].first_code;
       for_each_bit(cells_[block].active, [&](int cell) {
         const int signs = cells_.corner_signs(number);
         const std::uint32_t point = cells_[block].first_point + (number++ - cells_[block].first_code);
-        if (cells_.is_plain(signs) && !cells_.is_joint(block, cell)) {
+        if (test(placed, cell)) return;
+        if (is_plain(block, cell, signs)) {
           mesh.points[point] = file_.rounded(place_plain(block, cell, signs));
           return;
         }
@@ -85,6 +115,46 @@ class Contourer {
       mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
       mesh.several_sheets += several[b];
     }
+  }
+
+  /// Whether the cell's corners tell all.
+  bool is_plain(std::int32_t block, int cell, int signs) const { return cells_.is_plain(signs) && !cells_.is_joint(block, cell); }
+
+  /// Most cells by vector code: plain ones whose planes are nearly parallel. Returns which.
+  BlockMask place_flat_cells(std::int32_t block, std::vector<Vector3d>& points) const {
+    BlockMask placed{};
+    if (options_.placement == DualContouringOptions::Placement::average || options_.truncation < leaf_kernels::kLeastTruncation)
+      return placed;
+    thread_local CellRecords records;
+    if (!records.read(cells_, block)) return placed;
+    constexpr std::size_t kMost = 512 + leaf_kernels::kLargestVector;
+    std::array<std::uint16_t, kMost> cell{};
+    std::array<std::array<float, kMost>, 3> place;
+    std::array<std::uint8_t, kMost> is_placed;
+    std::array<std::uint32_t, kMost> point;
+    std::size_t found = 0;
+    std::uint32_t number = cells_[block].first_code;
+    for_each_bit(cells_[block].active, [&](int at) {
+      point[found] = cells_[block].first_point + (number - cells_[block].first_code);
+      cell[found] = static_cast<std::uint16_t>(at);
+      found += is_plain(block, at, cells_.corner_signs(number++));
+    });
+    for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
+    float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
+    kernels_.place_flat({.records = records.data(),
+                         .cell = cell.data(),
+                         .count = static_cast<int>(found),
+                         .truncation = static_cast<float>(options_.truncation),
+                         .margin = static_cast<float>(cells_.margin()),
+                         .most_error = static_cast<float>(reach_ > 0 ? kWorthLeaving * kWorthLeaving : 1e6),
+                         .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
+                        out, is_placed.data());
+    for (std::size_t i = 0; i < found; ++i) {
+      if (!is_placed[i]) continue;
+      placed[static_cast<std::size_t>(cell[i] >> 6)] |= std::uint64_t{1} << (cell[i] & 63);
+      points[point[i]] = file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
+    }
+    return placed;
   }
 
   /// Of a cell whose corners tell all.
@@ -275,6 +345,7 @@ class Contourer {
   const DualContouringOptions options_;
   const double reach_;  ///< of points, from their cells
   const FilePoints& file_;
+  const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
   std::vector<std::vector<PointWish>> wishes_;  ///< by block
 };
 

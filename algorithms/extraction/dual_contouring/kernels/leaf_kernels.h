@@ -63,6 +63,24 @@ struct PlaceInput : edge_kernels::LeafInput {
 /// Below it single precision cannot tell which singular values are to be dropped.
 inline constexpr float kLeastTruncation = 0.03f;
 
+/// Crossings of all edges that a leaf's cells have, by axis and place of the first sample: offset, and the normal along the
+/// edge and the axes after it, of unit length; zeros where none is.
+struct RecordCube {
+  static constexpr int kX = 81, kY = 9, kOfAxis = 729, kAll = 3 * kOfAxis;
+  static int number(int axis, int x, int y, int z) { return kOfAxis * axis + kX * x + kY * y + z; }
+};
+
+/// Cells to be placed if their planes are nearly parallel.
+struct FlatCells {
+  const float (*records)[4];  ///< a RecordCube
+  const std::uint16_t* cell;  ///< 64x + 8y + z; kLargestVector more can be read, and are cells, too
+  int count;
+  float truncation;  ///< no less than kLeastTruncation
+  float margin;      ///< places are so far off the cell's faces
+  /// Square of the distance from the planes, root mean square, where the minimiser lies within the cell, and where it is held there.
+  float most_error, most_error_held;
+};
+
 /// Where they go.
 struct PlaceOutput {
   float* points;   ///< of the leaf's cells, in the mesh's coordinates, three numbers a point
@@ -87,6 +105,11 @@ struct ConnectInput {
   bool mirrors;          ///< turns the quads about
 };
 
+/// Of each cell the minimiser of its quadratic error function, held within the cell; `placed` is 0 where it is another case: more than one
+/// large eigenvalue, or too large an error.
+/// @param place by axis, from the cell's first corner; room for kLargestVector more
+using PlaceFlat = void(const FlatCells& cells, float* const* place, std::uint8_t* placed);
+
 /// One quad for each crossing edge that starts in the leaf, four point numbers each, by axis, in that by sample.
 using Connect = void(const ConnectInput& input, std::uint32_t* quads);
 
@@ -94,6 +117,7 @@ struct Kernels {
   Count* count;
   PlaceAverage* place_average;
   PlaceOptimal* place_optimal;
+  PlaceFlat* place_flat;
   Connect* connect;
 };
 
