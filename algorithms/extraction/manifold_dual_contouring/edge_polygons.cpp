@@ -15,8 +15,10 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points, RunContext& context)
     : cells_(cells), edges_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+    PlainPoints near;
+    near.read(cells_, static_cast<std::int32_t>(b));
     cells_.for_each_crossing_edge(static_cast<std::int32_t>(b),
-                                  [&](const CellBlocks::Edge& edge) { decide(edge, points); });
+                                  [&](const CellBlocks::Edge& edge) { decide(edge, points, &near); });
   });
   number_all(context);
 }
@@ -86,11 +88,11 @@ int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Aroun
   return made;
 }
 
-void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points) {
+void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points, const PlainPoints* near) {
   BlockEdges& edges = edges_[edge.block];
   std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
-  if (!cells_.plain_points(edge, corners)) {
+  if (!(near ? near->around(edge, corners) : cells_.plain_points(edge, corners))) {
     const CellBlocks::Around around = cells_.around(edge);
     for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
     corners = around.points;

@@ -10,6 +10,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+#include "algorithms/extraction/manifold_dual_contouring/plain_points.h"
 
 namespace hermesh {
 
@@ -39,17 +40,19 @@ class EdgePolygons {
   std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
 
   bool is_fanned(const CellBlocks::Edge& edge) const { return test(edges_[edge.block].fanned[edge.axis], edge.sample); }
+  const BlockMask& fanned(std::int32_t block, int axis) const { return edges_[block].fanned[axis]; }
   /// Of a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
   /// Calls quad(Quad) or triangle(Triangle), counter-clockwise seen from outside (at a cut from the edge's second sample).
   /// Of a segment that two fanned edges share, one of them has the two triangles.
+  /// @param near of the edge's block, where they are at hand
   template <class OnQuad, class OnTriangle>
-  void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle) const {
+  void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle, const PlainPoints* near = nullptr) const {
     const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
     if (!is_fanned(edge)) {
       std::array<std::uint32_t, 4> p;
-      if (!cells_.plain_points(edge, p)) p = cells_.around(edge).points;
+      if (!(near ? near->around(edge, p) : cells_.plain_points(edge, p))) p = cells_.around(edge).points;
       const std::size_t d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
       Quad q = {p[d], p[d + 1], p[d + 2], p[(d + 3) % 4]};
       if (!outwards) std::swap(q[1], q[3]);
@@ -87,7 +90,7 @@ class EdgePolygons {
   }
   void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
-  void decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points);
+  void decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points, const PlainPoints* near = nullptr);
   int safe_diagonal(const CellBlocks::Edge& edge, const std::array<std::uint32_t, 4>& corners,
                     const std::vector<Eigen::Vector3d>& points) const;
 

@@ -119,9 +119,11 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
 
 void RegionShell::describe(std::int32_t block, std::uint64_t first_quad) {
   first_quad_[static_cast<std::size_t>(block)] = static_cast<std::uint32_t>(first_quad);
+  PlainPoints near;
+  near.read(cells_, block);
   cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
     Quad& quad = quads_[first_quad++];
-    if (!polygons_.is_fanned(edge)) polygons_.polygons_of(edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {});
+    if (!polygons_.is_fanned(edge)) polygons_.polygons_of(edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {}, &near);
   });
   const Vector3d corner = cells_.corner(block, 0);
   const std::uint32_t first = cells_[block].first_point, count = cells_.points_in(block);
@@ -193,19 +195,22 @@ void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (
   const std::uint64_t row = ((1u << end[2]) - 1) & ~((1u << begin[2]) - 1);
   std::uint64_t rows = 0;
   for (int y = begin[1]; y < end[1]; ++y) rows |= row << (8 * y);
+  const std::uint64_t below = (rows & -rows) - 1;
   const HermiteView::Block& source = cells_.source(block);
-  const std::uint32_t first = first_quad_[static_cast<std::size_t>(block)];
   for (int axis = 0; axis < 3; ++axis)
     for (int x = begin[0]; x < end[0]; ++x) {
       const std::uint64_t all = source.crossing[axis][x];
-      for (std::uint64_t word = all & rows; word != 0; word &= word - 1) {
-        const int bit = std::countr_zero(word);
-        const CellBlocks::Edge edge{block, 64 * x + bit, axis};
-        if (polygons_.is_fanned(edge))
-          polygons_.polygons_of(edge, [](const Quad&) {}, [&](const Triangle& t) { nearby.fans.push_back(t); });
+      if ((all & rows) == 0) continue;
+      std::uint32_t number = first_quad_[static_cast<std::size_t>(block)] + source.before[axis][x] + static_cast<std::uint32_t>(bits_in(all & below));
+      const std::uint64_t fanned = polygons_.fanned(block, axis)[x];
+      for (std::uint64_t word = all & ~below & until; word != 0; word &= word - 1, ++number) {
+        const std::uint64_t bit = word & -word;
+        if ((bit & rows) == 0) continue;
+        if ((bit & fanned) == 0)
+          nearby.quads.push_back(number);
         else
-          nearby.quads.push_back(first + source.before[axis][x] +
-                                 static_cast<std::uint32_t>(bits_in(all & ((std::uint64_t{1} << bit) - 1))));
+          polygons_.polygons_of({block, 64 * x + std::countr_zero(bit), axis}, [](const Quad&) {},
+                                [&](const Triangle& t) { nearby.fans.push_back(t); });
       }
     }
 }

@@ -102,17 +102,26 @@ ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
 
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
   const Places places = places_of(prism, triangle);
+  // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are their sums: where one is positive at
+  // all corners, it is on all of the triangle. Sums tell of what is beyond an edge of the prism.
+  std::array<std::array<double, 3>, 5> beyond;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    for (std::size_t side = 0; side < 3; ++side) beyond[side][corner] = prism.beyond_wall(places[corner], side);
+    beyond[3][corner] = prism.lid().signedDistance(triangle[corner]);
+    beyond[4][corner] = prism.bottom().signedDistance(triangle[corner]);
+  }
   for (std::size_t side = 0; side < 3; ++side)
-    if (std::ranges::all_of(places, [&](const auto& place) { return prism.beyond_wall(place, side) > -kRounding; }))
-      return Meeting::none;
-  const auto beyond = [&](const ShellPrism::Plane& plane) {
-    return std::minmax({plane.signedDistance(triangle[0]), plane.signedDistance(triangle[1]), plane.signedDistance(triangle[2])});
-  };
-  const auto above = beyond(prism.lid()), below = beyond(prism.bottom());
-  if (above.first > kRounding || below.first > kRounding) return Meeting::none;
+    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kRounding; })) return Meeting::none;
+  const auto above = std::ranges::minmax(beyond[3]), below = std::ranges::minmax(beyond[4]);
+  if (above.min > kRounding || below.min > kRounding) return Meeting::none;
   const Vector3d normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   const bool faces = std::ranges::all_of(prism.pillars(), [&](const Vector3d& pillar) { return normal.dot(pillar) > 0; });
-  if (faces && tolerance >= prism.height() && above.second < -kRounding && below.second < -kRounding) return Meeting::good;
+  if (faces && tolerance >= prism.height() && above.max < -kRounding && below.max < -kRounding) return Meeting::good;
+  for (std::size_t i = 0; i < 5; ++i)
+    for (std::size_t j = i + 1; j < 5; ++j) {
+      const auto by = [&](std::size_t corner) { return beyond[i][corner] + beyond[j][corner]; };
+      if (std::min({by(0), by(1), by(2)}) > kRounding) return Meeting::none;
+    }
   const Extent extent = extent_in(prism, places, Walls::outer);
   if (extent.empty()) return Meeting::none;
   const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kRounding;

@@ -312,9 +312,11 @@ class Contourer {
       const auto block = static_cast<std::int32_t>(b);
       Quad* quad = mesh.quads.data() + polygons.first_quad(block);
       Triangle* triangle = mesh.triangles.data() + polygons.first_triangle(block);
+      PlainPoints near;
+      near.read(cells_, block);
       cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
         polygons.polygons_of(
-            edge, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; });
+            edge, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; }, &near);
       });
     });
   }
