@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 /// A cube's place may be farther from the planes than this share of the tolerance, root mean square.
 constexpr double kShare = 0.3;
 /// Length of the mean of a cube's unit normals: what bends more than this, the proof would split.
-constexpr double kLeastAgreement = 0.95;
+constexpr double kLeastAgreement = 0.93;
 /// How strongly the place is drawn to the mean of the crossings, against the planes: it should lie in the middle of
 /// what it stands for, but on the surface.
 constexpr double kPullToMean = 0.02;
