@@ -191,6 +191,9 @@ RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, 
   const std::size_t splits = prove_regions(regions, polygons, points, tolerance, context);
   context.figure("split_regions", double(splits));
   Stage stage(context, "connect regions");
+  RegionMesh mesh = Filling(regions, polygons, points, context).run();
+  if (mesh.points.size() <= polygons.point_count()) return mesh;
+  regions.split_all();
   return Filling(regions, polygons, points, context).run();
 }
 

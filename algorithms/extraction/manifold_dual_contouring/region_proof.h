@@ -28,7 +28,7 @@ namespace hermesh {
 ///
 /// **Distance.** See region_shell.h.
 ///
-/// @param tolerance by the cells' points, voxels
+/// @param tolerance by point, those on fanned edges included; voxels
 /// @returns how many cubes were split
 /// @throws Cancelled
 std::size_t prove_regions(Regions& regions, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,

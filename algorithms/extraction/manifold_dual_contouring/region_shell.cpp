@@ -87,7 +87,7 @@ struct RegionShell::Scratch {
   double height, highest;                              ///< of this prism, of any
   bool is_there;                                       ///< S has been found in a prism
   std::vector<std::uint8_t> certain;                   ///< by point, of this prism; only those in runs
-  std::vector<Triangle> within;                        ///< of S, perhaps in this prism
+  std::vector<Triangle> good;                          ///< of S, whatever of them is in this prism
 
   /// Whether the cell of this point belongs to one of the regions: points lie in their cells.
   bool is_own(const Vector3d& p, int regions) const {
@@ -108,7 +108,12 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
       points_(points),
       tolerance_(tolerance),
       least_tolerance_(tolerance.empty() ? 0.0f : *std::ranges::min_element(tolerance)),
-      first_quad_(cells_.size()) {
+      first_quad_(cells_.size()),
+      scratch_([&points] {
+        auto scratch = std::make_unique<Scratch>();
+        scratch->certain.resize(points.size());
+        return scratch;
+      }) {
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b)
     for (const BlockMask& crossing : cells_.source(static_cast<std::int32_t>(b)).crossing) first[b] += static_cast<std::uint64_t>(count(crossing));
@@ -116,6 +121,8 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
   for (LargeArray<float>& coordinates : in_blocks_) coordinates.resize(cells_.point_count() + shell_kernels::kLargestVector);
   parallel_blocks(cells_.size(), context, [&](std::size_t b) { describe(static_cast<std::int32_t>(b), first[b]); });
 }
+
+RegionShell::~RegionShell() = default;
 
 void RegionShell::describe(std::int32_t block, std::uint64_t first_quad) {
   first_quad_[static_cast<std::size_t>(block)] = static_cast<std::uint32_t>(first_quad);
@@ -216,7 +223,7 @@ void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (
 }
 
 bool RegionShell::holds(const RegionPolygon& polygon) const {
-  thread_local Scratch scratch;
+  Scratch& scratch = *scratch_.local();
   double most = kFarthest;
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
@@ -228,12 +235,11 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
   if (polygon.cut.fanned) {
     const CellBlocks::Edge& edge = polygon.crossing;
     const auto& n = cells_.grid().crossing(edge.block, edge.sample, edge.axis).normal;
-    scratch.pillars[RegionPolygon::kMiddle] = {n[0], n[1], n[2]};
+    scratch.pillars[RegionPolygon::kMiddle] = Vector3d(n[0], n[1], n[2]).normalized();
     for (int i = 0; i < polygon.corners; ++i)
       scratch.pillars[static_cast<std::size_t>(RegionPolygon::kFirstSide + i)] =
           (scratch.pillars[static_cast<std::size_t>(i)] + scratch.pillars[static_cast<std::size_t>(polygon.next(i))]).normalized();
   }
-  scratch.certain.resize(points_.size());
   scratch.is_there = false;
   scratch.highest = most;
   unsigned open = ~0u;
@@ -292,9 +298,13 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::a
     const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
     return std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; });
   };
-  const auto holds = [&](const Triangle& t) { return meet(prism, corners_of(t), tolerance_of(t)) != Meeting::bad; };
-  std::vector<Triangle>& within = scratch.within;
-  within.clear();
+  std::vector<Triangle>& good = scratch.good;
+  good.clear();
+  const auto holds = [&](const Triangle& t) {
+    const Meeting meeting = meet(prism, corners_of(t), tolerance_of(t));
+    if (meeting == Meeting::good && !is_there) good.push_back(t);
+    return meeting != Meeting::bad;
+  };
   const bool tolerated = double(least_tolerance_) >= prism.height();
   for (const std::uint32_t number : scratch.nearby.quads) {
     const Quad& q = quads_[number];
@@ -303,15 +313,18 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::a
     if (ac & b & d & shell_kernels::kOut) continue;
     for (const auto& [all, t] : {std::pair{ac & b, Triangle{q[0], q[1], q[2]}}, {ac & d, Triangle{q[0], q[2], q[3]}}}) {
       if (all & shell_kernels::kOut) continue;
-      if (!is_there) within.push_back(t);
-      if ((all & shell_kernels::kBetweenLids) && (tolerated || tolerance_of(t) >= prism.height()) && faces(t)) continue;
-      if (!holds(t)) return Answer::perhaps;
+      if ((all & shell_kernels::kBetweenLids) && (tolerated || tolerance_of(t) >= prism.height()) && faces(t)) {
+        if (!is_there) good.push_back(t);
+      } else if (!holds(t)) {
+        return Answer::perhaps;
+      }
     }
   }
   for (const Triangle& t : scratch.nearby.fans)
     if (!holds(t)) return Answer::perhaps;
-  const auto reaches = [&](const Triangle& t) { return is_own(corners_of(t)) && reaches_into(prism, corners_of(t)); };
-  scratch.is_there = is_there || std::ranges::any_of(within, reaches) || std::ranges::any_of(scratch.nearby.fans, reaches);
+  scratch.is_there = is_there || std::ranges::any_of(good, [&](const Triangle& t) {
+                       return is_own(corners_of(t)) && reaches_into(prism, corners_of(t));
+                     });
   return Answer::yes;
 }
 

@@ -1,9 +1,12 @@
 // Whether a merged polygon is near the uniform mesh, and that near it.
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -36,9 +39,10 @@ class RegionShell {
   /// Farther than this nothing is shown, whatever the tolerance, in voxels.
   static constexpr double kFarthest = 2.0;
 
-  /// @param tolerance by the cells' points, voxels
+  /// @param tolerance by point, those on fanned edges included; voxels
   RegionShell(const Regions& regions, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
               std::span<const float> tolerance, RunContext& context);
+  ~RegionShell();
 
   /// Safe to call for several polygons at once.
   bool holds(const RegionPolygon& polygon) const;
@@ -64,6 +68,7 @@ class RegionShell {
   LargeArray<Quad> quads_;                      ///< by crossing edge, as EdgePolygons cuts it; undefined for a fanned one
   std::array<LargeArray<float>, 3> in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
   shell_kernels::Classify* const classify_ = shell_kernels::chosen();
+  mutable tbb::enumerable_thread_specific<std::unique_ptr<Scratch>> scratch_;
 };
 
 }  // namespace hermesh

@@ -32,7 +32,7 @@ class Regions {
   /// A cube is proposed where the surface within it is one disc (by its Euler characteristic, and because those of its
   /// octants are discs that hang together) whose border crosses the cube's edges, none of its cells is fixed, and one place within it is near the planes of all
   /// its crossings for the tolerance.
-  /// @param tolerance by the cells' points, voxels; where it is 0 or less a cell stays alone
+  /// @param tolerance by point, those on fanned edges included; voxels; where it is 0 or less a cell stays alone
   Regions(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, std::span<const float> tolerance,
           const FilePoints& file, RunContext& context);
 
@@ -68,6 +68,10 @@ class Regions {
   /// Gives way to the cubes that were proposed within it, or to single cells.
   void split(const Region& region) {
     blocks_[static_cast<std::size_t>(region.block)].alive[region.level - 1] &= ~(std::uint64_t{1} << cube_of(region.cell, region.level));
+  }
+
+  void split_all() {
+    for (BlockRegions& block : blocks_) block.alive = {};
   }
 
   /// By axis the crossing edges of a block, but for those that have one and the same cube all around them.

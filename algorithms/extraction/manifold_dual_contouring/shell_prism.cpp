@@ -63,6 +63,8 @@ ShellPrism::ShellPrism(const Corners& corners, const std::array<Vector3d, 3>& pi
   lid_ = through(corners, height_);
   bottom_ = through(corners, -height_);
   bottom_.coeffs() = -bottom_.coeffs();
+  for (std::size_t i = 0; i < 3; ++i)
+    for (const double up : {height_, -height_}) box_.extend(corners[i] + up * pillars_[i]);
   for (const Vector3d& pillar : pillars_) least_lid_ = std::min(least_lid_, pillar.dot(over_.normal()));
   stands_ = is_unfolded(corners) && keeps_its_corners(corners);
 }
@@ -101,6 +103,10 @@ ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
 }
 
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
+  const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
+  const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
+  if ((lowest.array() > prism.box().max().array() + kRounding).any() || (highest.array() < prism.box().min().array() - kRounding).any())
+    return Meeting::none;
   const Places places = places_of(prism, triangle);
   // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are their sums: where one is positive at
   // all corners, it is on all of the triangle. Sums tell of what is beyond an edge of the prism.

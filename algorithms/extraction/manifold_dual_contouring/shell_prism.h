@@ -32,7 +32,9 @@ class ShellPrism {
   /// Positive outside.
   const Plane& lid() const { return lid_; }
   const Plane& bottom() const { return bottom_; }
-  /// How far these are from the triangle's plane at least, as a share of the height.
+  /// About all of it.
+  const Eigen::AlignedBox3d& box() const { return box_; }
+  /// How far lid and bottom are from the triangle's plane at least, as a share of the height.
   double least_lid() const { return least_lid_; }
   /// How far beyond a side's wall, wherever between its two pillars that is.
   double beyond_wall(const OverTriangle::Place& place, std::size_t side) const;
@@ -48,6 +50,7 @@ class ShellPrism {
   double height_;
   std::array<std::array<double, 2>, 3> leans_{};
   Plane lid_, bottom_;
+  Eigen::AlignedBox3d box_;
   double least_lid_ = 1;
   bool stands_ = false;
 };
@@ -58,7 +61,7 @@ enum class Meeting { none, good, bad };
 /// @param tolerance how far from the prism's triangle that part may be
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance);
 
-/// Whether some of a triangle is certainly in the prism.
+/// Whether some of a triangle that meets the prism and is good, or is wholly between lid and bottom, is certainly in it.
 bool reaches_into(const ShellPrism& prism, const Corners& triangle);
 
 }  // namespace hermesh

@@ -54,6 +54,18 @@ TEST(ShellPrism, IsReachedIntoByWhatIsWithinEitherPillarsWall) {
   EXPECT_FALSE(reaches_into(prism, {Vector3d(-2, 1, 0), Vector3d(-1, 1, 0), Vector3d(-1, 2, 0)}));
 }
 
+/// The lid lies lower than the height where pillars lean: what is between the two is not in the prism, and no witness that S is.
+TEST(ShellPrism, IsNotMetAboveALowLid) {
+  const Vector3d leaning(0.6, 0, 0.8);
+  const ShellPrism prism(kTriangle, {leaning, leaning, leaning}, 0.5);  // the lid is at 0.4
+  ASSERT_TRUE(prism.stands());
+  EXPECT_EQ(meet(prism, raised(kTriangle, 0.45), 1), Meeting::none);
+  EXPECT_EQ(meet(prism, raised(kTriangle, 0.35), 1), Meeting::good);
+  EXPECT_TRUE(reaches_into(prism, raised(kTriangle, 0.35)));
+  // Above the lid and across it beyond the first wall.
+  EXPECT_EQ(meet(prism, {Vector3d(1.2, -2, 0.3), Vector3d(1.9, 0.02, 0.46), Vector3d(1, 0.02, 0.46)}, 1), Meeting::none);
+}
+
 /// The planes of an upright prism over kTriangle: the third wall is x + y = 4.
 shell_kernels::Planes planes(float height) {
   shell_kernels::Planes result{};
