@@ -141,8 +141,8 @@ class CellBlocks {
   Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
   Around around(const Edge& edge) const;
 
-  /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint, has several sheets or
-  /// an ambiguous face.
+  /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint,
+  /// has several sheets or an ambiguous face.
   bool plain_points(const Edge& edge, std::array<std::uint32_t, 4>& points) const {
     for (std::size_t i = 0; i < 4; ++i) {
       int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};

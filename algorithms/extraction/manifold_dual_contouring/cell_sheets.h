@@ -45,18 +45,23 @@ constexpr std::array<int, 3> edge_offset(int edge) {
 constexpr int edge_number(int axis, const std::array<int, 3>& offset) {
   return 4 * axis + offset[(axis + 1) % 3] + 2 * offset[(axis + 2) % 3];
 }
-constexpr int corner_number(const std::array<int, 3>& offset) { return offset[0] + 2 * offset[1] + 4 * offset[2]; }
+constexpr int corner_number(const std::array<int, 3>& offset) {
+  return offset[0] + 2 * offset[1] + 4 * offset[2];
+}
 /// By the inside bits of the corners the edges that are crossed, a bit an edge.
 inline constexpr std::array<std::uint16_t, 256> kCrossedEdges = [] {
   std::array<std::uint16_t, 256> result{};
   for (int signs = 0; signs < 256; ++signs)
     for (int edge = 0; edge < 12; ++edge) {
       const int from = corner_number(edge_offset(edge)), to = from | 1 << edge_axis(edge);
-      if (((signs >> from) & 1) != ((signs >> to) & 1)) result[static_cast<std::size_t>(signs)] |= static_cast<std::uint16_t>(1 << edge);
+      if (((signs >> from) & 1) != ((signs >> to) & 1))
+        result[static_cast<std::size_t>(signs)] |= static_cast<std::uint16_t>(1 << edge);
     }
   return result;
 }();
-constexpr std::array<int, 3> corner_offset(int corner) { return {corner & 1, (corner >> 1) & 1, corner >> 2}; }
+constexpr std::array<int, 3> corner_offset(int corner) {
+  return {corner & 1, (corner >> 1) & 1, corner >> 2};
+}
 
 /// Edges of a face in cyclic order: between corners 00–10, 10–11, 11–01, 01–00 along axes (a+1) % 3 and (a+2) % 3.
 constexpr std::array<int, 4> face_edges(int face) {

@@ -122,10 +122,12 @@ class Filling {
     return number;
   }
 
-  /// `numbered` is false as long as there are no numbers, and polygons are only counted. Calls kept_fan(edge) for the edges that are
-  /// fanned as in the uniform mesh, and fan(RegionPolygon) for those that are otherwise.
+  /// `numbered` is false as long as there are no numbers, and polygons are only counted. Calls kept_fan(edge)
+  /// for the edges that are fanned as in the uniform mesh, and fan(RegionPolygon) for those that are
+  /// otherwise.
   template <class OnQuad, class OnTriangle, class OnKept, class OnFan>
-  void for_each_polygon(std::int32_t block, bool numbered, OnQuad&& quad, OnTriangle&& triangle, OnKept&& kept_fan, OnFan&& fan) const {
+  void for_each_polygon(std::int32_t block, bool numbered, OnQuad&& quad, OnTriangle&& triangle,
+                        OnKept&& kept_fan, OnFan&& fan) const {
     const auto all_numbered = [&](auto polygon) {
       if (numbered)
         for (std::uint32_t& p : polygon) p = number_[p];
@@ -141,7 +143,8 @@ class Filling {
       }
       if (polygons_.is_fanned(edge)) kept_fan(edge);
       polygons_.polygons_of(
-          edge, [&](const Quad& q) { quad(all_numbered(q)); }, [&](const Triangle& t) { triangle(all_numbered(t)); });
+          edge, [&](const Quad& q) { quad(all_numbered(q)); },
+          [&](const Triangle& t) { triangle(all_numbered(t)); });
     });
   }
 

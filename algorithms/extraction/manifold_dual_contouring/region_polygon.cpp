@@ -15,8 +15,8 @@ bool is_same(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
   return a.block == b.block && a.sample == b.sample && a.axis == b.axis;
 }
 
-/// What a segment keeps from the border of a face's common part, and how far a point that takes its place is from that at
-/// least; in sides of it.
+/// What a segment keeps from the border of a face's common part, and how far a point that takes its place is
+/// from that at least; in sides of it.
 constexpr double kFromBorder = 1e-3, kFarFromBorder = 0.02;
 
 /// Segments between regions of one size stay in the two cubes, which are convex together.
@@ -54,7 +54,8 @@ void hold_if_needed(const Regions& regions, RegionPolygon& polygon, int i) {
 }  // namespace
 
 FaceBorder face_border(const Regions& regions, const RegionPolygon& polygon, int i) {
-  const Region &a = polygon.regions[i], &b = polygon.regions[polygon.next(i)], &smaller = a.level < b.level ? a : b;
+  const Region &a = polygon.regions[i], &b = polygon.regions[polygon.next(i)],
+               &smaller = a.level < b.level ? a : b;
   const CellBlocks& cells = regions.cells();
   const int f = polygon.sides[i].across, p = (f + 1) % 3, q = (f + 2) % 3;
   int at[3] = {smaller.cell >> 6, (smaller.cell >> 3) & 7, smaller.cell & 7};
@@ -89,9 +90,11 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   int last_across = u;
   for (std::size_t i = 0; i < 4; ++i) {
     ring.any_merged = ring.any_merged || around[i].merged();
-    const std::size_t before = (i + 3) % 4;  // the step from it to i crosses a plane of constant u if it is even
+    const std::size_t before =
+        (i + 3) % 4;  // the step from it to i crosses a plane of constant u if it is even
     if (around[i] == around[before]) continue;
-    (ring.corners > 0 ? ring.across[static_cast<std::size_t>(ring.corners - 1)] : last_across) = before % 2 == 0 ? u : v;
+    (ring.corners > 0 ? ring.across[static_cast<std::size_t>(ring.corners - 1)] : last_across) =
+        before % 2 == 0 ? u : v;
     ring.regions[static_cast<std::size_t>(ring.corners++)] = around[i];
     ring.least_level = std::min(ring.least_level, int(around[i].level));
   }
@@ -99,7 +102,8 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   return ring;
 }
 
-std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring) {
+std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge,
+                                        const RegionRing& ring) {
   if (!ring.has_polygon()) return std::nullopt;
   const CellBlocks& cells = regions.cells();
   const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
@@ -113,7 +117,9 @@ std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks
     if (!region.merged() && cells.sheets(region.block, region.cell).sheets != 1) return std::nullopt;
     polygon.points[i] = regions.point(region);
   }
-  const int along = edge.axis == 0 ? edge.sample >> 6 : edge.axis == 1 ? (edge.sample >> 3) & 7 : edge.sample & 7;
+  const int along = edge.axis == 0   ? edge.sample >> 6
+                    : edge.axis == 1 ? (edge.sample >> 3) & 7
+                                     : edge.sample & 7;
   const int level = ring.least_level, before = along & ((1 << level) - 1);
   polygon.start = cells.corner(edge.block, edge.sample);
   polygon.start[edge.axis] -= before;
@@ -121,7 +127,8 @@ std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks
   polygon.outwards = test(cells[edge.block].inside, edge.sample);
   const double margin = cells.margin();
   const double hit =
-      before + std::clamp(double(cells.grid().crossing(edge.block, edge.sample, edge.axis).offset), margin, 1.0 - margin);
+      before + std::clamp(double(cells.grid().crossing(edge.block, edge.sample, edge.axis).offset), margin,
+                          1.0 - margin);
   std::array<EnvelopeCorner, 4> r;
   for (int i = 0; i < polygon.corners; ++i) {
     const Vector3d p = (polygon.points[i] - polygon.start) / polygon.length;
@@ -134,7 +141,8 @@ std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks
     // From below the plane to above, so that the polygon on the other side of the face finds the same bits.
     const Vector3d *a = &polygon.points[i], *b = &polygon.points[polygon.next(i)];
     if ((*a)[side.across] > (*b)[side.across]) std::swap(a, b);
-    side.place = *a + (polygon.start[side.across] - (*a)[side.across]) / ((*b)[side.across] - (*a)[side.across]) * (*b - *a);
+    side.place = *a + (polygon.start[side.across] - (*a)[side.across]) /
+                          ((*b)[side.across] - (*a)[side.across]) * (*b - *a);
     hold_if_needed(regions, polygon, i);
   }
   if (polygon.cut.fanned) polygon.cut.height = hit / polygon.length;

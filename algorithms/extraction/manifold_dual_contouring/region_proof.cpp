@@ -35,7 +35,9 @@ class RegionProof {
                     [&](std::size_t b) { open_[b] = regions_.outer_edges(static_cast<std::int32_t>(b)); });
     for (std::size_t b = 0; b < cells_.size(); ++b) {
       const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
-      turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 | ((lower[2] >> 3) & 1))].push_back(static_cast<std::uint32_t>(b));
+      turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 |
+                                      ((lower[2] >> 3) & 1))]
+          .push_back(static_cast<std::uint32_t>(b));
     }
   }
 
@@ -56,8 +58,8 @@ class RegionProof {
   }
 
   void look_at_polygons() {
-    // A cube has polygons in its own block and those next to it, and of these no two in one turn: what is split does not depend
-    // on threads.
+    // A cube has polygons in its own block and those next to it, and of these no two in one turn: what is
+    // split does not depend on threads.
     for (const std::vector<std::uint32_t>& turn : turns_)
       parallel_blocks(turn.size(), context_, [&](std::size_t i) {
         const std::size_t b = turn[i];
@@ -65,7 +67,8 @@ class RegionProof {
           for (int word = 0; word < 8; ++word) {
             std::uint64_t& open = open_[b][axis][word];
             for (std::uint64_t bits = open; bits != 0; bits &= bits - 1)
-              if (holds({static_cast<std::int32_t>(b), 64 * word + std::countr_zero(bits), axis})) open &= ~(bits & -bits);
+              if (holds({static_cast<std::int32_t>(b), 64 * word + std::countr_zero(bits), axis}))
+                open &= ~(bits & -bits);
           }
       });
   }
@@ -73,7 +76,8 @@ class RegionProof {
   /// Bits of a cube in each of its words of a mask.
   static std::uint64_t rows_of(const Region& cube) {
     std::uint64_t rows = 0;
-    for (int y = 0; y < cube.side(); ++y) rows |= ((std::uint64_t{1} << cube.side()) - 1) << ((cube.cell & 63) + 8 * y);
+    for (int y = 0; y < cube.side(); ++y)
+      rows |= ((std::uint64_t{1} << cube.side()) - 1) << ((cube.cell & 63) + 8 * y);
     return rows;
   }
 
@@ -82,7 +86,9 @@ class RegionProof {
     const RegionRing ring = ring_of(regions_, edge);
     if (!ring.has_polygon() || !ring.any_merged) return true;
     for (int i = 0; i < ring.corners; ++i)
-      if (const Region& region = ring.regions[static_cast<std::size_t>(i)]; region.merged() && bold_[regions_.number(region)]) return false;
+      if (const Region& region = ring.regions[static_cast<std::size_t>(i)];
+          region.merged() && bold_[regions_.number(region)])
+        return false;
     const std::optional<RegionPolygon> polygon = polygon_of(regions_, edge, ring);
     if (polygon && is_manifold(*polygon) && shell_.holds(*polygon)) return true;
     Region largest = ring.regions[0];
@@ -94,7 +100,8 @@ class RegionProof {
 
   /// Whether the edge that its envelope is made of is crossed once: else several polygons would share that.
   bool is_crossed_once(const RegionPolygon& polygon) const {
-    const int axis = polygon.axis(), length = static_cast<int>(polygon.length), sample = polygon.crossing.sample;
+    const int axis = polygon.axis(), length = static_cast<int>(polygon.length),
+              sample = polygon.crossing.sample;
     int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7}, crossings = 0;
     at[axis] &= ~(length - 1);
     for (int k = 0; k < length; ++k, ++at[axis])
@@ -102,7 +109,8 @@ class RegionProof {
     return crossings == 1;
   }
 
-  /// Whether each two of its regions have one polygon more in common, and no other. A face of a single cell is not ambiguous.
+  /// Whether each two of its regions have one polygon more in common, and no other. A face of a single cell
+  /// is not ambiguous.
   bool is_manifold(const RegionPolygon& polygon) const {
     if (!is_crossed_once(polygon)) return false;
     for (int i = 0; i < polygon.corners; ++i)
@@ -129,7 +137,8 @@ class RegionProof {
           [](int) {});
       for (const Region& cube : here) {
         regions_.split(cube);
-        for (int x = 0; x < cube.side(); ++x) fresh[b][static_cast<std::size_t>((cube.cell >> 6) + x)] |= rows_of(cube);
+        for (int x = 0; x < cube.side(); ++x)
+          fresh[b][static_cast<std::size_t>((cube.cell >> 6) + x)] |= rows_of(cube);
       }
       splits[b] = static_cast<std::uint32_t>(here.size());
     });
@@ -137,7 +146,9 @@ class RegionProof {
     if (all == 0) return 0;
     parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
       const auto& neighbours = cells_.source(static_cast<std::int32_t>(b)).neighbours;
-      if (std::ranges::none_of(neighbours, [&](std::int32_t there) { return there >= 0 && splits[static_cast<std::size_t>(there)] > 0; }))
+      if (std::ranges::none_of(neighbours, [&](std::int32_t there) {
+            return there >= 0 && splits[static_cast<std::size_t>(there)] > 0;
+          }))
         return;
       const BlockMask stirred = widened<1>([&](int ax, int ay, int az) -> const BlockMask* {
         const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(ax, ay, az))];
@@ -145,7 +156,8 @@ class RegionProof {
       });
       const std::array<BlockMask, 3> edges = regions_.outer_edges(static_cast<std::int32_t>(b));
       for (std::size_t axis = 0; axis < 3; ++axis)
-        for (std::size_t word = 0; word < 8; ++word) open_[b][axis][word] |= edges[axis][word] & stirred[word];
+        for (std::size_t word = 0; word < 8; ++word)
+          open_[b][axis][word] |= edges[axis][word] & stirred[word];
     });
     return all;
   }
@@ -154,9 +166,10 @@ class RegionProof {
   const CellBlocks& cells_;
   const RegionShell shell_;
   RunContext& context_;
-  std::vector<std::uint8_t> bold_;              ///< by cube: to be split
-  std::vector<std::array<BlockMask, 3>> open_;  ///< by block and axis: edges whose polygons are not known to be near
-  std::vector<std::uint8_t> any_bold_;          ///< by block
+  std::vector<std::uint8_t> bold_;  ///< by cube: to be split
+  std::vector<std::array<BlockMask, 3>>
+      open_;                            ///< by block and axis: edges whose polygons are not known to be near
+  std::vector<std::uint8_t> any_bold_;  ///< by block
   std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };

@@ -18,9 +18,10 @@ namespace {
 using Eigen::Vector3d;
 using shell_kernels::Planes;
 
-/// Heights of prisms in voxels, but for the tolerance itself. Where prisms are low there is less to look at, and small triangles have no
-/// high ones. Neighbours may have prisms of different heights: on the wall between them each line meets S once in either.
-constexpr double kMiddle = 0.5, kLow = 0.125;
+/// Heights of prisms in voxels, but for the tolerance itself. Where prisms are low there is less to look at,
+/// and small triangles have no high ones. Neighbours may have prisms of different heights: on the wall
+/// between them each line meets S once in either.
+constexpr double kFirst = 0.5, kLow = 0.125;
 
 /// Of distances within a block from planes a few blocks away, far above what single precision makes of them.
 constexpr float kSingleRounding = 1e-4f;
@@ -34,7 +35,8 @@ class ShellPlanes {
       for (int end = 0; end < 2; ++end) {
         const double lean = prism.leans()[static_cast<std::size_t>(side)][static_cast<std::size_t>(end)];
         const double length = std::sqrt(1 + lean * lean);  // divided by it, so that rounding weighs alike
-        set(2 * side + end, (axes.row(side) - lean * axes.row(3)).transpose() / length, (offsets[side] - lean * offsets[3]) / length);
+        set(2 * side + end, (axes.row(side) - lean * axes.row(3)).transpose() / length,
+            (offsets[side] - lean * offsets[3]) / length);
       }
     set(Planes::kLid, prism.lid().normal(), -prism.lid().signedDistance(origin));
     set(Planes::kBottom, prism.bottom().normal(), -prism.bottom().signedDistance(origin));
@@ -43,7 +45,8 @@ class ShellPlanes {
   /// For points relative to `corner`.
   const Planes& relative_to(const Vector3d& corner) {
     const Vector3d step = corner - origin_;
-    for (std::size_t p = 0; p < Planes::kAll; ++p) planes_.offsets[p] = static_cast<float>(offsets_[p] - normals_[p].dot(step));
+    for (std::size_t p = 0; p < Planes::kAll; ++p)
+      planes_.offsets[p] = static_cast<float>(offsets_[p] - normals_[p].dot(step));
     return planes_;
   }
 
@@ -92,7 +95,8 @@ struct RegionShell::Scratch {
   /// Whether the cell of this point belongs to one of the regions: points lie in their cells.
   bool is_own(const Vector3d& p, int regions) const {
     for (std::size_t i = 0; i < static_cast<std::size_t>(regions); ++i)
-      if ((p.array() > cubes[i].first.array()).all() && (p.array() < cubes[i].second.array()).all()) return true;
+      if ((p.array() > cubes[i].first.array()).all() && (p.array() < cubes[i].second.array()).all())
+        return true;
     return false;
   }
   bool is_own(const Corners& points, int regions) const {
@@ -100,8 +104,9 @@ struct RegionShell::Scratch {
   }
 };
 
-RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
-                         std::span<const float> tolerance, RunContext& context)
+RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons,
+                         const std::vector<Vector3d>& points, std::span<const float> tolerance,
+                         RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),
       polygons_(polygons),
@@ -116,10 +121,13 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
       }) {
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b)
-    for (const BlockMask& crossing : cells_.source(static_cast<std::int32_t>(b)).crossing) first[b] += static_cast<std::uint64_t>(count(crossing));
+    for (const BlockMask& crossing : cells_.source(static_cast<std::int32_t>(b)).crossing)
+      first[b] += static_cast<std::uint64_t>(count(crossing));
   quads_.resize(exclusive_scan(first, "edge crossings"));
-  for (LargeArray<float>& coordinates : in_blocks_) coordinates.resize(cells_.point_count() + shell_kernels::kLargestVector);
-  parallel_blocks(cells_.size(), context, [&](std::size_t b) { describe(static_cast<std::int32_t>(b), first[b]); });
+  for (LargeArray<float>& coordinates : in_blocks_)
+    coordinates.resize(cells_.point_count() + shell_kernels::kLargestVector);
+  parallel_blocks(cells_.size(), context,
+                  [&](std::size_t b) { describe(static_cast<std::int32_t>(b), first[b]); });
 }
 
 RegionShell::~RegionShell() = default;
@@ -130,13 +138,16 @@ void RegionShell::describe(std::int32_t block, std::uint64_t first_quad) {
   near.read(cells_, block);
   cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
     Quad& quad = quads_[first_quad++];
-    if (!polygons_.is_fanned(edge)) polygons_.polygons_of(edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {}, &near);
+    if (!polygons_.is_fanned(edge))
+      polygons_.polygons_of(
+          edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {}, &near);
   });
   const Vector3d corner = cells_.corner(block, 0);
   const std::uint32_t first = cells_[block].first_point, count = cells_.points_in(block);
   for (std::uint32_t point = first; point < first + count; ++point)
     for (std::size_t a = 0; a < 3; ++a)
-      in_blocks_[a][point] = static_cast<float>(points_[point][static_cast<int>(a)] - corner[static_cast<int>(a)]);
+      in_blocks_[a][point] =
+          static_cast<float>(points_[point][static_cast<int>(a)] - corner[static_cast<int>(a)]);
 }
 
 void RegionShell::gather(const RegionPolygon& polygon, double height, Nearby& nearby) const {
@@ -156,7 +167,8 @@ void RegionShell::gather(const RegionPolygon& polygon, double height, Nearby& ne
     to[a] = static_cast<int>(std::floor(upper[a] + height)) + 1;
   }
   std::array<Vector3d, 4> corners;
-  for (int i = 0; i < polygon.corners; ++i) corners[static_cast<std::size_t>(i)] = cells_.corner(polygon.regions[i].block, 0);
+  for (int i = 0; i < polygon.corners; ++i)
+    corners[static_cast<std::size_t>(i)] = cells_.corner(polygon.regions[i].block, 0);
   int first_step[3], last_step[3];  // in blocks, from the first region's
   for (int a = 0; a < 3; ++a) {
     first_step[a] = (from[a] - 1 - int(corners[0][a])) >> 3;
@@ -171,14 +183,16 @@ void RegionShell::gather(const RegionPolygon& polygon, double height, Nearby& ne
           const Vector3d step = (corner - corners[static_cast<std::size_t>(i)]) / 8;
           if (step.cwiseAbs().maxCoeff() > 1) continue;
           const int slot = neighbour_slot(int(step[0]), int(step[1]), int(step[2]));
-          const std::int32_t block = cells_.source(polygon.regions[i].block).neighbours[static_cast<std::size_t>(slot)];
+          const std::int32_t block =
+              cells_.source(polygon.regions[i].block).neighbours[static_cast<std::size_t>(slot)];
           if (block >= 0) gather(block, corner, from, to, nearby);
           break;
         }
       }
 }
 
-void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (&from)[3], const int (&to)[3], Nearby& nearby) const {
+void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (&from)[3], const int (&to)[3],
+                         Nearby& nearby) const {
   int begin[3], end[3];
   for (int a = 0; a < 3; ++a) {
     begin[a] = std::max(0, from[a] - int(corner[a]));
@@ -191,11 +205,14 @@ void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (
   for (int x = std::max(0, from[0] - 1 - int(corner[0])); x < end[0]; ++x) {
     const std::uint64_t word = own.active[static_cast<std::size_t>(x)];
     if (const int points = bits_in(word & until & ~before))
-      nearby.runs.push_back({own.first_point + own.rank[static_cast<std::size_t>(x)] + static_cast<std::uint32_t>(bits_in(word & before)), points, corner});
+      nearby.runs.push_back({own.first_point + own.rank[static_cast<std::size_t>(x)] +
+                                 static_cast<std::uint32_t>(bits_in(word & before)),
+                             points, corner});
   }
   if (!own.several.empty()) {
     const std::uint32_t end_of_points = own.first_point + cells_.points_in(block);
-    for (std::uint32_t first = own.first_point + static_cast<std::uint32_t>(count(own.active)); first < end_of_points; first += shell_kernels::kMost)
+    for (std::uint32_t first = own.first_point + static_cast<std::uint32_t>(count(own.active));
+         first < end_of_points; first += shell_kernels::kMost)
       nearby.runs.push_back({first, std::min(shell_kernels::kMost, int(end_of_points - first)), corner});
   }
   if (begin[0] >= end[0] || begin[1] >= end[1] || begin[2] >= end[2]) return;
@@ -208,7 +225,8 @@ void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (
     for (int x = begin[0]; x < end[0]; ++x) {
       const std::uint64_t all = source.crossing[axis][x];
       if ((all & rows) == 0) continue;
-      std::uint32_t number = first_quad_[static_cast<std::size_t>(block)] + source.before[axis][x] + static_cast<std::uint32_t>(bits_in(all & below));
+      std::uint32_t number = first_quad_[static_cast<std::size_t>(block)] + source.before[axis][x] +
+                             static_cast<std::uint32_t>(bits_in(all & below));
       const std::uint64_t fanned = polygons_.fanned(block, axis)[x];
       for (std::uint64_t word = all & ~below & until; word != 0; word &= word - 1, ++number) {
         const std::uint64_t bit = word & -word;
@@ -216,8 +234,9 @@ void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (
         if ((bit & fanned) == 0)
           nearby.quads.push_back(number);
         else
-          polygons_.polygons_of({block, 64 * x + std::countr_zero(bit), axis}, [](const Quad&) {},
-                                [&](const Triangle& t) { nearby.fans.push_back(t); });
+          polygons_.polygons_of(
+              {block, 64 * x + std::countr_zero(bit), axis}, [](const Quad&) {},
+              [&](const Triangle& t) { nearby.fans.push_back(t); });
       }
     }
 }
@@ -238,14 +257,16 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
     scratch.pillars[RegionPolygon::kMiddle] = Vector3d(n[0], n[1], n[2]).normalized();
     for (int i = 0; i < polygon.corners; ++i)
       scratch.pillars[static_cast<std::size_t>(RegionPolygon::kFirstSide + i)] =
-          (scratch.pillars[static_cast<std::size_t>(i)] + scratch.pillars[static_cast<std::size_t>(polygon.next(i))]).normalized();
+          (scratch.pillars[static_cast<std::size_t>(i)] +
+           scratch.pillars[static_cast<std::size_t>(polygon.next(i))])
+              .normalized();
   }
   scratch.is_there = false;
   scratch.highest = most;
   unsigned open = ~0u;
   double before = 0;
   const double lowest = std::min(kLow, most);
-  for (const double height : {std::min(kMiddle, most), most, lowest}) {
+  for (const double height : {std::min(kFirst, most), most, lowest}) {
     if (std::exchange(before, height) == height) continue;
     scratch.height = height;
     gather(polygon, height, scratch.nearby);
@@ -266,7 +287,8 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
 }
 
 /// No exact number is needed where points keep off the prism's planes: then they are told by kernels.
-RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const {
+RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::array<int, 3>& corners,
+                                      Scratch& scratch) const {
   const auto pillar = [&](std::size_t i) { return scratch.pillars[static_cast<std::size_t>(corners[i])]; };
   const ShellPrism prism({polygon.place(corners[0]), polygon.place(corners[1]), polygon.place(corners[2])},
                          {pillar(0), pillar(1), pillar(2)}, scratch.height);
@@ -281,7 +303,8 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::a
   for (const Nearby::Run& run : scratch.nearby.runs) {
     if (corner != run.corner) relative = &planes.relative_to(corner = run.corner);
     const shell_kernels::Found found = classify_(
-        {&in_blocks_[0][run.first], &in_blocks_[1][run.first], &in_blocks_[2][run.first], run.count}, *relative, certain.data());
+        {&in_blocks_[0][run.first], &in_blocks_[1][run.first], &in_blocks_[2][run.first], run.count},
+        *relative, certain.data());
     std::memcpy(&scratch.certain[run.first], certain.data(), static_cast<std::size_t>(run.count));
     const auto any_own = [&](std::uint64_t bits) {
       for (; bits != 0; bits &= bits - 1)
@@ -293,7 +316,9 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::a
     if (!is_there && found.inside) is_there = any_own(found.inside);
   }
 
-  const auto tolerance_of = [&](const Triangle& t) { return double(std::min({tolerance_[t[0]], tolerance_[t[1]], tolerance_[t[2]]})); };
+  const auto tolerance_of = [&](const Triangle& t) {
+    return double(std::min({tolerance_[t[0]], tolerance_[t[1]], tolerance_[t[2]]}));
+  };
   const auto faces = [&](const Triangle& t) {
     const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
     return std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; });
@@ -308,12 +333,15 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::a
   const bool tolerated = double(least_tolerance_) >= prism.height();
   for (const std::uint32_t number : scratch.nearby.quads) {
     const Quad& q = quads_[number];
-    const unsigned a = scratch.certain[q[0]], b = scratch.certain[q[1]], c = scratch.certain[q[2]], d = scratch.certain[q[3]];
+    const unsigned a = scratch.certain[q[0]], b = scratch.certain[q[1]], c = scratch.certain[q[2]],
+                   d = scratch.certain[q[3]];
     const unsigned ac = a & c;
     if (ac & b & d & shell_kernels::kOut) continue;
-    for (const auto& [all, t] : {std::pair{ac & b, Triangle{q[0], q[1], q[2]}}, {ac & d, Triangle{q[0], q[2], q[3]}}}) {
+    for (const auto& [all, t] :
+         {std::pair{ac & b, Triangle{q[0], q[1], q[2]}}, {ac & d, Triangle{q[0], q[2], q[3]}}}) {
       if (all & shell_kernels::kOut) continue;
-      if ((all & shell_kernels::kBetweenLids) && (tolerated || tolerance_of(t) >= prism.height()) && faces(t)) {
+      if ((all & shell_kernels::kBetweenLids) && (tolerated || tolerance_of(t) >= prism.height()) &&
+          faces(t)) {
         if (!is_there) good.push_back(t);
       } else if (!holds(t)) {
         return Answer::perhaps;

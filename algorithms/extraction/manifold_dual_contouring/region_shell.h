@@ -23,25 +23,29 @@ namespace hermesh {
 
 /// Of merged polygons T beside the uniform mesh S: a shell about T (Jiang et al. 2020).
 ///
-/// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between the corners of a
-/// triangle directions are interpolated; over each triangle stands a prism, as far up and down its pillars as the tolerance, and
-/// prisms of neighbours share a wall. It is shown that
-///   - pillars rise over their triangles and neither meet nor cross, so that a place in a prism lies on one line of it;
-///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and stay between its lid and
+/// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between
+/// the corners of a triangle directions are interpolated; over each triangle stands a prism, as far up and
+/// down its pillars as the tolerance, and prisms of neighbours share a wall. It is shown that
+///   - pillars rise over their triangles and neither meet nor cross, so that a place in a prism lies on one
+///   line of it;
+///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and stay
+///   between its lid and
 ///     its bottom;
 ///   - S is there, a triangle of one of the cells that the polygon's regions are made of.
-/// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at all, because the
-/// lines that do are an open and a closed set: S has no border, and leaves by the walls alone. So each point of T has one of S
-/// no farther away than the tolerance. And as S comes to T's neighbours' prisms through the walls, all of it is in prisms: each
-/// point of S has one of T no farther away. Where no cell is merged T is S, and the point that a line meets is its own.
+/// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at
+/// all, because the lines that do are an open and a closed set: S has no border, and leaves by the walls
+/// alone. So each point of T has one of S no farther away than the tolerance. And as S comes to T's
+/// neighbours' prisms through the walls, all of it is in prisms: each point of S has one of T no farther
+/// away. Where no cell is merged T is S, and the point that a line meets is its own.
 class RegionShell {
  public:
   /// Farther than this nothing is shown, whatever the tolerance, in voxels.
   static constexpr double kFarthest = 2.0;
 
   /// @param tolerance by point, those on fanned edges included; voxels
-  RegionShell(const Regions& regions, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
-              std::span<const float> tolerance, RunContext& context);
+  RegionShell(const Regions& regions, const EdgePolygons& polygons,
+              const std::vector<Eigen::Vector3d>& points, std::span<const float> tolerance,
+              RunContext& context);
   ~RegionShell();
 
   /// Safe to call for several polygons at once.
@@ -54,7 +58,8 @@ class RegionShell {
 
   void describe(std::int32_t block, std::uint64_t first_quad);
   void gather(const RegionPolygon& polygon, double height, Nearby& nearby) const;
-  void gather(std::int32_t block, const Eigen::Vector3d& corner, const int (&from)[3], const int (&to)[3], Nearby& nearby) const;
+  void gather(std::int32_t block, const Eigen::Vector3d& corner, const int (&from)[3], const int (&to)[3],
+              Nearby& nearby) const;
   Answer look(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
   Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
@@ -64,9 +69,10 @@ class RegionShell {
   const std::vector<Eigen::Vector3d>& points_;
   const std::span<const float> tolerance_;
   float least_tolerance_;
-  std::vector<std::uint32_t> first_quad_;       ///< by block: that of its first crossing edge
-  LargeArray<Quad> quads_;                      ///< by crossing edge, as EdgePolygons cuts it; undefined for a fanned one
-  std::array<LargeArray<float>, 3> in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
+  std::vector<std::uint32_t> first_quad_;  ///< by block: that of its first crossing edge
+  LargeArray<Quad> quads_;  ///< by crossing edge, as EdgePolygons cuts it; undefined for a fanned one
+  std::array<LargeArray<float>, 3>
+      in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
   shell_kernels::Classify* const classify_ = shell_kernels::chosen();
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Scratch>> scratch_;
 };

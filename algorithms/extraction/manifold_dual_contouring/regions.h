@@ -63,11 +63,13 @@ class Regions {
   std::uint32_t number(const Region& cube) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
     const std::uint64_t before = (std::uint64_t{1} << cube_of(cube.cell, cube.level)) - 1;
-    return own.first_cube[cube.level - 1u] + static_cast<std::uint32_t>(bits_in(own.proposed[cube.level - 1u] & before));
+    return own.first_cube[cube.level - 1u] +
+           static_cast<std::uint32_t>(bits_in(own.proposed[cube.level - 1u] & before));
   }
   /// Gives way to the cubes that were proposed within it, or to single cells.
   void split(const Region& region) {
-    blocks_[static_cast<std::size_t>(region.block)].alive[region.level - 1] &= ~(std::uint64_t{1} << cube_of(region.cell, region.level));
+    blocks_[static_cast<std::size_t>(region.block)].alive[region.level - 1] &=
+        ~(std::uint64_t{1} << cube_of(region.cell, region.level));
   }
 
   void split_all() {

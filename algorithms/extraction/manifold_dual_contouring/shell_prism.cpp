@@ -23,8 +23,9 @@ struct Extent {
   bool empty() const { return lowest > highest; }
 };
 
-/// Of the prism that is as wide, or as narrow, as the leans of a side's two pillars allow at each height: above the triangle's
-/// plane that is one plane, below it another. What reaches less than kRounding into it is not there.
+/// Of the prism that is as wide, or as narrow, as the leans of a side's two pillars allow at each height:
+/// above the triangle's plane that is one plane, below it another. What reaches less than kRounding into it
+/// is not there.
 Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
   Extent extent;
   for (const double up : {1.0, -1.0}) {
@@ -42,7 +43,9 @@ Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
     }
     if (farthest < 0 || nearest >= prism.height()) continue;
     const Extent there = up > 0 ? Extent{nearest, farthest} : Extent{-farthest, -nearest};
-    extent = extent.empty() ? there : Extent{std::min(extent.lowest, there.lowest), std::max(extent.highest, there.highest)};
+    extent = extent.empty()
+                 ? there
+                 : Extent{std::min(extent.lowest, there.lowest), std::max(extent.highest, there.highest)};
   }
   return extent;
 }
@@ -77,14 +80,16 @@ double ShellPrism::lean(const Vector3d& pillar, std::size_t side) const {
   return over_.frame().axes.row(static_cast<int>(side)).dot(pillar) / pillar.dot(over_.normal());
 }
 
-/// The map from a point of the triangle and a height to a place turns nothing over: the triangle that the pillars make at
-/// any height faces up along each of them. A quadratic function of the height, bounded by its coefficients.
+/// The map from a point of the triangle and a height to a place turns nothing over: the triangle that the
+/// pillars make at any height faces up along each of them. A quadratic function of the height, bounded by its
+/// coefficients.
 bool ShellPrism::is_unfolded(const Corners& corners) const {
   const Vector3d e = corners[1] - corners[0], f = corners[2] - corners[0];
   const Vector3d de = pillars_[1] - pillars_[0], df = pillars_[2] - pillars_[0];
   const Vector3d constant = e.cross(f), linear = e.cross(df) + de.cross(f), square = de.cross(df);
   return std::ranges::all_of(pillars_, [&](const Vector3d& pillar) {
-    return constant.dot(pillar) - height_ * std::abs(linear.dot(pillar)) - height_ * height_ * std::abs(square.dot(pillar)) >
+    return constant.dot(pillar) - height_ * std::abs(linear.dot(pillar)) -
+               height_ * height_ * std::abs(square.dot(pillar)) >
            kRounding * (e.squaredNorm() + f.squaredNorm());
   });
 }
@@ -99,20 +104,24 @@ bool ShellPrism::keeps_its_corners(const Corners& corners) const {
 
 ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
   // Eigen's planes face those that see the points clockwise.
-  return Plane::Through(corners[0] + up * pillars_[0], corners[2] + up * pillars_[2], corners[1] + up * pillars_[1]);
+  return Plane::Through(corners[0] + up * pillars_[0], corners[2] + up * pillars_[2],
+                        corners[1] + up * pillars_[1]);
 }
 
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
   const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
   const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
-  if ((lowest.array() > prism.box().max().array() + kRounding).any() || (highest.array() < prism.box().min().array() - kRounding).any())
+  if ((lowest.array() > prism.box().max().array() + kRounding).any() ||
+      (highest.array() < prism.box().min().array() - kRounding).any())
     return Meeting::none;
   const Places places = places_of(prism, triangle);
-  // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are their sums: where one is positive at
-  // all corners, it is on all of the triangle. Sums tell of what is beyond an edge of the prism.
+  // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are
+  // their sums: where one is positive at all corners, it is on all of the triangle. Sums tell of what is
+  // beyond an edge of the prism.
   std::array<std::array<double, 3>, 5> beyond;
   for (std::size_t corner = 0; corner < 3; ++corner) {
-    for (std::size_t side = 0; side < 3; ++side) beyond[side][corner] = prism.beyond_wall(places[corner], side);
+    for (std::size_t side = 0; side < 3; ++side)
+      beyond[side][corner] = prism.beyond_wall(places[corner], side);
     beyond[3][corner] = prism.lid().signedDistance(triangle[corner]);
     beyond[4][corner] = prism.bottom().signedDistance(triangle[corner]);
   }
@@ -121,8 +130,10 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
   const auto above = std::ranges::minmax(beyond[3]), below = std::ranges::minmax(beyond[4]);
   if (above.min > kRounding || below.min > kRounding) return Meeting::none;
   const Vector3d normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
-  const bool faces = std::ranges::all_of(prism.pillars(), [&](const Vector3d& pillar) { return normal.dot(pillar) > 0; });
-  if (faces && tolerance >= prism.height() && above.max < -kRounding && below.max < -kRounding) return Meeting::good;
+  const bool faces =
+      std::ranges::all_of(prism.pillars(), [&](const Vector3d& pillar) { return normal.dot(pillar) > 0; });
+  if (faces && tolerance >= prism.height() && above.max < -kRounding && below.max < -kRounding)
+    return Meeting::good;
   for (std::size_t i = 0; i < 5; ++i)
     for (std::size_t j = i + 1; j < 5; ++j) {
       const auto by = [&](std::size_t corner) { return beyond[i][corner] + beyond[j][corner]; };

@@ -1,4 +1,5 @@
-// What stands over a triangle of a merged mesh, and whether another mesh passes through it once (region_shell.h).
+// What stands over a triangle of a merged mesh, and whether another mesh passes through it once
+// (region_shell.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +11,9 @@
 
 namespace hermesh {
 
-/// The places within a height above and below a triangle, along directions that are given at its corners and interpolated
-/// between. Parts of space beside or above it are known by linear functions: a triangle is there if its corners are.
+/// The places within a height above and below a triangle, along directions that are given at its corners and
+/// interpolated between. Parts of space beside or above it are known by linear functions: a triangle is there
+/// if its corners are.
 class ShellPrism {
  public:
   /// Of coordinates, in voxels, far above what doubles make of it.
@@ -55,13 +57,14 @@ class ShellPrism {
   bool stands_ = false;
 };
 
-/// `good`: what of the triangle is in the prism faces up along all pillars, and is off the lid and the bottom; `none`: nothing is, or
-/// less than kRounding deep.
+/// `good`: what of the triangle is in the prism faces up along all pillars, and is off the lid and the
+/// bottom; `none`: nothing is, or less than kRounding deep.
 enum class Meeting { none, good, bad };
 /// @param tolerance how far from the prism's triangle that part may be
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance);
 
-/// Whether some of a triangle that meets the prism and is good, or is wholly between lid and bottom, is certainly in it.
+/// Whether some of a triangle that meets the prism and is good, or is wholly between lid and bottom, is
+/// certainly in it.
 bool reaches_into(const ShellPrism& prism, const Corners& triangle);
 
 }  // namespace hermesh

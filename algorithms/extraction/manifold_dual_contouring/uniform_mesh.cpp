@@ -43,21 +43,25 @@ class CellRecords {
     bool all_unit = true;
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
-      const std::int32_t there = cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(d[0], d[1], d[2]))];
+      const std::int32_t there =
+          cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(d[0], d[1], d[2]))];
       if (there < 0) continue;
-      const std::uint64_t rows = (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
+      const std::uint64_t rows =
+          (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
       for (int axis = 0; axis < 3; ++axis) {
         if (d[axis]) continue;
         for (int x = 0; x < (d[0] ? 1 : 8); ++x)
-          for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0; word &= word - 1) {
+          for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0;
+               word &= word - 1) {
             const int bit = std::countr_zero(word);
             const EdgeCrossing crossing = cells.grid().crossing(there, 64 * x + bit, axis);
             const auto& n = crossing.normal;
-            const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1], (bit & 7) + 8 * d[2]);
+            const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1],
+                                                                (bit & 7) + 8 * d[2]);
             written_.push_back(number);
             records_[static_cast<std::size_t>(number)] = {
-                static_cast<float>(std::clamp(double(crossing.offset), cells.margin(), 1.0 - cells.margin())), n[axis], n[(axis + 1) % 3],
-                n[(axis + 2) % 3]};
+                static_cast<float>(std::clamp(double(crossing.offset), cells.margin(), 1.0 - cells.margin())),
+                n[axis], n[(axis + 1) % 3], n[(axis + 2) % 3]};
             all_unit = all_unit && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0.5f;
           }
       }
@@ -67,7 +71,8 @@ class CellRecords {
   const float (*data() const)[4] { return reinterpret_cast<const float(*)[4]>(records_.data()); }
 
  private:
-  std::vector<std::array<float, 4>> records_ = std::vector<std::array<float, 4>>(leaf_kernels::RecordCube::kAll);
+  std::vector<std::array<float, 4>> records_ =
+      std::vector<std::array<float, 4>>(leaf_kernels::RecordCube::kAll);
   std::vector<int> written_;
 };
 
@@ -118,12 +123,15 @@ class Contourer {
   }
 
   /// Whether the cell's corners tell all.
-  bool is_plain(std::int32_t block, int cell, int signs) const { return cells_.is_plain(signs) && !cells_.is_joint(block, cell); }
+  bool is_plain(std::int32_t block, int cell, int signs) const {
+    return cells_.is_plain(signs) && !cells_.is_joint(block, cell);
+  }
 
   /// Most cells by vector code: plain ones whose planes are nearly parallel. Returns which.
   BlockMask place_flat_cells(std::int32_t block, std::vector<Vector3d>& points) const {
     BlockMask placed{};
-    if (options_.placement == DualContouringOptions::Placement::average || options_.truncation < leaf_kernels::kLeastTruncation)
+    if (options_.placement == DualContouringOptions::Placement::average ||
+        options_.truncation < leaf_kernels::kLeastTruncation)
       return placed;
     thread_local CellRecords records;
     if (!records.read(cells_, block)) return placed;
@@ -152,7 +160,8 @@ class Contourer {
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
       placed[static_cast<std::size_t>(cell[i] >> 6)] |= std::uint64_t{1} << (cell[i] & 63);
-      points[point[i]] = file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
+      points[point[i]] =
+          file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
     }
     return placed;
   }

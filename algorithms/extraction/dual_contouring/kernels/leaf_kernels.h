@@ -77,7 +77,8 @@ struct FlatCells {
   int count;
   float truncation;  ///< no less than kLeastTruncation
   float margin;      ///< places are so far off the cell's faces
-  /// Square of the distance from the planes, root mean square, where the minimiser lies within the cell, and where it is held there.
+  /// Square of the distance from the planes, root mean square, where the minimiser lies within the cell, and
+  /// where it is held there.
   float most_error, most_error_held;
 };
 
@@ -105,8 +106,8 @@ struct ConnectInput {
   bool mirrors;          ///< turns the quads about
 };
 
-/// Of each cell the minimiser of its quadratic error function, held within the cell; `placed` is 0 where it is another case: more than one
-/// large eigenvalue, or too large an error.
+/// Of each cell the minimiser of its quadratic error function, held within the cell; `placed` is 0 where it
+/// is another case: more than one large eigenvalue, or too large an error.
 /// @param place by axis, from the cell's first corner; room for kLargestVector more
 using PlaceFlat = void(const FlatCells& cells, float* const* place, std::uint8_t* placed);
 

@@ -1,5 +1,6 @@
-// Where many points are beside a prism, compiled for several levels of vector code; all give the same bits. Light and free of the
-// standard library's functions, because what two levels share the linker may take from either.
+// Where many points are beside a prism, compiled for several levels of vector code; all give the same bits.
+// Light and free of the standard library's functions, because what two levels share the linker may take from
+// either.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +14,8 @@ struct Points {
 };
 constexpr int kLargestVector = 16, kMost = 64;
 
-/// How far a place is beyond each of a prism's walls (three, by each of their two pillars), above its lid and below its bottom;
-/// negative inside.
+/// How far a place is beyond each of a prism's walls (three, by each of their two pillars), above its lid and
+/// below its bottom; negative inside.
 struct Planes {
   static constexpr int kLid = 6, kBottom = 7, kAll = 8;
   float normals[kAll][3];
@@ -22,8 +23,8 @@ struct Planes {
   float rounding;       ///< what is less than this is not certain
 };
 
-/// What is certain of a point; polygons all of whose corners are beyond one plane are not in the prism, nor above or below it if
-/// all are between lid and bottom.
+/// What is certain of a point; polygons all of whose corners are beyond one plane are not in the prism, nor
+/// above or below it if all are between lid and bottom.
 enum Certain : std::uint8_t {
   kBeyondWall = 1,  ///< the first wall, and the next two bits the others
   kAboveLid = 8,
