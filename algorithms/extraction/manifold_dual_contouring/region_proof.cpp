@@ -167,9 +167,9 @@ class RegionProof {
   const RegionShell shell_;
   RunContext& context_;
   std::vector<std::uint8_t> bold_;  ///< by cube: to be split
-  std::vector<std::array<BlockMask, 3>>
-      open_;                            ///< by block and axis: edges whose polygons are not known to be near
-  std::vector<std::uint8_t> any_bold_;  ///< by block
+  /// By block and axis: edges whose polygons are not known to be near.
+  std::vector<std::array<BlockMask, 3>> open_;
+  std::vector<std::uint8_t> any_bold_;               ///< by block
   std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };
