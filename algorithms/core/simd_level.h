@@ -21,4 +21,10 @@ SimdLevel parse_simd_level(std::string_view name);
 /// parse_simd_level() does.
 SimdLevel chosen_simd_level();
 
+/// What was compiled for a level, of the same for each of them.
+template <class T>
+const T& of_level(SimdLevel level, const T& sse2, const T& avx2, const T& avx512) {
+  return level == SimdLevel::avx512 ? avx512 : level == SimdLevel::avx2 ? avx2 : sse2;
+}
+
 }  // namespace hermesh

@@ -34,13 +34,7 @@ struct RegionPolygon {
   EnvelopeCut cut;
   Eigen::Vector3d middle;  ///< where the surface passes through the edge; rounded for the file where it is a point of a fan
 
-  bool any_merged() const {
-    for (int i = 0; i < corners; ++i)
-      if (regions[i].merged()) return true;
-    return false;
-  }
   int next(int i) const { return i + 1 < corners ? i + 1 : 0; }
-  int previous(int i) const { return i > 0 ? i - 1 : corners - 1; }
   int axis() const { return crossing.axis; }
   static constexpr int kMiddle = 4, kFirstSide = 5;
   /// By a number that for_each_triangle() gives.

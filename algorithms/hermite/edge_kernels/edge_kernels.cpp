@@ -15,15 +15,7 @@ extern const Kernels kKernels;
 }
 
 const Kernels& chosen() {
-  switch (chosen_simd_level()) {
-    case SimdLevel::avx2:
-      return avx2::kKernels;
-    case SimdLevel::avx512:
-      return avx512::kKernels;
-    case SimdLevel::sse2:
-      break;
-  }
-  return sse2::kKernels;
+  return of_level(chosen_simd_level(), sse2::kKernels, avx2::kKernels, avx512::kKernels);
 }
 
 }  // namespace hermesh::edge_kernels

@@ -61,15 +61,7 @@ std::vector<std::string> levels() {
 namespace {
 
 const Kernels& kernels_of(SimdLevel level) {
-  switch (level) {
-    case SimdLevel::avx2:
-      return avx2::kKernels;
-    case SimdLevel::avx512:
-      return avx512::kKernels;
-    case SimdLevel::sse2:
-      break;
-  }
-  return sse2::kKernels;
+  return of_level(level, sse2::kKernels, avx2::kKernels, avx512::kKernels);
 }
 
 }  // namespace

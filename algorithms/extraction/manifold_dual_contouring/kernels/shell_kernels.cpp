@@ -15,15 +15,7 @@ extern Classify* const kClassify;
 }
 
 Classify* chosen() {
-  switch (chosen_simd_level()) {
-    case SimdLevel::avx2:
-      return avx2::kClassify;
-    case SimdLevel::avx512:
-      return avx512::kClassify;
-    case SimdLevel::sse2:
-      break;
-  }
-  return sse2::kClassify;
+  return of_level(chosen_simd_level(), sse2::kClassify, avx2::kClassify, avx512::kClassify);
 }
 
 }  // namespace hermesh::shell_kernels
