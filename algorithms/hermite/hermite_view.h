@@ -2,6 +2,7 @@
 // each crossing edge.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -31,6 +32,7 @@ class HermiteView {
       return before[axis][word] +
              static_cast<std::uint32_t>(bits_in(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
     }
+    int crossing_count() const { return before[2][7] + bits_in(crossing[2][7]); }
     void count_before() {
       int sum = 0;
       for (int axis = 0; axis < 3; ++axis)
@@ -47,6 +49,8 @@ class HermiteView {
 
   /// Of an edge that is crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
+  /// Of all of a block, in the order of Block::rank(). @param out room for as many, 1536 at most
+  virtual void crossings(std::int32_t block, EdgeCrossing* out) const = 0;
 
  protected:
   /// `leaves` in ascending order; all of them own a crossing edge.
@@ -67,6 +71,12 @@ class SparseView : public HermiteView {
   EdgeCrossing crossing(std::int32_t number, int sample, int axis) const override {
     const Block& block = blocks()[number];
     return read_(hermite_.crossings[hermite_.leaves[block.leaf].first + block.rank(axis, sample)]);
+  }
+  void crossings(std::int32_t number, EdgeCrossing* out) const override {
+    const Block& block = blocks()[number];
+    if (block.leaf < 0) return;
+    const Crossing* first = hermite_.crossings.data() + hermite_.leaves[block.leaf].first;
+    std::transform(first, first + block.crossing_count(), out, read_);
   }
 
  private:

@@ -31,6 +31,12 @@ class CellGrid {
   virtual const IndexToWorld& placement() const = 0;
   /// Of an edge that is crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
+  /// Of all of a block, by axis and then by sample. @param out room for as many, 1536 at most
+  virtual void crossings(std::int32_t block, EdgeCrossing* out) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(blocks()[static_cast<std::size_t>(block)].crossing[static_cast<std::size_t>(axis)],
+                   [&](int sample) { *out++ = crossing(block, sample, axis); });
+  }
   /// By block and axis those crossing edges that are cuts; empty where there are none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
   /// By block the joints that have several sheets or an ambiguous face; empty where there are none.

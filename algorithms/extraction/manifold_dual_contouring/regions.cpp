@@ -52,6 +52,9 @@ class Regions::Proposals {
     corner_ = cells_.corner(block, 0);
     std::uint64_t used = 0;
     std::uint32_t number = cells_.cell_number(block, 0), point = cells_[block].first_point;
+    cells_.grid().crossings(block, crossings_.data());
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      next_[axis] = crossings_.data() + cells_.source(block).before[axis][0];
     for_each_bit(cells_[block].active, [&](int cell) {
       const int cube = cube_of(cell, 1);
       if (!((used >> cube) & 1)) sums_[1][cube] = Sum();
@@ -151,7 +154,7 @@ class Regions::Proposals {
       if (inside == beyond) continue;
       const int level = std::max(level_within(at[(a + 1) % 3]), level_within(at[(a + 2) % 3]));
       if (level <= kLevels) link(cell, level, {cube_of(cell, level), 0, 0});
-      const EdgeCrossing crossing = cells_.grid().crossing(block_, cell, a);
+      const EdgeCrossing& crossing = *next_[static_cast<std::size_t>(a)]++;
       Vector3d p(at[0], at[1], at[2]);
       p[a] += double(crossing.offset);
       const Vector3d n(crossing.normal[0], crossing.normal[1], crossing.normal[2]);
@@ -225,7 +228,9 @@ class Regions::Proposals {
   const FilePoints& file_;
   std::int32_t block_ = 0;
   Vector3d corner_;
-  std::array<std::array<Sum, 64>, kLevels + 1> sums_;  ///< by level and cube
+  std::array<EdgeCrossing, 3 * 512> crossings_;         ///< of the block
+  std::array<const EdgeCrossing*, 3> next_;             ///< by axis: that of the next cell's edge
+  std::array<std::array<Sum, 64>, kLevels + 1> sums_;   ///< by level and cube
   std::array<std::vector<Link>, kLevels + 1> links_;    ///< by level
 };
 

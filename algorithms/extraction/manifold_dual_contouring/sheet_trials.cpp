@@ -32,8 +32,10 @@ class Trials {
     std::vector<Cells> tried(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
+      std::uint32_t number = cells_[block].first_code;
       for_each_bit(cells_[block].active, [&](int cell) {
-        if (is_tried({block, cell})) tried[b].push_back({block, cell});
+        const bool is_plain = cells_.is_plain(cells_.corner_signs(number++)) && !cells_.is_joint(block, cell);
+        if (!is_plain && is_tried({block, cell})) tried[b].push_back({block, cell});
       });
     });
     tried_ = joined(tried);
@@ -77,10 +79,11 @@ class Trials {
   void place_crossings(const FilePoints& file, RunContext& context) {
     points_.resize(polygons_.point_count());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
-        if (polygons_.is_fanned(edge))
+      for (int axis = 0; axis < 3; ++axis)
+        for_each_bit(polygons_.fanned(static_cast<std::int32_t>(b), axis), [&](int sample) {
+          const CellBlocks::Edge edge{static_cast<std::int32_t>(b), sample, axis};
           points_[polygons_.crossing_point(edge)] = file.rounded(cells_.crossing_point(edge));
-      });
+        });
     });
   }
 

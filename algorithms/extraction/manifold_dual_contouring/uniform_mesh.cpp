@@ -41,6 +41,8 @@ class CellRecords {
     for (const int number : written_) std::fill_n(records_[static_cast<std::size_t>(number)].data(), 4, 0.0f);
     written_.clear();
     bool all_unit = true;
+    cells.grid().crossings(block, own_.data());
+    const EdgeCrossing* next = own_.data();
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
       const std::int32_t there =
@@ -54,7 +56,8 @@ class CellRecords {
           for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0;
                word &= word - 1) {
             const int bit = std::countr_zero(word);
-            const EdgeCrossing crossing = cells.grid().crossing(there, 64 * x + bit, axis);
+            const EdgeCrossing crossing =
+                slot == 0 ? *next++ : cells.grid().crossing(there, 64 * x + bit, axis);
             const auto& n = crossing.normal;
             const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1],
                                                                 (bit & 7) + 8 * d[2]);
@@ -74,6 +77,7 @@ class CellRecords {
   std::vector<std::array<float, 4>> records_ =
       std::vector<std::array<float, 4>>(leaf_kernels::RecordCube::kAll);
   std::vector<int> written_;
+  std::vector<EdgeCrossing> own_ = std::vector<EdgeCrossing>(3 * 512);  ///< the block's
 };
 
 class Contourer {
@@ -95,6 +99,8 @@ class Contourer {
  private:
   void place_points(UniformMesh& mesh, RunContext& context) {
     Stage stage(context, "place points");
+    // With room for the few points that come to lie on edges, without which all would move then.
+    mesh.points.reserve(cells_.point_count() + cells_.point_count() / 32);
     mesh.points.resize(cells_.point_count());
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -369,6 +375,7 @@ class HermiteCells : public CellGrid {
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override {
     return view_.crossing(block, sample, axis);
   }
+  void crossings(std::int32_t block, EdgeCrossing* out) const override { view_.crossings(block, out); }
 
  private:
   const HermiteView& view_;
