@@ -20,30 +20,34 @@ bool has_same_regions(const RegionPolygon& a, int i, const RegionPolygon& b, int
   return (a0 == b0 && a1 == b1) || (a0 == b1 && a1 == b0);
 }
 
-/// Counts per block, then fills.
+/// Makes the polygons block by block, with names instead of numbers, and numbers them when all points are
+/// known.
 class Filling {
  public:
-  Filling(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points, RunContext& context)
+  Filling(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
+          RunContext& context)
       : regions_(regions),
         cells_(regions.cells()),
         polygons_(polygons),
         points_(points),
         context_(context),
-        number_(polygons.point_count()),
-        cube_number_(regions.cube_count()),
-        made_(cells_.size()) {}
+        first_cube_(static_cast<std::uint32_t>(polygons.point_count())),
+        number_(polygons.point_count() + regions.cube_count()),
+        made_(cells_.size()) {
+    check_indices(number_.size(), "points and cubes");
+  }
 
   RegionMesh run() {
     const std::size_t n = cells_.size();
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
     parallel_blocks(n, context_, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
+      Made& made = made_[b];
       for_each_cell_point(block, [&](const Region&) { ++points[b]; }, [&](std::uint32_t) { ++points[b]; });
-      for_each_polygon(
-          block, false, [&](const Quad&) { ++quads[b]; }, [&](const Triangle&) { ++triangles[b]; },
-          [&](const CellBlocks::Edge& edge) { made_[b].kept.push_back(polygons_.crossing_point(edge)); },
-          [&](const RegionPolygon& fan) { make_points(fan, made_[b]); });
-      points[b] += made_[b].kept.size() + made_[b].places.size();
+      regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) { make(edge, made); });
+      points[b] += made.kept.size() + made.places.size();
+      quads[b] = made.quads.size();
+      triangles[b] = made.triangles.size() + made.fan_triangles;
     });
     RegionMesh mesh;
     mesh.points.resize(exclusive_scan(points, "points"));
@@ -58,7 +62,7 @@ class Filling {
       for_each_cell_point(
           static_cast<std::int32_t>(b),
           [&](const Region& region) {
-            cube_number_[regions_.number(region)] = at;
+            number_[name_of(region)] = at;
             mesh.points[at++] = regions_.point(region);
           },
           keep);
@@ -67,11 +71,17 @@ class Filling {
       std::ranges::copy(made_[b].places, mesh.points.begin() + at);
     });
     parallel_blocks(n, context_, [&](std::size_t b) {
-      Quad* quad = mesh.quads.data() + quads[b];
+      const Made& made = made_[b];
+      const auto numbered = [&](auto polygon) {
+        for (std::uint32_t& corner : polygon) corner = number_[corner];
+        return polygon;
+      };
+      std::ranges::transform(made.quads, mesh.quads.data() + quads[b], numbered);
       Triangle* triangle = mesh.triangles.data() + triangles[b];
-      for_each_polygon(
-          static_cast<std::int32_t>(b), true, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; },
-          [](const CellBlocks::Edge&) {}, [](const RegionPolygon&) {});
+      triangle = std::ranges::transform(made.triangles, triangle, numbered).out;
+      for (const Fan& fan : made.fans)
+        number_fan(*polygon_of(regions_, edge_of(static_cast<std::int32_t>(b), fan.key)),
+                   [&](const Triangle& t) { *triangle++ = t; });
     });
     return mesh;
   }
@@ -82,23 +92,62 @@ class Filling {
     std::uint16_t key;
     std::uint32_t first;  ///< among the block's, until these have numbers
   };
-  /// Points on a block's edges.
+  /// Of a block.
   struct Made {
-    std::vector<std::uint32_t> kept;  ///< those that the uniform mesh has, too
+    std::vector<Quad> quads;  ///< of names: a point's number in the uniform mesh, or first_cube_ and a cube's
+    std::vector<Triangle> triangles;  ///< but for those of fans
+    std::vector<std::uint32_t> kept;  ///< points on edges that the uniform mesh has, too
     std::vector<Fan> fans;            ///< ascending by key
     std::vector<Vector3d> places;     ///< of the fans' points
+    std::size_t fan_triangles = 0;
   };
-  static std::uint16_t key(const CellBlocks::Edge& edge) { return static_cast<std::uint16_t>(edge.axis << 9 | edge.sample); }
+  static std::uint16_t key_of(const CellBlocks::Edge& edge) {
+    return static_cast<std::uint16_t>(edge.axis << 9 | edge.sample);
+  }
+  static CellBlocks::Edge edge_of(std::int32_t block, std::uint16_t key) {
+    return {block, key & 511, key >> 9};
+  }
+  std::uint32_t name_of(const Region& region) const {
+    return region.merged() ? first_cube_ + regions_.number(region)
+                           : cells_.point(region.block, region.cell, 0);
+  }
+
+  void make(const CellBlocks::Edge& edge, Made& made) const {
+    const RegionRing ring = ring_of(regions_, edge);
+    if (!ring.has_polygon()) return;
+    if (!ring.any_merged) {
+      if (polygons_.is_fanned(edge)) made.kept.push_back(polygons_.crossing_point(edge));
+      polygons_.polygons_of(
+          edge, [&](const Quad& q) { made.quads.push_back(q); },
+          [&](const Triangle& t) { made.triangles.push_back(t); });
+      return;
+    }
+    const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
+    if (polygon.cut.fanned) return make_fan(polygon, made);
+    std::array<std::uint32_t, RegionPolygon::kFirstSide + 4> names{};  // only the first four are used
+    for (int i = 0; i < polygon.corners; ++i) names[i] = name_of(polygon.regions[i]);
+    if (polygon.corners == 3) {
+      polygon.for_each_triangle([&](int a, int b, int c) {
+        made.triangles.push_back({names[a], names[b], names[c]});
+      });
+      return;
+    }
+    const int d = polygon.cut.diagonal;
+    Quad q = {names[d], names[d + 1], names[d + 2], names[(d + 3) % 4]};
+    if (!polygon.outwards) std::swap(q[1], q[3]);
+    made.quads.push_back(q);
+  }
 
   /// Of the two polygons beside a side that is held to a point.
   bool owns(const RegionPolygon& polygon, int side) const {
     return polygon.sides[side].held && cells_.comes_first(polygon.crossing, polygon.sides[side].partner);
   }
-  void make_points(const RegionPolygon& fan, Made& made) const {
-    made.fans.push_back({key(fan.crossing), static_cast<std::uint32_t>(made.places.size())});
+  void make_fan(const RegionPolygon& fan, Made& made) const {
+    made.fans.push_back({key_of(fan.crossing), static_cast<std::uint32_t>(made.places.size())});
     made.places.push_back(fan.middle);
     for (int i = 0; i < fan.corners; ++i)
       if (owns(fan, i)) made.places.push_back(fan.sides[i].place);
+    fan.for_each_triangle([&](int, int, int) { ++made.fan_triangles; });
   }
 
   /// Calls cube(Region) and kept(point of the uniform mesh).
@@ -109,12 +158,10 @@ class Filling {
     });
   }
 
-  std::uint32_t number_of(const Region& region) const {
-    return region.merged() ? cube_number_[regions_.number(region)]
-                           : number_[cells_.point(region.block, region.cell, 0)];
-  }
   std::uint32_t middle_of(const CellBlocks::Edge& edge) const {
-    return std::ranges::lower_bound(made_[static_cast<std::size_t>(edge.block)].fans, key(edge), {}, &Fan::key)->first;
+    return std::ranges::lower_bound(made_[static_cast<std::size_t>(edge.block)].fans, key_of(edge), {},
+                                    &Fan::key)
+        ->first;
   }
   std::uint32_t number_of_side(const RegionPolygon& polygon, int side) const {
     std::uint32_t number = middle_of(polygon.crossing);
@@ -122,58 +169,26 @@ class Filling {
     return number;
   }
 
-  /// `numbered` is false as long as there are no numbers, and polygons are only counted. Calls kept_fan(edge)
-  /// for the edges that are fanned as in the uniform mesh, and fan(RegionPolygon) for those that are
-  /// otherwise.
-  template <class OnQuad, class OnTriangle, class OnKept, class OnFan>
-  void for_each_polygon(std::int32_t block, bool numbered, OnQuad&& quad, OnTriangle&& triangle,
-                        OnKept&& kept_fan, OnFan&& fan) const {
-    const auto all_numbered = [&](auto polygon) {
-      if (numbered)
-        for (std::uint32_t& p : polygon) p = number_[p];
-      return polygon;
-    };
-    regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) {
-      const RegionRing ring = ring_of(regions_, edge);
-      if (!ring.has_polygon()) return;
-      if (ring.any_merged) {
-        const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
-        if (polygon.cut.fanned) fan(polygon);
-        return add(polygon, numbered, quad, triangle);
-      }
-      if (polygons_.is_fanned(edge)) kept_fan(edge);
-      polygons_.polygons_of(
-          edge, [&](const Quad& q) { quad(all_numbered(q)); },
-          [&](const Triangle& t) { triangle(all_numbered(t)); });
-    });
-  }
-
-  template <class OnQuad, class OnTriangle>
-  void add(const RegionPolygon& polygon, bool numbered, OnQuad&& quad, OnTriangle&& triangle) const {
+  template <class OnTriangle>
+  void number_fan(const RegionPolygon& fan, OnTriangle&& triangle) const {
     std::array<std::uint32_t, RegionPolygon::kFirstSide + 4> numbers{};
-    if (numbered) {
-      for (int i = 0; i < polygon.corners; ++i) numbers[i] = number_of(polygon.regions[i]);
-      if (polygon.cut.fanned) numbers[RegionPolygon::kMiddle] = middle_of(polygon.crossing);
-      for (int i = 0; i < polygon.corners; ++i) {
-        if (!polygon.sides[i].held) continue;
-        std::uint32_t& number = numbers[RegionPolygon::kFirstSide + i];
-        if (owns(polygon, i)) {
-          number = number_of_side(polygon, i);
-        } else {
-          const RegionPolygon other = *polygon_of(regions_, polygon.sides[i].partner);
-          for (int side = 0; side < other.corners; ++side)
-            if (owns(other, side) && has_same_regions(polygon, i, other, side)) number = number_of_side(other, side);
-        }
+    for (int i = 0; i < fan.corners; ++i) numbers[i] = number_[name_of(fan.regions[i])];
+    numbers[RegionPolygon::kMiddle] = middle_of(fan.crossing);
+    for (int i = 0; i < fan.corners; ++i) {
+      if (!fan.sides[i].held) continue;
+      std::uint32_t& number = numbers[RegionPolygon::kFirstSide + i];
+      if (owns(fan, i)) {
+        number = number_of_side(fan, i);
+      } else {
+        const RegionPolygon other = *polygon_of(regions_, fan.sides[i].partner);
+        for (int side = 0; side < other.corners; ++side)
+          if (owns(other, side) && has_same_regions(fan, i, other, side))
+            number = number_of_side(other, side);
       }
     }
-    if (polygon.corners == 4 && !polygon.cut.fanned) {
-      const int d = polygon.cut.diagonal;
-      Quad q = {numbers[d], numbers[d + 1], numbers[d + 2], numbers[(d + 3) % 4]};
-      if (!polygon.outwards) std::swap(q[1], q[3]);
-      quad(q);
-      return;
-    }
-    polygon.for_each_triangle([&](int a, int b, int c) { triangle({numbers[a], numbers[b], numbers[c]}); });
+    fan.for_each_triangle([&](int a, int b, int c) {
+      triangle(Triangle{numbers[a], numbers[b], numbers[c]});
+    });
   }
 
   const Regions& regions_;
@@ -181,9 +196,9 @@ class Filling {
   const EdgePolygons& polygons_;
   const std::vector<Vector3d>& points_;
   RunContext& context_;
-  std::vector<std::uint32_t> number_;       ///< by the uniform mesh's point
-  std::vector<std::uint32_t> cube_number_;  ///< by cube
-  std::vector<Made> made_;                  ///< by block
+  const std::uint32_t first_cube_;     ///< name of the first
+  std::vector<std::uint32_t> number_;  ///< by name
+  std::vector<Made> made_;             ///< by block
 };
 
 }  // namespace
