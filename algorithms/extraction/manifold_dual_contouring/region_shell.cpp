@@ -5,11 +5,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/manifold_dual_contouring/kernels/shell_kernels.h"
 #include "algorithms/extraction/manifold_dual_contouring/shell_prism.h"
 
 namespace hermesh {
@@ -23,84 +22,61 @@ using shell_kernels::Planes;
 /// between them each line meets S once in either.
 constexpr double kFirst = 0.5, kLow = 0.125;
 
-/// Of distances within a block from planes a few blocks away, far above what single precision makes of them.
+/// What keeps within this cosine of one direction keeps within a right angle of each other.
+constexpr double kUpright = 0.7072;
+
+/// Of places a few blocks away from the one that they are relative to, far above what single precision makes
+/// of them.
 constexpr float kSingleRounding = 1e-4f;
 
-/// Relative to the triangle's first corner.
-class ShellPlanes {
- public:
-  explicit ShellPlanes(const ShellPrism& prism) : origin_(prism.over().frame().origin) {
-    const auto& [axes, origin, offsets] = prism.over().frame();
-    for (int side = 0; side < 3; ++side)
-      for (int end = 0; end < 2; ++end) {
-        const double lean = prism.leans()[static_cast<std::size_t>(side)][static_cast<std::size_t>(end)];
-        const double length = std::sqrt(1 + lean * lean);  // divided by it, so that rounding weighs alike
-        set(2 * side + end, (axes.row(side) - lean * axes.row(3)).transpose() / length,
-            (offsets[side] - lean * offsets[3]) / length);
-      }
-    set(Planes::kLid, prism.lid().normal(), -prism.lid().signedDistance(origin));
-    set(Planes::kBottom, prism.bottom().normal(), -prism.bottom().signedDistance(origin));
-    planes_.rounding = kSingleRounding;
+/// Relative to a place.
+Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
+  Planes planes;
+  const auto set = [&](int plane, const Vector3d& normal, double offset) {
+    for (int a = 0; a < 3; ++a) planes.normals[plane][a] = static_cast<float>(normal[a]);
+    planes.offsets[plane] = static_cast<float>(offset - normal.dot(base));
+  };
+  const auto& [axes, origin, offsets] = prism.over().frame();
+  for (int side = 0; side < 3; ++side) {
+    const auto& [first, second] = prism.leans()[static_cast<std::size_t>(side)];
+    const double lean = (first + second) / 2, length = std::sqrt(1 + lean * lean);
+    const Vector3d normal = (axes.row(side) - lean * axes.row(3)).transpose() / length;
+    set(side, normal, normal.dot(origin) + (offsets[side] - lean * offsets[3]) / length);
+    planes.spread[side] = static_cast<float>(std::abs(first - second) / 2 * prism.height() / length);
   }
-  /// For points relative to `corner`.
-  const Planes& relative_to(const Vector3d& corner) {
-    const Vector3d step = corner - origin_;
-    for (std::size_t p = 0; p < Planes::kAll; ++p)
-      planes_.offsets[p] = static_cast<float>(offsets_[p] - normals_[p].dot(step));
-    return planes_;
-  }
-
- private:
-  void set(int plane, const Vector3d& normal, double offset) {
-    normals_[static_cast<std::size_t>(plane)] = normal;
-    offsets_[static_cast<std::size_t>(plane)] = offset;
-    for (int a = 0; a < 3; ++a) planes_.normals[plane][a] = static_cast<float>(normal[a]);
-  }
-  Vector3d origin_;
-  std::array<Vector3d, Planes::kAll> normals_;
-  std::array<double, Planes::kAll> offsets_;
-  Planes planes_;
-};
+  set(Planes::kLid, prism.lid().normal(), -prism.lid().offset());
+  set(Planes::kBottom, prism.bottom().normal(), -prism.bottom().offset());
+  planes.rounding = kSingleRounding;
+  return planes;
+}
 
 }  // namespace
 
-/// What of S may reach into the prisms of a polygon.
-struct RegionShell::Nearby {
-  /// Points that follow one another, of one block.
-  struct Run {
-    std::uint32_t first;
-    int count;
-    Vector3d corner;
-  };
-  std::vector<Run> runs;  ///< with all corners of the quads
-  std::vector<std::uint32_t> quads;
-  std::vector<Triangle> fans;
-
-  void clear() {
-    runs.clear();
-    quads.clear();
-    fans.clear();
-  }
-};
-
 struct RegionShell::Scratch {
-  Nearby nearby;
   std::array<Vector3d, RegionPolygon::kFirstSide + 4> pillars;
-  std::array<std::pair<Vector3d, Vector3d>, 4> cubes;  ///< of the polygon's regions
-  double height, highest;                              ///< of this prism, of any
-  bool is_there;                                       ///< S has been found in a prism
-  std::vector<std::uint8_t> certain;                   ///< by point, of this prism; only those in runs
-  std::vector<Triangle> good;                          ///< of S, whatever of them is in this prism
+  Vector3d base;                            ///< near the polygon: what single precision is relative to
+  std::array<shell_kernels::Box, 4> cubes;  ///< the polygon's regions
+  int regions;
+  double height, highest;  ///< of these prisms, of any
+  bool is_lowest;
+  std::vector<std::array<int, 3>>
+      open;  ///< triangles of the polygon, by their corners, that are not shown yet
+  std::vector<shell_kernels::Window> windows;  ///< with what of S may reach into their prisms,
+  std::vector<Triangle> fans;                  ///< and its fans there
+  std::vector<ShellPrism> prisms;
+  std::vector<shell_kernels::Candidate> candidates;
+  std::vector<std::uint32_t> certain;
 
-  /// Whether the cell of this point belongs to one of the regions: points lie in their cells.
-  bool is_own(const Vector3d& p, int regions) const {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(regions); ++i)
-      if ((p.array() > cubes[i].first.array()).all() && (p.array() < cubes[i].second.array()).all())
+  /// Whether one of the points is that of a cell of the polygon's regions: points lie in their cells.
+  bool is_own(const Corners& points) const {
+    return std::ranges::any_of(points, [&](const Vector3d& p) {
+      const Vector3d place = p - base;
+      return std::any_of(cubes.begin(), cubes.begin() + regions, [&](const shell_kernels::Box& cube) {
+        for (int a = 0; a < 3; ++a)
+          if (!(place[a] > cube.lower[a] && place[a] < cube.upper[a])) return false;
         return true;
-    return false;
-  }
-  bool is_own(const Corners& points, int regions) const {
-    return std::ranges::any_of(points, [&](const Vector3d& p) { return is_own(p, regions); });
+      });
+    });
   }
 };
 
@@ -113,143 +89,176 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons,
       points_(points),
       tolerance_(tolerance),
       least_tolerance_(tolerance.empty() ? 0.0f : *std::ranges::min_element(tolerance)),
-      first_quad_(cells_.size()),
+      blocks_(cells_.size()),
+      up_(cells_.size()),
       scratch_([&points] {
         auto scratch = std::make_unique<Scratch>();
-        scratch->certain.resize(points.size());
+        scratch->certain.resize(points.size() + shell_kernels::kLargestVector);
         return scratch;
       }) {
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b)
-    for (const BlockMask& crossing : cells_.source(static_cast<std::int32_t>(b)).crossing)
-      first[b] += static_cast<std::uint64_t>(count(crossing));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::size_t x = 0; x < 8; ++x)
+        first[b] += static_cast<std::uint64_t>(bits_in(quads_in(b, axis, x)));
   quads_.resize(exclusive_scan(first, "edge crossings"));
+  upright_.resize(quads_.size());
   for (LargeArray<float>& coordinates : in_blocks_)
     coordinates.resize(cells_.point_count() + shell_kernels::kLargestVector);
   parallel_blocks(cells_.size(), context,
-                  [&](std::size_t b) { describe(static_cast<std::int32_t>(b), first[b]); });
+                  [&](std::size_t b) { describe(b, static_cast<std::uint32_t>(first[b])); });
 }
 
 RegionShell::~RegionShell() = default;
 
-void RegionShell::describe(std::int32_t block, std::uint64_t first_quad) {
-  first_quad_[static_cast<std::size_t>(block)] = static_cast<std::uint32_t>(first_quad);
-  PlainPoints near;
-  near.read(cells_, block);
-  cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
-    Quad& quad = quads_[first_quad++];
-    if (!polygons_.is_fanned(edge))
-      polygons_.polygons_of(
-          edge, [&](const Quad& q) { quad = q; }, [](const Triangle&) {}, &near);
-  });
+std::uint64_t RegionShell::quads_in(std::size_t block, std::size_t axis, std::size_t layer) const {
+  const auto b = static_cast<std::int32_t>(block);
+  return cells_.source(b).crossing[axis][layer] & ~polygons_.fanned(b, static_cast<int>(axis))[layer];
+}
+
+void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
+  const auto block = static_cast<std::int32_t>(b);
+  const CellBlocks::Block& own = cells_[block];
+  shell_kernels::Block& described = blocks_[b];
+  described.active = own.active.data();
+  described.points_before = own.rank.data();
+  described.first_point = own.first_point;
+  const std::uint32_t points = cells_.points_in(block),
+                      cells = own.several.empty() ? points : static_cast<std::uint32_t>(count(own.active));
+  described.first_later = own.first_point + cells;
+  described.later_points = points - cells;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    described.crossing[axis] = cells_.source(block).crossing[axis].data();
+    described.without_quad[axis] = polygons_.fanned(block, static_cast<int>(axis)).data();
+  }
+  described.first_quad = first_quad;
   const Vector3d corner = cells_.corner(block, 0);
-  const std::uint32_t first = cells_[block].first_point, count = cells_.points_in(block);
-  for (std::uint32_t point = first; point < first + count; ++point)
+  for (std::uint32_t point = own.first_point; point < own.first_point + points; ++point)
     for (std::size_t a = 0; a < 3; ++a)
       in_blocks_[a][point] =
           static_cast<float>(points_[point][static_cast<int>(a)] - corner[static_cast<int>(a)]);
+
+  PlainPoints near;
+  near.read(cells_, block);
+  std::uint32_t number = first_quad;
+  for (std::size_t x = 0; x < 8; ++x) {
+    described.quads_before[x] = static_cast<std::uint16_t>(number - first_quad);
+    const std::uint64_t of_axis[3] = {quads_in(b, 0, x), quads_in(b, 1, x), quads_in(b, 2, x)};
+    for (std::uint64_t bits = of_axis[0] | of_axis[1] | of_axis[2]; bits != 0; bits &= bits - 1)
+      for (int axis = 0; axis < 3; ++axis)
+        if (of_axis[axis] & bits & -bits)
+          polygons_.polygons_of(
+              {block, static_cast<int>(64 * x) + std::countr_zero(bits), axis},
+              [&](const Quad& q) { quads_[number++] = q; }, [](const Triangle&) {}, &near);
+  }
+  find_upright(b, first_quad, number);
 }
 
-void RegionShell::gather(const RegionPolygon& polygon, double height, Nearby& nearby) const {
-  nearby.clear();
-  Vector3d lower = polygon.points[0], upper = lower;
+void RegionShell::find_upright(std::size_t block, std::uint32_t first, std::uint32_t end) {
+  const auto normals = [&](const Quad& q) {
+    const Vector3d middle = points_[q[2]] - points_[q[0]];
+    return std::pair<Vector3d, Vector3d>((points_[q[1]] - points_[q[0]]).cross(middle),
+                                         middle.cross(points_[q[3]] - points_[q[0]]));
+  };
+  Vector3d up = Vector3d::Zero();
+  for (std::uint32_t i = first; i < end; ++i) {
+    const auto [a, b] = normals(quads_[i]);
+    up += a + b;
+  }
+  up_[block] = up = up.normalized();
+  const auto is_upright = [&](const Vector3d& normal) {
+    const double along = normal.dot(up);
+    return along > 0 && along * along > kUpright * kUpright * normal.squaredNorm();
+  };
+  for (std::uint32_t i = first; i < end; ++i) {
+    const auto [a, b] = normals(quads_[i]);
+    upright_[i] = is_upright(a) && is_upright(b);
+  }
+}
+
+void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
+  scratch.windows.clear();
+  scratch.fans.clear();
+  Eigen::AlignedBox3d box;
   polygon.for_each_triangle([&](int a, int b, int c) {
-    for (const int corner : {a, b, c}) {
-      const Vector3d place = polygon.place(corner);
-      lower = lower.cwiseMin(place);
-      upper = upper.cwiseMax(place);
-    }
+    for (const int corner : {a, b, c})
+      for (const double up : {scratch.height, -scratch.height})
+        box.extend(polygon.place(corner) + up * scratch.pillars[static_cast<std::size_t>(corner)]);
   });
-  // Edges that touch a cell that the prisms may reach into, and all cells that touch these.
-  int from[3], to[3];
+  const Vector3d lower = box.min() - scratch.base, upper = box.max() - scratch.base;
+  // Edges that touch a cell that the prisms may reach into, and all cells that touch these; from the base.
+  int from[3], to[3], first_step[3], last_step[3];  // steps in blocks
   for (int a = 0; a < 3; ++a) {
-    from[a] = static_cast<int>(std::floor(lower[a] - height));
-    to[a] = static_cast<int>(std::floor(upper[a] + height)) + 1;
+    from[a] = static_cast<int>(std::floor(lower[a] - ShellPrism::kRounding));
+    to[a] = static_cast<int>(std::floor(upper[a] + ShellPrism::kRounding)) + 1;
+    first_step[a] = (from[a] - 1) >> 3;
+    last_step[a] = to[a] >> 3;
   }
-  std::array<Vector3d, 4> corners;
-  for (int i = 0; i < polygon.corners; ++i)
-    corners[static_cast<std::size_t>(i)] = cells_.corner(polygon.regions[i].block, 0);
-  int first_step[3], last_step[3];  // in blocks, from the first region's
-  for (int a = 0; a < 3; ++a) {
-    first_step[a] = (from[a] - 1 - int(corners[0][a])) >> 3;
-    last_step[a] = (to[a] - int(corners[0][a])) >> 3;
-  }
+  const auto lower_of = [&](int region) -> const std::array<std::int32_t, 3>& {
+    return cells_.source(polygon.regions[region].block).lower;
+  };
   for (int x = first_step[0]; x <= last_step[0]; ++x)
     for (int y = first_step[1]; y <= last_step[1]; ++y)
       for (int z = first_step[2]; z <= last_step[2]; ++z) {
-        const Vector3d corner = corners[0] + 8 * Vector3d(x, y, z);
         // The regions' blocks are all those around the polygon's edge, so one of them is next to it.
+        const int steps[3] = {x, y, z};
         for (int i = 0; i < polygon.corners; ++i) {
-          const Vector3d step = (corner - corners[static_cast<std::size_t>(i)]) / 8;
-          if (step.cwiseAbs().maxCoeff() > 1) continue;
-          const int slot = neighbour_slot(int(step[0]), int(step[1]), int(step[2]));
+          int step[3];
+          for (std::size_t a = 0; a < 3; ++a) step[a] = steps[a] - (lower_of(i)[a] - lower_of(0)[a]) / 8;
+          if (std::ranges::any_of(step, [](int by) { return by < -1 || by > 1; })) continue;
           const std::int32_t block =
-              cells_.source(polygon.regions[i].block).neighbours[static_cast<std::size_t>(slot)];
-          if (block >= 0) gather(block, corner, from, to, nearby);
+              cells_.source(polygon.regions[i].block)
+                  .neighbours[static_cast<std::size_t>(neighbour_slot(step[0], step[1], step[2]))];
+          if (block >= 0) gather(block, {8 * x, 8 * y, 8 * z}, from, to, scratch);
           break;
         }
       }
+  std::ranges::sort(scratch.windows, {},
+                    [](const shell_kernels::Window& window) { return window.block->first_point; });
 }
 
-void RegionShell::gather(std::int32_t block, const Vector3d& corner, const int (&from)[3], const int (&to)[3],
-                         Nearby& nearby) const {
-  int begin[3], end[3];
-  for (int a = 0; a < 3; ++a) {
-    begin[a] = std::max(0, from[a] - int(corner[a]));
-    end[a] = std::min(8, to[a] + 1 - int(corner[a]));
-  }
-  const CellBlocks::Block& own = cells_[block];
-  const int first_row = std::max(0, from[1] - 1 - int(corner[1]));
-  const std::uint64_t before = (std::uint64_t{1} << (8 * first_row)) - 1;
-  const std::uint64_t until = end[1] == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << (8 * end[1])) - 1;
-  for (int x = std::max(0, from[0] - 1 - int(corner[0])); x < end[0]; ++x) {
-    const std::uint64_t word = own.active[static_cast<std::size_t>(x)];
-    if (const int points = bits_in(word & until & ~before))
-      nearby.runs.push_back({own.first_point + own.rank[static_cast<std::size_t>(x)] +
-                                 static_cast<std::uint32_t>(bits_in(word & before)),
-                             points, corner});
-  }
-  if (!own.several.empty()) {
-    const std::uint32_t end_of_points = own.first_point + cells_.points_in(block);
-    for (std::uint32_t first = own.first_point + static_cast<std::uint32_t>(count(own.active));
-         first < end_of_points; first += shell_kernels::kMost)
-      nearby.runs.push_back({first, std::min(shell_kernels::kMost, int(end_of_points - first)), corner});
-  }
-  if (begin[0] >= end[0] || begin[1] >= end[1] || begin[2] >= end[2]) return;
-  const std::uint64_t row = ((1u << end[2]) - 1) & ~((1u << begin[2]) - 1);
-  std::uint64_t rows = 0;
-  for (int y = begin[1]; y < end[1]; ++y) rows |= row << (8 * y);
-  const std::uint64_t below = (rows & -rows) - 1;
-  const HermiteView::Block& source = cells_.source(block);
-  for (int axis = 0; axis < 3; ++axis)
-    for (int x = begin[0]; x < end[0]; ++x) {
-      const std::uint64_t all = source.crossing[axis][x];
-      if ((all & rows) == 0) continue;
-      std::uint32_t number = first_quad_[static_cast<std::size_t>(block)] + source.before[axis][x] +
-                             static_cast<std::uint32_t>(bits_in(all & below));
-      const std::uint64_t fanned = polygons_.fanned(block, axis)[x];
-      for (std::uint64_t word = all & ~below & until; word != 0; word &= word - 1, ++number) {
-        const std::uint64_t bit = word & -word;
-        if ((bit & rows) == 0) continue;
-        if ((bit & fanned) == 0)
-          nearby.quads.push_back(number);
-        else
-          polygons_.polygons_of(
-              {block, 64 * x + std::countr_zero(bit), axis}, [](const Quad&) {},
-              [&](const Triangle& t) { nearby.fans.push_back(t); });
-      }
+void RegionShell::gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3],
+                         const int (&to)[3], Scratch& scratch) const {
+  const auto part_from = [&](int below) {
+    int first[3], end[3];
+    for (std::size_t a = 0; a < 3; ++a) {
+      first[a] = std::max(0, from[a] - below - corner[a]);
+      end[a] = std::min(8, to[a] + 1 - corner[a]);
+      if (first[a] >= end[a]) return shell_kernels::Window::Part{};
     }
+    const std::uint64_t row = (1u << end[2]) - (1u << first[2]);
+    // A row for each y, by a product: bits 0, 8, 16 and so on, as many as there are.
+    const std::uint64_t rows = row * (0x0101010101010101u >> (8 * (8 - (end[1] - first[1]))))
+                               << (8 * first[1]);
+    return shell_kernels::Window::Part{rows, first[0], end[0]};
+  };
+  const shell_kernels::Block& described = blocks_[static_cast<std::size_t>(block)];
+  const shell_kernels::Window window{
+      &described, {float(corner[0]), float(corner[1]), float(corner[2])}, part_from(1), part_from(0), 0};
+  scratch.windows.push_back(window);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int x = window.samples.first; x < window.samples.end; ++x)
+      for (std::uint64_t bits = described.without_quad[axis][x] & window.samples.rows; bits != 0;
+           bits &= bits - 1)
+        polygons_.polygons_of(
+            {block, 64 * x + std::countr_zero(bits), axis}, [](const Quad&) {},
+            [&](const Triangle& t) { scratch.fans.push_back(t); });
 }
 
 bool RegionShell::holds(const RegionPolygon& polygon) const {
   Scratch& scratch = *scratch_.local();
+  scratch.regions = polygon.corners;
+  scratch.base = cells_.corner(polygon.regions[0].block, 0);
   double most = kFarthest;
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
     most = std::min(most, double(regions_.tolerance(region)));
     scratch.pillars[static_cast<std::size_t>(i)] = regions_.normal(region);
-    const Vector3d lower = cells_.corner(region.block, region.cell);
-    scratch.cubes[static_cast<std::size_t>(i)] = {lower, lower + Vector3d::Constant(region.side())};
+    const Vector3d lower = cells_.corner(region.block, region.cell) - scratch.base;
+    for (int a = 0; a < 3; ++a) {
+      scratch.cubes[static_cast<std::size_t>(i)].lower[a] = static_cast<float>(lower[a]);
+      scratch.cubes[static_cast<std::size_t>(i)].upper[a] = static_cast<float>(lower[a] + region.side());
+    }
   }
   if (polygon.cut.fanned) {
     const CellBlocks::Edge& edge = polygon.crossing;
@@ -261,99 +270,143 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
            scratch.pillars[static_cast<std::size_t>(polygon.next(i))])
               .normalized();
   }
-  scratch.is_there = false;
+  scratch.open.clear();
+  polygon.for_each_triangle([&](int a, int b, int c) { scratch.open.push_back({a, b, c}); });
   scratch.highest = most;
-  unsigned open = ~0u;
+  bool is_there = false;
   double before = 0;
   const double lowest = std::min(kLow, most);
   for (const double height : {std::min(kFirst, most), most, lowest}) {
     if (std::exchange(before, height) == height) continue;
     scratch.height = height;
-    gather(polygon, height, scratch.nearby);
-    unsigned number = 0, still_open = 0;
-    bool fails = false;
-    polygon.for_each_triangle([&](int a, int b, int c) {
-      const unsigned bit = 1u << number++;
-      if (fails || !(open & bit)) return;
-      const Answer answer = look(polygon, {a, b, c}, scratch);
-      fails = answer == Answer::no || (answer == Answer::perhaps && height == lowest);
-      if (answer != Answer::yes) still_open |= bit;
-    });
-    if (fails) return false;
-    open = still_open;
-    if (open == 0) break;
+    scratch.is_lowest = height == lowest;
+    gather(polygon, scratch);
+    std::size_t still_open = 0;
+    for (std::size_t first = 0; first < scratch.open.size(); first += shell_kernels::kMostPrisms) {
+      const std::size_t some = std::min<std::size_t>(shell_kernels::kMostPrisms, scratch.open.size() - first);
+      const Answer answer = look(polygon, std::span(scratch.open).subspan(first, some), is_there, scratch);
+      if (answer.never) return false;
+      is_there = answer.is_there;
+      for (std::size_t i = first; i < first + some; ++i)
+        if (!((answer.shown >> (i - first)) & 1)) scratch.open[still_open++] = scratch.open[i];
+    }
+    scratch.open.resize(still_open);
+    if (still_open == 0) return is_there;
   }
-  return open == 0 && scratch.is_there;
+  return false;
 }
 
-/// No exact number is needed where points keep off the prism's planes: then they are told by kernels.
-RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, const std::array<int, 3>& corners,
+/// No exact number is needed where points keep off the prisms' planes: then they are told by kernels.
+RegionShell::Answer RegionShell::look(const RegionPolygon& polygon,
+                                      std::span<const std::array<int, 3>> triangles, bool is_there,
                                       Scratch& scratch) const {
-  const auto pillar = [&](std::size_t i) { return scratch.pillars[static_cast<std::size_t>(corners[i])]; };
-  const ShellPrism prism({polygon.place(corners[0]), polygon.place(corners[1]), polygon.place(corners[2])},
-                         {pillar(0), pillar(1), pillar(2)}, scratch.height);
-  if (!prism.stands()) return Answer::perhaps;
-  const auto is_own = [&](const auto& place) { return scratch.is_own(place, polygon.corners); };
-
-  bool is_there = scratch.is_there;
-  ShellPlanes planes(prism);
-  Vector3d corner = Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  const Planes* relative = nullptr;
-  std::array<std::uint8_t, shell_kernels::kMost + shell_kernels::kLargestVector> certain;
-  for (const Nearby::Run& run : scratch.nearby.runs) {
-    if (corner != run.corner) relative = &planes.relative_to(corner = run.corner);
-    const shell_kernels::Found found = classify_(
-        {&in_blocks_[0][run.first], &in_blocks_[1][run.first], &in_blocks_[2][run.first], run.count},
-        *relative, certain.data());
-    std::memcpy(&scratch.certain[run.first], certain.data(), static_cast<std::size_t>(run.count));
-    const auto any_own = [&](std::uint64_t bits) {
-      for (; bits != 0; bits &= bits - 1)
-        if (is_own(points_[run.first + static_cast<std::uint32_t>(std::countr_zero(bits))])) return true;
-      return false;
-    };
-    // What is farther than the tolerance here is not nearer in a lower prism.
-    if (found.beyond && scratch.height == scratch.highest && any_own(found.beyond)) return Answer::no;
-    if (!is_there && found.inside) is_there = any_own(found.inside);
+  constexpr Answer kNever{.shown = 0, .is_there = false, .never = true};
+  std::array<std::size_t, shell_kernels::kMostPrisms> triangle_of;
+  std::array<Planes, shell_kernels::kMostPrisms> planes;
+  std::vector<ShellPrism>& prisms = scratch.prisms;
+  prisms.clear();
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto& [a, b, c] = triangles[i];
+    const auto pillar = [&](int corner) { return scratch.pillars[static_cast<std::size_t>(corner)]; };
+    prisms.emplace_back(Corners{polygon.place(a), polygon.place(b), polygon.place(c)},
+                        std::array{pillar(a), pillar(b), pillar(c)}, scratch.height);
+    if (!prisms.back().stands()) {
+      if (scratch.is_lowest) return kNever;
+      prisms.pop_back();
+      continue;
+    }
+    planes[prisms.size() - 1] = planes_of(prisms.back(), scratch.base);
+    triangle_of[prisms.size() - 1] = i;
   }
+  if (prisms.empty()) return {.shown = 0, .is_there = is_there, .never = false};
+
+  const bool tolerated = double(least_tolerance_) >= scratch.height;
+  for (shell_kernels::Window& window : scratch.windows) {
+    const Vector3d& up = up_[static_cast<std::size_t>(window.block - blocks_.data())];
+    window.facing = 0;
+    for (std::size_t p = 0; p < prisms.size() && tolerated; ++p)
+      if (std::ranges::all_of(prisms[p].pillars(),
+                              [&](const Vector3d& pillar) { return pillar.dot(up) > kUpright; }))
+        window.facing |= 1u << p;
+  }
+  scratch.candidates.resize(std::max(scratch.candidates.size(), 3 * 512 * scratch.windows.size()));
+  const auto find = [&] {
+    const shell_kernels::Surface surface{
+        in_blocks_[0].data(), in_blocks_[1].data(),
+        in_blocks_[2].data(), reinterpret_cast<const std::uint32_t(*)[4]>(quads_.data()),
+        upright_.data(),      scratch.certain.data()};
+    return look_({&surface, scratch.windows.data(), static_cast<int>(scratch.windows.size()), planes.data(),
+                  static_cast<int>(prisms.size()), scratch.cubes.data(), scratch.regions},
+                 scratch.candidates.data());
+  };
+  shell_kernels::Found found = find();
+  // What is farther than the tolerance here is not nearer in a lower prism.
+  if (found.beyond && scratch.height == scratch.highest) return kNever;
 
   const auto tolerance_of = [&](const Triangle& t) {
     return double(std::min({tolerance_[t[0]], tolerance_[t[1]], tolerance_[t[2]]}));
   };
-  const auto faces = [&](const Triangle& t) {
+  const auto faces = [&](const ShellPrism& prism, const Triangle& t) {
     const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
     return std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; });
   };
-  std::vector<Triangle>& good = scratch.good;
-  good.clear();
-  const auto holds = [&](const Triangle& t) {
-    const Meeting meeting = meet(prism, corners_of(t), tolerance_of(t));
-    if (meeting == Meeting::good && !is_there) good.push_back(t);
-    return meeting != Meeting::bad;
+  const auto meeting_of = [&](const Triangle& t, std::size_t p, unsigned between) {
+    const ShellPrism& prism = prisms[p];
+    return ((between >> p) & 1) && (tolerated || tolerance_of(t) >= prism.height()) && faces(prism, t)
+               ? Meeting::good
+               : meet(prism, corners_of(t), tolerance_of(t));
   };
-  const bool tolerated = double(least_tolerance_) >= prism.height();
-  for (const std::uint32_t number : scratch.nearby.quads) {
-    const Quad& q = quads_[number];
-    const unsigned a = scratch.certain[q[0]], b = scratch.certain[q[1]], c = scratch.certain[q[2]],
-                   d = scratch.certain[q[3]];
-    const unsigned ac = a & c;
-    if (ac & b & d & shell_kernels::kOut) continue;
-    for (const auto& [all, t] :
-         {std::pair{ac & b, Triangle{q[0], q[1], q[2]}}, {ac & d, Triangle{q[0], q[2], q[3]}}}) {
-      if (all & shell_kernels::kOut) continue;
-      if ((all & shell_kernels::kBetweenLids) && (tolerated || tolerance_of(t) >= prism.height()) &&
-          faces(t)) {
-        if (!is_there) good.push_back(t);
-      } else if (!holds(t)) {
-        return Answer::perhaps;
-      }
+  // Calls f(triangle, prism, between) for those that the kernels do not show to be good.
+  const auto for_each_near = [&](auto&& f) {
+    const auto in_each = [&](const Triangle& t, unsigned near, unsigned between) {
+      for (unsigned left = near; left != 0; left &= left - 1)
+        f(t, static_cast<std::size_t>(std::countr_zero(left)), between);
+    };
+    for (int i = 0; i < found.candidates; ++i) {
+      const shell_kernels::Candidate& candidate = scratch.candidates[static_cast<std::size_t>(i)];
+      const Quad& q = quads_[candidate.quad];
+      in_each({q[0], q[1], q[2]}, candidate.near[0], candidate.between[0]);
+      in_each({q[0], q[2], q[3]}, candidate.near[1], candidate.between[1]);
     }
+    for (const Triangle& t : scratch.fans) in_each(t, (1u << prisms.size()) - 1, 0);
+  };
+  unsigned bad = 0;
+  for_each_near([&](const Triangle& t, std::size_t p, unsigned between) {
+    const bool is_known = ((bad >> p) & 1) || (bad != 0 && scratch.is_lowest);
+    if (!is_known && meeting_of(t, p, between) == Meeting::bad) bad |= 1u << p;
+  });
+  if (bad != 0 && scratch.is_lowest) return kNever;
+
+  Answer answer{.shown = 0, .is_there = is_there, .never = false};
+  for (std::size_t p = 0; p < prisms.size(); ++p) {
+    if ((bad >> p) & 1) continue;
+    answer.shown |= 1u << triangle_of[p];
+    answer.is_there = answer.is_there || ((found.inside >> p) & 1);
   }
-  for (const Triangle& t : scratch.nearby.fans)
-    if (!holds(t)) return Answer::perhaps;
-  scratch.is_there = is_there || std::ranges::any_of(good, [&](const Triangle& t) {
-                       return is_own(corners_of(t)) && reaches_into(prism, corners_of(t));
-                     });
-  return Answer::yes;
+  if (answer.is_there || answer.shown == 0) return answer;
+  // No point is certainly in a prism; perhaps a triangle is. First those that the polygon's own edge has in
+  // S.
+  const auto is_witness = [&](const Triangle& t, std::size_t p, unsigned between) {
+    return ((answer.shown >> triangle_of[p]) & 1) && scratch.is_own(corners_of(t)) &&
+           meeting_of(t, p, between) == Meeting::good && reaches_into(prisms[p], corners_of(t));
+  };
+  const auto look_at = [&](const Triangle& t) {
+    for (std::size_t p = 0; p < prisms.size(); ++p) answer.is_there = answer.is_there || is_witness(t, p, 0);
+  };
+  polygons_.polygons_of(
+      polygon.crossing,
+      [&](const Quad& q) {
+        look_at({q[0], q[1], q[2]});
+        look_at({q[0], q[2], q[3]});
+      },
+      look_at);
+  if (answer.is_there) return answer;
+  for (shell_kernels::Window& window : scratch.windows) window.facing = 0;
+  found = find();
+  for_each_near([&](const Triangle& t, std::size_t p, unsigned between) {
+    answer.is_there = answer.is_there || is_witness(t, p, between);
+  });
+  return answer;
 }
 
 }  // namespace hermesh

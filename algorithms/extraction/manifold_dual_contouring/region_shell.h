@@ -52,15 +52,23 @@ class RegionShell {
   bool holds(const RegionPolygon& polygon) const;
 
  private:
-  struct Nearby;
   struct Scratch;
-  enum class Answer { yes, no, perhaps };
+  /// About some triangles of a polygon.
+  struct Answer {
+    unsigned shown;  ///< a bit each
+    bool is_there;   ///< S has been found in the prism of one that is shown
+    bool never;      ///< the polygon cannot be shown to hold
+  };
 
-  void describe(std::int32_t block, std::uint64_t first_quad);
-  void gather(const RegionPolygon& polygon, double height, Nearby& nearby) const;
-  void gather(std::int32_t block, const Eigen::Vector3d& corner, const int (&from)[3], const int (&to)[3],
-              Nearby& nearby) const;
-  Answer look(const RegionPolygon& polygon, const std::array<int, 3>& corners, Scratch& scratch) const;
+  /// Crossing edges with a quad.
+  std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t layer) const;
+  void describe(std::size_t block, std::uint32_t first_quad);
+  void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
+  void gather(const RegionPolygon& polygon, Scratch& scratch) const;
+  void gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3], const int (&to)[3],
+              Scratch& scratch) const;
+  Answer look(const RegionPolygon& polygon, std::span<const std::array<int, 3>> triangles, bool is_there,
+              Scratch& scratch) const;
   Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
   const Regions& regions_;
@@ -69,11 +77,13 @@ class RegionShell {
   const std::vector<Eigen::Vector3d>& points_;
   const std::span<const float> tolerance_;
   float least_tolerance_;
-  std::vector<std::uint32_t> first_quad_;  ///< by block: that of its first crossing edge
-  LargeArray<Quad> quads_;  ///< by crossing edge, as EdgePolygons cuts it; undefined for a fanned one
+  std::vector<shell_kernels::Block> blocks_;
+  std::vector<Eigen::Vector3d> up_;  ///< by block: mean normal of its quads
+  LargeArray<Quad> quads_;  ///< by block, sample and axis, without fanned edges; as EdgePolygons cuts them
+  LargeArray<std::uint8_t> upright_;  ///< by quad: both triangles face up along their block's direction
   std::array<LargeArray<float>, 3>
       in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
-  shell_kernels::Classify* const classify_ = shell_kernels::chosen();
+  shell_kernels::Look* const look_ = shell_kernels::chosen();
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Scratch>> scratch_;
 };
 

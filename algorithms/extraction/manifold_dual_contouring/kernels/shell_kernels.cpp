@@ -5,17 +5,15 @@
 namespace hermesh::shell_kernels {
 
 namespace sse2 {
-extern Classify* const kClassify;
+extern Look* const kLook;
 }
 namespace avx2 {
-extern Classify* const kClassify;
+extern Look* const kLook;
 }
 namespace avx512 {
-extern Classify* const kClassify;
+extern Look* const kLook;
 }
 
-Classify* chosen() {
-  return of_level(chosen_simd_level(), sse2::kClassify, avx2::kClassify, avx512::kClassify);
-}
+Look* chosen() { return of_level(chosen_simd_level(), sse2::kLook, avx2::kLook, avx512::kLook); }
 
 }  // namespace hermesh::shell_kernels

@@ -1,48 +1,105 @@
-// Where many points are beside a prism, compiled for several levels of vector code; all give the same bits.
-// Light and free of the standard library's functions, because what two levels share the linker may take from
-// either.
+// Which triangles of a mesh may be in a few prisms, compiled for several levels of vector code; all give the
+// same bits. Light and free of the standard library's functions, because what two levels share the linker may
+// take from either.
 #pragma once
 
 #include <cstdint>
 
 namespace hermesh::shell_kernels {
 
-/// By coordinate; up to kLargestVector numbers behind them are read, too.
-struct Points {
-  const float *x, *y, *z;
-  int count;  ///< kMost at most
-};
-constexpr int kLargestVector = 16, kMost = 64;
+/// At once, see Surface::certain.
+constexpr int kMostPrisms = 4, kLargestVector = 16;
 
-/// How far a place is beyond each of a prism's walls (three, by each of their two pillars), above its lid and
-/// below its bottom; negative inside.
+/// How far a place is beyond each of a prism's three walls, above its lid and below its bottom; negative
+/// inside. Walls are not flat: between lid and bottom they are within `spread` of a plane.
 struct Planes {
-  static constexpr int kLid = 6, kBottom = 7, kAll = 8;
+  static constexpr int kLid = 3, kBottom = 4, kAll = 5;
   float normals[kAll][3];
   float offsets[kAll];  ///< subtracted
-  float rounding;       ///< what is less than this is not certain
+  float spread[3];
+  float rounding;  ///< what is less than this is not certain
 };
 
-/// What is certain of a point; polygons all of whose corners are beyond one plane are not in the prism, nor
-/// above or below it if all are between lid and bottom.
-enum Certain : std::uint8_t {
-  kBeyondWall = 1,  ///< the first wall, and the next two bits the others
-  kAboveLid = 8,
-  kBelowBottom = 16,
-  kBetweenLids = 32,
-  kWithinWalls = 64,
-  kOut = 31  ///< any of the first five
+/// What is certain of a point and a prism. Triangles all of whose corners are beyond one plane are not in the
+/// prism, nor above or below it if all are between lid and bottom.
+enum Certain {
+  kBeyondWall /* and the two after it */,
+  kAboveLid = 3,
+  kBelowBottom,
+  kBetweenLids,
+  kAllCertain
 };
 
-/// A bit a point: in the prism; and in between the walls, but above the lid or below the bottom.
+/// A mesh with a point for most cells of a lattice, or several, and a quad for most edges that it crosses.
+struct Surface {
+  const float *x, *y,
+      *z;  ///< of points, relative to the corners of their blocks; kLargestVector more can be read
+  const std::uint32_t (*quads)[4];
+  const std::uint8_t*
+      upright;  ///< by quad: 1 if both triangles, 012 and 023, face up along the block's direction
+  /// By point; kLargestVector more can be written. Bit kMostPrisms c + p: c (Certain) is certain of prism p.
+  /// Only for the points of windows.
+  std::uint32_t* certain;
+};
+
+/// 8 words each for the cells and for the edges by first sample, of each layer bit 8y+z. Quads are in the
+/// order of samples, those of one sample in that of axes.
+struct Block {
+  const std::uint64_t* active;         ///< cells with a point
+  const std::uint32_t* points_before;  ///< by word of these, in the block
+  std::uint32_t first_point;
+  std::uint32_t first_later, later_points;             ///< cells' further points: all of them are looked at
+  const std::uint64_t *crossing[3], *without_quad[3];  ///< by axis
+  std::uint32_t first_quad;
+  std::uint16_t quads_before[8];  ///< by layer, in the block
+};
+
+/// The part of a block that is looked at. All corners of its quads must be among the points of some window.
+struct Window {
+  struct Part {
+    std::uint64_t rows;  ///< of each layer
+    int first, end;      ///< layers
+  };
+  const Block* block;
+  float corner[3];
+  Part cells, samples;
+  unsigned facing;  ///< a bit a prism: what is upright in the block faces up in the prism
+};
+
+struct Box {
+  float lower[3], upper[3];
+};
+
+/// All relative to one place.
+struct Scan {
+  const Surface* surface;
+  const Window* windows;  ///< ascending by first_point
+  int window_count;
+  const Planes* prisms;
+  int prism_count;  ///< kMostPrisms at most
+  const Box* own;
+  int own_count;
+};
+
+/// A quad of which a triangle may be in some prism, and does not certainly face up and lie between lid and
+/// bottom.
+struct Candidate {
+  std::uint32_t quad;
+  std::uint8_t near[2],
+      between[2];  ///< a bit a prism: those it may be in, and of which it is between lid and bottom
+};
+
+/// A bit a prism: one of the points in the own boxes is in it; one is between its walls, but above or below
+/// it.
 struct Found {
-  std::uint64_t inside, beyond;
+  unsigned inside, beyond;
+  int candidates;
 };
 
-/// @param out room for kMost + kLargestVector
-using Classify = Found(const Points& points, const Planes& planes, std::uint8_t* out);
+/// @param out room for a candidate for each edge of the windows' blocks
+using Look = Found(const Scan& scan, Candidate* out);
 
 /// For the level of vector code that is chosen, see simd_level.h.
-Classify* chosen();
+Look* chosen();
 
 }  // namespace hermesh::shell_kernels
