@@ -15,10 +15,14 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points, RunContext& context)
     : cells_(cells), edges_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+    const auto block = static_cast<std::int32_t>(b);
     PlainPoints near;
-    near.read(cells_, static_cast<std::int32_t>(b));
-    cells_.for_each_crossing_edge(static_cast<std::int32_t>(b),
-                                  [&](const CellBlocks::Edge& edge) { decide(edge, points, &near); });
+    near.read(cells_, block);
+    std::array<EdgeCrossing, 3 * 512> crossings;
+    cells_.grid().crossings(block, crossings.data());
+    const EdgeCrossing* next = crossings.data();
+    cells_.for_each_crossing_edge(
+        block, [&](const CellBlocks::Edge& edge) { decide(edge, (next++)->offset, points, &near); });
   });
   number_all(context);
 }
@@ -41,7 +45,7 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::v
   for (const CellBlocks::Cell& cell : cells)
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
-        decide(at, points);
+        decide(at, cells_.grid().crossing(at.block, at.sample, at.axis).offset, points);
   number_all(context);
 }
 
@@ -55,14 +59,18 @@ void EdgePolygons::number_all(RunContext& context) {
   const std::size_t blocks = cells_.size();
   std::vector<std::uint64_t> crossing_points(blocks), quads(blocks), triangles(blocks);
   parallel_blocks(blocks, context, [&](std::size_t b) {
-    cells_.for_each_crossing_edge(static_cast<std::int32_t>(b), [&](const CellBlocks::Edge& edge) {
-      if (!is_fanned(edge)) {
-        ++quads[b];
-        return;
-      }
-      ++crossing_points[b];
-      triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
-    });
+    const auto block = static_cast<std::int32_t>(b);
+    for (int axis = 0; axis < 3; ++axis) {
+      const BlockMask& fanned = edges_[b].fanned[static_cast<std::size_t>(axis)];
+      const int fans = count(fanned),
+                all = count(cells_.source(block).crossing[static_cast<std::size_t>(axis)]);
+      crossing_points[b] += static_cast<std::uint64_t>(fans);
+      quads[b] += static_cast<std::uint64_t>(all - fans);
+      for_each_bit(fanned, [&](int sample) {
+        const CellBlocks::Edge edge{block, sample, axis};
+        triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
+      });
+    }
   });
   fanned_edges_ = exclusive_scan(crossing_points, "points");
   points_ = cells_.point_count() + fanned_edges_;
@@ -88,7 +96,8 @@ int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Aroun
   return made;
 }
 
-void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector3d>& points, const PlainPoints* near) {
+void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const std::vector<Vector3d>& points,
+                          const PlainPoints* near) {
   BlockEdges& edges = edges_[edge.block];
   std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
@@ -97,7 +106,7 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector
     for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
     corners = around.points;
   }
-  const int diagonal = any_explicit ? -1 : safe_diagonal(edge, corners, points);
+  const int diagonal = any_explicit ? -1 : safe_diagonal(edge, hit, corners, points);
   if (diagonal < 0)
     set(edges.fanned[edge.axis], edge.sample);
   else if (diagonal == 1)
@@ -105,7 +114,8 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, const std::vector<Vector
 }
 
 /// 0 or 1 for the diagonal to cut along; −1 if neither keeps the triangles in the envelope.
-int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, const std::array<std::uint32_t, 4>& corners,
+int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
+                                const std::array<std::uint32_t, 4>& corners,
                                 const std::vector<Vector3d>& points) const {
   const Vector3d start = cells_.corner(edge.block, edge.sample);
   std::array<EnvelopeCorner, 4> r;
@@ -113,7 +123,7 @@ int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, const std::array<s
     const Vector3d p = points[corners[i]] - start;
     r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
   }
-  const EnvelopeCut cut = cut_quad(r, cells_.grid().crossing(edge.block, edge.sample, edge.axis).offset);
+  const EnvelopeCut cut = cut_quad(r, hit);
   return cut.fanned ? -1 : cut.diagonal;
 }
 

@@ -90,8 +90,10 @@ class EdgePolygons {
   }
   void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
-  void decide(const CellBlocks::Edge& edge, const std::vector<Eigen::Vector3d>& points, const PlainPoints* near = nullptr);
-  int safe_diagonal(const CellBlocks::Edge& edge, const std::array<std::uint32_t, 4>& corners,
+  /// @param hit offset of the crossing
+  void decide(const CellBlocks::Edge& edge, double hit, const std::vector<Eigen::Vector3d>& points,
+              const PlainPoints* near = nullptr);
+  int safe_diagonal(const CellBlocks::Edge& edge, double hit, const std::array<std::uint32_t, 4>& corners,
                     const std::vector<Eigen::Vector3d>& points) const;
 
   const CellBlocks& cells_;

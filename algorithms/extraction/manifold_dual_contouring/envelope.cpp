@@ -15,13 +15,11 @@ constexpr double kMargin = 1e-4;
 
 double cross(const Corner& a, const Corner& b) { return a.u * b.v - a.v * b.u; }
 
-/// Where the edge passes through the two triangles of diagonal (d, d+2), if both lie in the envelope. The diagonal
-/// passes the edge on one side, through the half-plane of the corner k there. If it passes through the triangle of the
-/// edge with k, the triangle on that side is within the two tetrahedra of k; if, besides, the edge passes through the
-/// other triangle, that one is within all four.
+/// Where the edge passes through the two triangles of diagonal (d, d+2), if both lie in the envelope; the
+/// corners go around it. The diagonal passes the edge on one side, through the half-plane of the corner k
+/// there. If it passes through the triangle of the edge with k, the triangle on that side is within the two
+/// tetrahedra of k; if, besides, the edge passes through the other triangle, that one is within all four.
 std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
-  for (int i = 0; i < 4; ++i)
-    if (cross(r[i], r[(i + 1) % 4]) < kPositive) return std::nullopt;
   const Corner &a = r[d], &c = r[d + 2];
   const bool left = cross(a, c) > 0;  // the edge is on the left of the diagonal, and so is corner d+3
   const Corner &beyond = r[left ? d + 1 : (d + 3) % 4], &other = r[left ? (d + 3) % 4 : d + 1];
@@ -42,6 +40,8 @@ std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
 }  // namespace
 
 EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
+  for (int i = 0; i < 4; ++i)
+    if (cross(r[i], r[(i + 1) % 4]) < kPositive) return {.height = hit};
   std::array<std::optional<double>, 2> heights;
   for (int d = 0; d < 2; ++d) heights[d] = height_if_safe(r, d);
   if (!heights[0] && !heights[1]) return {.height = hit};

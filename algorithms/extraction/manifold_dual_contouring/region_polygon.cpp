@@ -15,6 +15,16 @@ bool is_same(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
   return a.block == b.block && a.sample == b.sample && a.axis == b.axis;
 }
 
+/// Calls f(edge) for those that are crossed of so many edges of a block that follow one another in a line.
+template <class F>
+void for_each_crossing_on(const CellBlocks::Edge& first, int length, const CellBlocks& cells, F&& f) {
+  if (first.block < 0) return;
+  constexpr int kStep[3] = {64, 8, 1};
+  const BlockMask& crossing = cells.source(first.block).crossing[static_cast<std::size_t>(first.axis)];
+  for (int k = 0, sample = first.sample; k < length; ++k, sample += kStep[first.axis])
+    if (test(crossing, sample)) f(CellBlocks::Edge{first.block, sample, first.axis});
+}
+
 /// What a segment keeps from the border of a face's common part, and how far a point that takes its place is
 /// from that at least; in sides of it.
 constexpr double kFromBorder = 1e-3, kFarFromBorder = 0.02;
@@ -62,18 +72,24 @@ FaceBorder face_border(const Regions& regions, const RegionPolygon& polygon, int
   if (polygon.start[f] > cells.corner(smaller.block, smaller.cell)[f]) at[f] += smaller.side();
   FaceBorder border;
   for (const auto& [along, other] : {std::pair{p, q}, std::pair{q, p}})
-    for (const int step : {0, smaller.side()})
-      for (int k = 0; k < smaller.side(); ++k) {
-        int sample[3] = {at[0], at[1], at[2]};
-        sample[along] += k;
-        sample[other] += step;
-        const CellBlocks::Cell cell = cells.locate(smaller.block, sample[0], sample[1], sample[2]);
-        const CellBlocks::Edge edge{cell.block, cell.cell, along};
-        if (!cells.is_crossed(edge)) continue;
-        if (border.count < 2) border.edges[static_cast<std::size_t>(border.count)] = edge;
-        ++border.count;
-      }
+    for (const int step : {0, smaller.side()}) {
+      int first[3] = {at[0], at[1], at[2]};
+      first[other] += step;
+      const CellBlocks::Cell cell = cells.locate(smaller.block, first[0], first[1], first[2]);
+      for_each_crossing_on({cell.block, cell.cell, along}, smaller.side(), cells,
+                           [&](const CellBlocks::Edge& edge) {
+                             if (border.count < 2)
+                               border.edges[static_cast<std::size_t>(border.count)] = edge;
+                             ++border.count;
+                           });
+    }
   return border;
+}
+
+int crossings_on(const CellBlocks::Edge& first, int length, const CellBlocks& cells) {
+  int found = 0;
+  for_each_crossing_on(first, length, cells, [&](const CellBlocks::Edge&) { ++found; });
+  return found;
 }
 
 RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {

@@ -72,6 +72,9 @@ struct FaceBorder {
 };
 FaceBorder face_border(const Regions& regions, const RegionPolygon& polygon, int side);
 
+/// How many are crossed of so many edges of a block that follow one another in a line.
+int crossings_on(const CellBlocks::Edge& first, int length, const CellBlocks& cells);
+
 /// The regions around an edge, from corner to corner: fewer than three if there is no polygon.
 struct RegionRing {
   int corners = 0;

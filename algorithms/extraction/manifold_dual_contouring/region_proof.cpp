@@ -100,13 +100,11 @@ class RegionProof {
 
   /// Whether the edge that its envelope is made of is crossed once: else several polygons would share that.
   bool is_crossed_once(const RegionPolygon& polygon) const {
-    const int axis = polygon.axis(), length = static_cast<int>(polygon.length),
-              sample = polygon.crossing.sample;
-    int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7}, crossings = 0;
-    at[axis] &= ~(length - 1);
-    for (int k = 0; k < length; ++k, ++at[axis])
-      crossings += cells_.is_crossed({polygon.crossing.block, sample_index(at[0], at[1], at[2]), axis});
-    return crossings == 1;
+    constexpr int kShift[3] = {6, 3, 0};
+    const int length = static_cast<int>(polygon.length), shift = kShift[polygon.axis()];
+    CellBlocks::Edge first = polygon.crossing;
+    first.sample &= ~((length - 1) << shift);
+    return crossings_on(first, length, cells_) == 1;
   }
 
   /// Whether each two of its regions have one polygon more in common, and no other. A face of a single cell

@@ -155,25 +155,23 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
 }
 
 void RegionShell::find_upright(std::size_t block, std::uint32_t first, std::uint32_t end) {
-  const auto normals = [&](const Quad& q) {
-    const Vector3d middle = points_[q[2]] - points_[q[0]];
-    return std::pair<Vector3d, Vector3d>((points_[q[1]] - points_[q[0]]).cross(middle),
-                                         middle.cross(points_[q[3]] - points_[q[0]]));
-  };
+  std::vector<Vector3d> normals;  // of both triangles of each
+  normals.reserve(2 * (end - first));
   Vector3d up = Vector3d::Zero();
   for (std::uint32_t i = first; i < end; ++i) {
-    const auto [a, b] = normals(quads_[i]);
-    up += a + b;
+    const Quad& q = quads_[i];
+    const Vector3d middle = points_[q[2]] - points_[q[0]];
+    normals.push_back((points_[q[1]] - points_[q[0]]).cross(middle));
+    normals.push_back(middle.cross(points_[q[3]] - points_[q[0]]));
+    up += normals.end()[-2] + normals.back();
   }
   up_[block] = up = up.normalized();
   const auto is_upright = [&](const Vector3d& normal) {
     const double along = normal.dot(up);
     return along > 0 && along * along > kUpright * kUpright * normal.squaredNorm();
   };
-  for (std::uint32_t i = first; i < end; ++i) {
-    const auto [a, b] = normals(quads_[i]);
-    upright_[i] = is_upright(a) && is_upright(b);
-  }
+  for (std::uint32_t i = first; i < end; ++i)
+    upright_[i] = is_upright(normals[2 * (i - first)]) && is_upright(normals[2 * (i - first) + 1]);
 }
 
 void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
