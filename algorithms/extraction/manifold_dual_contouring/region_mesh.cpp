@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/manifold_dual_contouring/loose_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
 #include "algorithms/extraction/manifold_dual_contouring/regions.h"
@@ -13,12 +14,6 @@ namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-
-/// Whether a side of one polygon lies between the two regions that a side of another one does.
-bool has_same_regions(const RegionPolygon& a, int i, const RegionPolygon& b, int j) {
-  const Region &a0 = a.regions[i], &a1 = a.regions[a.next(i)], &b0 = b.regions[j], &b1 = b.regions[b.next(j)];
-  return (a0 == b0 && a1 == b1) || (a0 == b1 && a1 == b0);
-}
 
 /// Makes the polygons block by block, with names instead of numbers, and numbers them when all points are
 /// known.
@@ -45,9 +40,9 @@ class Filling {
       Made& made = made_[b];
       for_each_cell_point(block, [&](const Region&) { ++points[b]; }, [&](std::uint32_t) { ++points[b]; });
       regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) { make(edge, made); });
-      points[b] += made.kept.size() + made.places.size();
+      points[b] += made.kept.size();
       quads[b] = made.quads.size();
-      triangles[b] = made.triangles.size() + made.fan_triangles;
+      triangles[b] = made.triangles.size();
     });
     RegionMesh mesh;
     mesh.points.resize(exclusive_scan(points, "points"));
@@ -67,8 +62,6 @@ class Filling {
           },
           keep);
       for (const std::uint32_t point : made_[b].kept) keep(point);
-      for (Fan& fan : made_[b].fans) fan.first += at;
-      std::ranges::copy(made_[b].places, mesh.points.begin() + at);
     });
     parallel_blocks(n, context_, [&](std::size_t b) {
       const Made& made = made_[b];
@@ -77,36 +70,33 @@ class Filling {
         return polygon;
       };
       std::ranges::transform(made.quads, mesh.quads.data() + quads[b], numbered);
-      Triangle* triangle = mesh.triangles.data() + triangles[b];
-      triangle = std::ranges::transform(made.triangles, triangle, numbered).out;
-      for (const Fan& fan : made.fans)
-        number_fan(*polygon_of(regions_, edge_of(static_cast<std::int32_t>(b), fan.key)),
-                   [&](const Triangle& t) { *triangle++ = t; });
+      std::ranges::transform(made.triangles, mesh.triangles.data() + triangles[b], numbered);
     });
+    for (std::size_t b = 0; b < n; ++b)
+      for (const Loose& loose : made_[b].loose) {
+        const auto first = static_cast<std::uint32_t>((loose.is_quad ? quads : triangles)[b]);
+        loose_.push_back({loose.edge, {first + loose.polygon, loose.is_quad}});
+      }
     return mesh;
   }
 
+  /// Edges that have them, ascending, and their polygons.
+  const std::vector<std::pair<CellBlocks::Edge, LoosePolygon>>& loose() const { return loose_; }
+
  private:
-  /// A fan that the uniform mesh does not have: its middle's number, and behind it those of the sides' points that it owns.
-  struct Fan {
-    std::uint16_t key;
-    std::uint32_t first;  ///< among the block's, until these have numbers
+  struct Loose {
+    CellBlocks::Edge edge;
+    bool is_quad;
+    std::uint32_t polygon;  ///< among the block's
   };
   /// Of a block.
   struct Made {
     std::vector<Quad> quads;  ///< of names: a point's number in the uniform mesh, or first_cube_ and a cube's
-    std::vector<Triangle> triangles;  ///< but for those of fans
-    std::vector<std::uint32_t> kept;  ///< points on edges that the uniform mesh has, too
-    std::vector<Fan> fans;            ///< ascending by key
-    std::vector<Vector3d> places;     ///< of the fans' points
-    std::size_t fan_triangles = 0;
+    std::vector<Triangle> triangles;
+    std::vector<std::uint32_t> kept;  ///< points on edges
+    std::vector<Loose> loose;
   };
-  static std::uint16_t key_of(const CellBlocks::Edge& edge) {
-    return static_cast<std::uint16_t>(edge.axis << 9 | edge.sample);
-  }
-  static CellBlocks::Edge edge_of(std::int32_t block, std::uint16_t key) {
-    return {block, key & 511, key >> 9};
-  }
+
   std::uint32_t name_of(const Region& region) const {
     return region.merged() ? first_cube_ + regions_.number(region)
                            : cells_.point(region.block, region.cell, 0);
@@ -123,31 +113,22 @@ class Filling {
       return;
     }
     const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
-    if (polygon.cut.fanned) return make_fan(polygon, made);
-    std::array<std::uint32_t, RegionPolygon::kFirstSide + 4> names{};  // only the first four are used
+    const bool is_quad = polygon.corners == 4;
+    if (polygon.loose)
+      made.loose.push_back(
+          {edge, is_quad, static_cast<std::uint32_t>(is_quad ? made.quads.size() : made.triangles.size())});
+    std::array<std::uint32_t, 4> names{};
     for (int i = 0; i < polygon.corners; ++i) names[i] = name_of(polygon.regions[i]);
-    if (polygon.corners == 3) {
+    if (!is_quad) {
       polygon.for_each_triangle([&](int a, int b, int c) {
         made.triangles.push_back({names[a], names[b], names[c]});
       });
       return;
     }
-    const int d = polygon.cut.diagonal;
+    const int d = polygon.diagonal;
     Quad q = {names[d], names[d + 1], names[d + 2], names[(d + 3) % 4]};
     if (!polygon.outwards) std::swap(q[1], q[3]);
     made.quads.push_back(q);
-  }
-
-  /// Of the two polygons beside a side that is held to a point.
-  bool owns(const RegionPolygon& polygon, int side) const {
-    return polygon.sides[side].held && cells_.comes_first(polygon.crossing, polygon.sides[side].partner);
-  }
-  void make_fan(const RegionPolygon& fan, Made& made) const {
-    made.fans.push_back({key_of(fan.crossing), static_cast<std::uint32_t>(made.places.size())});
-    made.places.push_back(fan.middle);
-    for (int i = 0; i < fan.corners; ++i)
-      if (owns(fan, i)) made.places.push_back(fan.sides[i].place);
-    fan.for_each_triangle([&](int, int, int) { ++made.fan_triangles; });
   }
 
   /// Calls cube(Region) and kept(point of the uniform mesh).
@@ -155,39 +136,6 @@ class Filling {
   void for_each_cell_point(std::int32_t block, Cube&& cube, Kept&& kept) const {
     regions_.for_each(block, cube, [&](int cell) {
       for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet) kept(cells_.point(block, cell, sheet));
-    });
-  }
-
-  std::uint32_t middle_of(const CellBlocks::Edge& edge) const {
-    return std::ranges::lower_bound(made_[static_cast<std::size_t>(edge.block)].fans, key_of(edge), {},
-                                    &Fan::key)
-        ->first;
-  }
-  std::uint32_t number_of_side(const RegionPolygon& polygon, int side) const {
-    std::uint32_t number = middle_of(polygon.crossing);
-    for (int i = 0; i <= side; ++i) number += owns(polygon, i);
-    return number;
-  }
-
-  template <class OnTriangle>
-  void number_fan(const RegionPolygon& fan, OnTriangle&& triangle) const {
-    std::array<std::uint32_t, RegionPolygon::kFirstSide + 4> numbers{};
-    for (int i = 0; i < fan.corners; ++i) numbers[i] = number_[name_of(fan.regions[i])];
-    numbers[RegionPolygon::kMiddle] = middle_of(fan.crossing);
-    for (int i = 0; i < fan.corners; ++i) {
-      if (!fan.sides[i].held) continue;
-      std::uint32_t& number = numbers[RegionPolygon::kFirstSide + i];
-      if (owns(fan, i)) {
-        number = number_of_side(fan, i);
-      } else {
-        const RegionPolygon other = *polygon_of(regions_, fan.sides[i].partner);
-        for (int side = 0; side < other.corners; ++side)
-          if (owns(other, side) && has_same_regions(fan, i, other, side))
-            number = number_of_side(other, side);
-      }
-    }
-    fan.for_each_triangle([&](int a, int b, int c) {
-      triangle(Triangle{numbers[a], numbers[b], numbers[c]});
     });
   }
 
@@ -199,6 +147,7 @@ class Filling {
   const std::uint32_t first_cube_;     ///< name of the first
   std::vector<std::uint32_t> number_;  ///< by name
   std::vector<Made> made_;             ///< by block
+  std::vector<std::pair<CellBlocks::Edge, LoosePolygon>> loose_;
 };
 
 }  // namespace
@@ -206,13 +155,34 @@ class Filling {
 RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
                          std::span<const float> tolerance, const FilePoints& file, RunContext& context) {
   Regions regions(cells, points, tolerance, file, context);
-  const std::size_t splits = prove_regions(regions, polygons, points, tolerance, context);
-  context.figure("split_regions", double(splits));
-  Stage stage(context, "connect regions");
-  RegionMesh mesh = Filling(regions, polygons, points, context).run();
-  if (mesh.points.size() <= polygons.point_count()) return mesh;
-  regions.split_all();
-  return Filling(regions, polygons, points, context).run();
+  std::size_t splits = 0;
+  const auto prove = [&](RegionProof& proof) {
+    Stage stage(context, "prove regions");
+    splits += proof.run();
+  };
+  RegionProof proof = [&] {
+    Stage stage(context, "prepare the proof");
+    return RegionProof(regions, polygons, points, tolerance, context);
+  }();
+  for (;;) {
+    prove(proof);
+    Filling filling(regions, polygons, points, context);
+    RegionMesh mesh = [&] {
+      Stage stage(context, "connect regions");
+      return filling.run();
+    }();
+    Stage stage(context, "test loose polygons");
+    std::vector<LoosePolygon> tested;
+    for (const auto& [edge, polygon] : filling.loose()) tested.push_back(polygon);
+    const std::vector<std::size_t> meeting =
+        loose_polygons_that_meet(mesh.points, mesh.quads, mesh.triangles, tested, context);
+    if (meeting.empty()) {
+      context.figure("split_regions", double(splits));
+      context.figure("loose_polygons", double(tested.size()));
+      return mesh;
+    }
+    for (const std::size_t i : meeting) proof.call_bold(filling.loose()[i].first);
+  }
 }
 
 }  // namespace hermesh

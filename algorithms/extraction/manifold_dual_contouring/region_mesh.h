@@ -18,10 +18,11 @@ struct RegionMesh {
   LargeArray<Quad> quads;
 };
 
-/// With no more points than the uniform mesh. Closed, oriented, manifold and free of self-intersection if that is, and within
-/// the tolerance of it both ways, but never farther than RegionShell::kFarthest (region_proof.h). The same bytes for every
-/// number of threads.
-/// @param points of the uniform mesh: those of cells lie within their cells, and those of fanned edges are behind them
+/// Closed, oriented, manifold and free of self-intersection if that is, and within
+/// the tolerance of it both ways, but never farther than RegionShell::kFarthest (region_proof.h). The same
+/// bytes for every number of threads.
+/// @param points of the uniform mesh: those of cells lie within their cells, and those of fanned edges are
+/// behind them
 /// @param tolerance by point, those on fanned edges included; voxels
 /// @throws Error for more points or polygons than 32 bits can number; Cancelled
 RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,

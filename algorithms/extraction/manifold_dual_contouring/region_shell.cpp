@@ -53,7 +53,7 @@ Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
 }  // namespace
 
 struct RegionShell::Scratch {
-  std::array<Vector3d, RegionPolygon::kFirstSide + 4> pillars;
+  std::array<Vector3d, 4> pillars;          ///< by the polygon's corners
   Vector3d base;                            ///< near the polygon: what single precision is relative to
   std::array<shell_kernels::Box, 4> cubes;  ///< the polygon's regions
   int regions;
@@ -65,7 +65,7 @@ struct RegionShell::Scratch {
   std::vector<Triangle> fans;                  ///< and its fans there
   std::vector<ShellPrism> prisms;
   std::vector<shell_kernels::Candidate> candidates;
-  std::vector<std::uint32_t> certain;
+  std::vector<std::uint16_t> certain;
 
   /// Whether one of the points is that of a cell of the polygon's regions: points lie in their cells.
   bool is_own(const Corners& points) const {
@@ -181,7 +181,8 @@ void RegionShell::gather(const RegionPolygon& polygon, Scratch& scratch) const {
   polygon.for_each_triangle([&](int a, int b, int c) {
     for (const int corner : {a, b, c})
       for (const double up : {scratch.height, -scratch.height})
-        box.extend(polygon.place(corner) + up * scratch.pillars[static_cast<std::size_t>(corner)]);
+        box.extend(polygon.points[static_cast<std::size_t>(corner)] +
+                   up * scratch.pillars[static_cast<std::size_t>(corner)]);
   });
   const Vector3d lower = box.min() - scratch.base, upper = box.max() - scratch.base;
   // Edges that touch a cell that the prisms may reach into, and all cells that touch these; from the base.
@@ -258,16 +259,6 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
       scratch.cubes[static_cast<std::size_t>(i)].upper[a] = static_cast<float>(lower[a] + region.side());
     }
   }
-  if (polygon.cut.fanned) {
-    const CellBlocks::Edge& edge = polygon.crossing;
-    const auto& n = cells_.grid().crossing(edge.block, edge.sample, edge.axis).normal;
-    scratch.pillars[RegionPolygon::kMiddle] = Vector3d(n[0], n[1], n[2]).normalized();
-    for (int i = 0; i < polygon.corners; ++i)
-      scratch.pillars[static_cast<std::size_t>(RegionPolygon::kFirstSide + i)] =
-          (scratch.pillars[static_cast<std::size_t>(i)] +
-           scratch.pillars[static_cast<std::size_t>(polygon.next(i))])
-              .normalized();
-  }
   scratch.open.clear();
   polygon.for_each_triangle([&](int a, int b, int c) { scratch.open.push_back({a, b, c}); });
   scratch.highest = most;
@@ -279,15 +270,12 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
     scratch.height = height;
     scratch.is_lowest = height == lowest;
     gather(polygon, scratch);
+    const Answer answer = look(polygon, is_there, scratch);
+    if (answer.never) return false;
+    is_there = answer.is_there;
     std::size_t still_open = 0;
-    for (std::size_t first = 0; first < scratch.open.size(); first += shell_kernels::kMostPrisms) {
-      const std::size_t some = std::min<std::size_t>(shell_kernels::kMostPrisms, scratch.open.size() - first);
-      const Answer answer = look(polygon, std::span(scratch.open).subspan(first, some), is_there, scratch);
-      if (answer.never) return false;
-      is_there = answer.is_there;
-      for (std::size_t i = first; i < first + some; ++i)
-        if (!((answer.shown >> (i - first)) & 1)) scratch.open[still_open++] = scratch.open[i];
-    }
+    for (std::size_t i = 0; i < scratch.open.size(); ++i)
+      if (!((answer.shown >> i) & 1)) scratch.open[still_open++] = scratch.open[i];
     scratch.open.resize(still_open);
     if (still_open == 0) return is_there;
   }
@@ -295,18 +283,16 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
 }
 
 /// No exact number is needed where points keep off the prisms' planes: then they are told by kernels.
-RegionShell::Answer RegionShell::look(const RegionPolygon& polygon,
-                                      std::span<const std::array<int, 3>> triangles, bool is_there,
-                                      Scratch& scratch) const {
+RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, bool is_there, Scratch& scratch) const {
   constexpr Answer kNever{.shown = 0, .is_there = false, .never = true};
   std::array<std::size_t, shell_kernels::kMostPrisms> triangle_of;
   std::array<Planes, shell_kernels::kMostPrisms> planes;
   std::vector<ShellPrism>& prisms = scratch.prisms;
   prisms.clear();
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    const auto& [a, b, c] = triangles[i];
+  for (std::size_t i = 0; i < scratch.open.size(); ++i) {
+    const auto& [a, b, c] = scratch.open[i];
     const auto pillar = [&](int corner) { return scratch.pillars[static_cast<std::size_t>(corner)]; };
-    prisms.emplace_back(Corners{polygon.place(a), polygon.place(b), polygon.place(c)},
+    prisms.emplace_back(Corners{polygon.points[a], polygon.points[b], polygon.points[c]},
                         std::array{pillar(a), pillar(b), pillar(c)}, scratch.height);
     if (!prisms.back().stands()) {
       if (scratch.is_lowest) return kNever;

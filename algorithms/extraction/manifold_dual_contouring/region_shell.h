@@ -53,7 +53,7 @@ class RegionShell {
 
  private:
   struct Scratch;
-  /// About some triangles of a polygon.
+  /// About the triangles of a polygon that are open.
   struct Answer {
     unsigned shown;  ///< a bit each
     bool is_there;   ///< S has been found in the prism of one that is shown
@@ -67,8 +67,7 @@ class RegionShell {
   void gather(const RegionPolygon& polygon, Scratch& scratch) const;
   void gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3], const int (&to)[3],
               Scratch& scratch) const;
-  Answer look(const RegionPolygon& polygon, std::span<const std::array<int, 3>> triangles, bool is_there,
-              Scratch& scratch) const;
+  Answer look(const RegionPolygon& polygon, bool is_there, Scratch& scratch) const;
   Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
   const Regions& regions_;

@@ -1,6 +1,6 @@
-// Which triangles of a mesh may be in a few prisms, compiled for several levels of vector code; all give the
-// same bits. Light and free of the standard library's functions, because what two levels share the linker may
-// take from either.
+// Which triangles of a mesh may be in one prism or two, compiled for several levels of vector code; all give
+// the same bits. Light and free of the standard library's functions, because what two levels share the linker
+// may take from either.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 namespace hermesh::shell_kernels {
 
 /// At once, see Surface::certain.
-constexpr int kMostPrisms = 4, kLargestVector = 16;
+constexpr int kMostPrisms = 2, kLargestVector = 16;
 
 /// How far a place is beyond each of a prism's three walls, above its lid and below its bottom; negative
 /// inside. Walls are not flat: between lid and bottom they are within `spread` of a plane.
@@ -39,7 +39,7 @@ struct Surface {
       upright;  ///< by quad: 1 if both triangles, 012 and 023, face up along the block's direction
   /// By point; kLargestVector more can be written. Bit kMostPrisms c + p: c (Certain) is certain of prism p.
   /// Only for the points of windows.
-  std::uint32_t* certain;
+  std::uint16_t* certain;
 };
 
 /// 8 words each for the cells and for the edges by first sample, of each layer bit 8y+z. Quads are in the

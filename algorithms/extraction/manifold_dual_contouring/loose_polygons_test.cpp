@@ -1,0 +1,76 @@
+#include "algorithms/extraction/manifold_dual_contouring/loose_polygons.h"
+
+#include <gtest/gtest.h>
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Indices = std::vector<std::size_t>;
+
+struct Mesh {
+  std::vector<Vector3d> points;
+  LargeArray<Quad> quads;
+  std::vector<Triangle> triangles;
+
+  Indices that_meet(const std::vector<LoosePolygon>& loose) const {
+    RunContext context;
+    return loose_polygons_that_meet(points, quads, triangles, loose, context);
+  }
+};
+
+const LoosePolygon kFirstTriangle{0, false}, kSecondTriangle{1, false}, kFirstQuad{0, true};
+
+Mesh two_triangles(double second_is_raised_by) {
+  const Vector3d up(0, 0, second_is_raised_by);
+  return {{{0, 0, 0},
+           {4, 0, 0},
+           {0, 4, 0},
+           Vector3d(1, 1, -1) + up,
+           Vector3d(1, 1, 1) + up,
+           Vector3d(9, 9, 1) + up},
+          {},
+          {{0, 1, 2}, {3, 4, 5}}};
+}
+
+TEST(LoosePolygons, MeetWhatPassesThroughThem) {
+  EXPECT_EQ(two_triangles(0).that_meet({kFirstTriangle}), Indices{0});
+  EXPECT_EQ(two_triangles(0).that_meet({kSecondTriangle}), Indices{0});
+  EXPECT_EQ(two_triangles(0).that_meet({kFirstTriangle, kSecondTriangle}), (Indices{0, 1}));
+  EXPECT_EQ(two_triangles(0).that_meet({}), Indices{});
+  EXPECT_EQ(two_triangles(1.5).that_meet({kFirstTriangle, kSecondTriangle}), Indices{});
+}
+
+/// Whose boxes share no point of the lattice by which they are found but in one cube.
+TEST(LoosePolygons, MeetAcrossTheLattice) {
+  Mesh mesh{{{-30, 0.5, 0.5}, {30, 0.5, 0.5}, {30, 1, 0.5}, {20.5, -20, 0}, {20.5, 20, 0}, {20.5, 0, 3}},
+            {},
+            {{0, 1, 2}, {3, 4, 5}}};
+  EXPECT_EQ(mesh.that_meet({kFirstTriangle}), Indices{0});
+  mesh.points[5].z() = 0.2;
+  EXPECT_EQ(mesh.that_meet({kFirstTriangle}), Indices{});
+}
+
+TEST(LoosePolygons, MayShareAnEdgeOrACorner) {
+  Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {-4, -1, 0}, {-1, -4, 0}},
+            {},
+            {{0, 1, 2}, {1, 3, 2}, {0, 4, 5}}};
+  EXPECT_EQ(mesh.that_meet({kFirstTriangle}), Indices{});
+  mesh.points[3] = {0.5, 0.5, 0};  // folded back
+  EXPECT_EQ(mesh.that_meet({kFirstTriangle}), Indices{0});
+}
+
+TEST(LoosePolygons, MeetWhatHasTheSameCorners) {
+  Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {}, {{0, 1, 2}, {0, 1, 2}}};
+  EXPECT_EQ(mesh.that_meet({kSecondTriangle}), Indices{0});
+}
+
+TEST(LoosePolygons, MeetThemselvesWhereTheyAreFolded) {
+  Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}}, {{0, 1, 2, 3}}, {}};
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
+  mesh.points[3] = {3, 1, 0};  // on the same side of the diagonal as the second corner
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
+}
+
+}  // namespace
+}  // namespace hermesh
