@@ -27,10 +27,9 @@ namespace hermesh {
 /// the corners of a triangle directions are interpolated; over each triangle stands a prism, as far up and
 /// down its pillars as the tolerance, and prisms of neighbours share a wall. It is shown that
 ///   - pillars rise over their triangles and neither meet nor cross, so that a place in a prism lies on one
-///   line of it;
-///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and stay
-///   between its lid and
-///     its bottom;
+///     line of it;
+///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and
+///     stay between its lid and its bottom;
 ///   - S is there, a triangle of one of the cells that the polygon's regions are made of.
 /// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at
 /// all, because the lines that do are an open and a closed set: S has no border, and leaves by the walls
