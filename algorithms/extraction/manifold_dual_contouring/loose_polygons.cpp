@@ -78,22 +78,31 @@ std::vector<std::size_t> loose_polygons_that_meet(const std::vector<Vector3d>& p
     return box;
   };
   struct Tested {
-    std::size_t number;
+    std::size_t number, other_half;  ///< that of the same quad, or itself
     Triangle triangle;
     Box3 box;
     std::size_t loose;
+
+    /// The triangles of two quads that have one diagonal would not meet, but be four at an edge.
+    bool shares_diagonal(const Triangle& t, std::size_t other) const {
+      if (other_half == number || other == other_half) return false;
+      const std::size_t end = other_half > number ? 2 : 1;  // 012 or 023 of the quad
+      return std::ranges::count(t, triangle[0]) + std::ranges::count(t, triangle[end]) == 2;
+    }
   };
   std::vector<Tested> tested;
-  const auto add = [&](std::size_t number, std::size_t i) {
+  const auto add = [&](std::size_t number, std::size_t other_half, std::size_t i) {
     const Triangle t = triangle_of(number);
-    tested.push_back({number, t, box_of(t), i});
+    tested.push_back({number, other_half, t, box_of(t), i});
   };
   for (std::size_t i = 0; i < loose.size(); ++i) {
-    if (loose[i].is_quad)
-      for (const std::size_t which : {0, 1})
-        add(triangles.size() + 2 * std::size_t{loose[i].number} + which, i);
-    else
-      add(loose[i].number, i);
+    if (!loose[i].is_quad) {
+      add(loose[i].number, loose[i].number, i);
+    } else {
+      const std::size_t first = triangles.size() + 2 * std::size_t{loose[i].number};
+      add(first, first + 1, i);
+      add(first + 1, first, i);
+    }
   }
   TrianglesByPlace by_place;
   for (std::size_t i = 0; i < tested.size(); ++i) by_place.add(static_cast<std::uint32_t>(i), tested[i].box);
@@ -107,7 +116,8 @@ std::vector<std::size_t> loose_polygons_that_meet(const std::vector<Vector3d>& p
       std::atomic_ref answer(meets[other.loose]);
       if (other.number == number || answer.load(std::memory_order_relaxed) || !box.overlaps(other.box))
         return;
-      if (!certainly_apart(t, other.triangle, points)) answer.store(1, std::memory_order_relaxed);
+      if (other.shares_diagonal(t, number) || !certainly_apart(t, other.triangle, points))
+        answer.store(1, std::memory_order_relaxed);
     });
   });
   std::vector<std::size_t> result;

@@ -72,5 +72,19 @@ TEST(LoosePolygons, MeetThemselvesWhereTheyAreFolded) {
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
 }
 
+/// Two quads, tilted against one another, with one diagonal: four triangles at one edge, of which no two
+/// meet.
+TEST(LoosePolygons, HaveDiagonalsOfTheirOwn) {
+  Mesh mesh{{{0, 0, 0}, {4, 0, 1}, {4, 4, 0}, {0, 4, 1}, {4, 0, -3}, {0, 4, -3}}, {{0, 1, 2, 3}}, {}};
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
+  mesh.quads.push_back({2, 5, 0, 4});
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
+  mesh.quads.back() = {5, 0, 4,
+                       2};  // cut along the other one, which the sides of the first quad do not touch
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
+  mesh.triangles.push_back({0, 2, 5});
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
+}
+
 }  // namespace
 }  // namespace hermesh

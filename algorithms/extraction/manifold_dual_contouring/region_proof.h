@@ -29,8 +29,9 @@ namespace hermesh {
 /// regions' points passes through it to the edges of its border. Each of these triangles makes two tetrahedra
 /// with the regions' points. Those of one edge are its envelope; envelopes lie side by side, and a polygon
 /// that is not loose stays within its own (region_polygon.h, after Ju & Udeshi 2006). Polygons of cells of
-/// several sheets, or with ambiguous faces, are those of S, and too far from every cube to meet what has
-/// changed (kAway in regions.cpp). Loose polygons are tested against all others (loose_polygons.h).
+/// several sheets, or with ambiguous faces, are those of S, and too far from every cube to meet one of these
+/// (kAway in regions.cpp). Loose polygons may reach farther, and have one diagonal in common; they are tested
+/// against all others (loose_polygons.h).
 ///
 /// **Distance.** See region_shell.h.
 class RegionProof {

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
@@ -262,22 +263,23 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
   scratch.open.clear();
   polygon.for_each_triangle([&](int a, int b, int c) { scratch.open.push_back({a, b, c}); });
   scratch.highest = most;
-  bool is_there = false;
-  double before = 0;
+  // S is in a prism, and by their common wall in the other triangle's, if that is no lower.
+  double found_at = std::numeric_limits<double>::infinity(), before = 0;
   const double lowest = std::min(kLow, most);
   for (const double height : {std::min(kFirst, most), most, lowest}) {
     if (std::exchange(before, height) == height) continue;
     scratch.height = height;
     scratch.is_lowest = height == lowest;
     gather(polygon, scratch);
-    const Answer answer = look(polygon, is_there, scratch);
+    const Answer answer = look(polygon, found_at <= height, scratch);
     if (answer.never) return false;
-    is_there = answer.is_there;
+    if (!answer.is_there) continue;
+    found_at = std::min(found_at, height);
     std::size_t still_open = 0;
     for (std::size_t i = 0; i < scratch.open.size(); ++i)
       if (!((answer.shown >> i) & 1)) scratch.open[still_open++] = scratch.open[i];
     scratch.open.resize(still_open);
-    if (still_open == 0) return is_there;
+    if (still_open == 0) return true;
   }
   return false;
 }
@@ -370,12 +372,13 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, bool is_ther
   if (answer.is_there || answer.shown == 0) return answer;
   // No point is certainly in a prism; perhaps a triangle is. First those that the polygon's own edge has in
   // S.
-  const auto is_witness = [&](const Triangle& t, std::size_t p, unsigned between) {
+  const auto is_witness = [&](const Triangle& t, std::size_t p) {
     return ((answer.shown >> triangle_of[p]) & 1) && scratch.is_own(corners_of(t)) &&
-           meeting_of(t, p, between) == Meeting::good && reaches_into(prisms[p], corners_of(t));
+           meet(prisms[p], corners_of(t), tolerance_of(t)) == Meeting::good &&
+           reaches_into(prisms[p], corners_of(t));
   };
   const auto look_at = [&](const Triangle& t) {
-    for (std::size_t p = 0; p < prisms.size(); ++p) answer.is_there = answer.is_there || is_witness(t, p, 0);
+    for (std::size_t p = 0; p < prisms.size(); ++p) answer.is_there = answer.is_there || is_witness(t, p);
   };
   polygons_.polygons_of(
       polygon.crossing,
@@ -387,8 +390,8 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, bool is_ther
   if (answer.is_there) return answer;
   for (shell_kernels::Window& window : scratch.windows) window.facing = 0;
   found = find();
-  for_each_near([&](const Triangle& t, std::size_t p, unsigned between) {
-    answer.is_there = answer.is_there || is_witness(t, p, between);
+  for_each_near([&](const Triangle& t, std::size_t p, unsigned) {
+    answer.is_there = answer.is_there || is_witness(t, p);
   });
   return answer;
 }

@@ -54,8 +54,8 @@ class RegionShell {
   struct Scratch;
   /// About the triangles of a polygon that are open.
   struct Answer {
-    unsigned shown;  ///< a bit each
-    bool is_there;   ///< S has been found in the prism of one that is shown
+    unsigned shown;  ///< a bit each; nothing is, unless S is there
+    bool is_there;   ///< S has been found in the prism of one of them
     bool never;      ///< the polygon cannot be shown to hold
   };
 
