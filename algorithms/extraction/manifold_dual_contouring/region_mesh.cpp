@@ -73,28 +73,27 @@ class Filling {
       std::ranges::transform(made.triangles, mesh.triangles.data() + triangles[b], numbered);
     });
     for (std::size_t b = 0; b < n; ++b)
-      for (const Loose& loose : made_[b].loose) {
-        const auto first = static_cast<std::uint32_t>((loose.is_quad ? quads : triangles)[b]);
-        loose_.push_back({loose.edge, {first + loose.polygon, loose.is_quad}});
+      for (LooseEdge loose : made_[b].loose) {
+        loose.polygon.number += static_cast<std::uint32_t>((loose.polygon.is_quad ? quads : triangles)[b]);
+        loose_.push_back(loose);
       }
     return mesh;
   }
 
-  /// Edges that have them, ascending, and their polygons.
-  const std::vector<std::pair<CellBlocks::Edge, LoosePolygon>>& loose() const { return loose_; }
+  struct LooseEdge {
+    CellBlocks::Edge edge;
+    LoosePolygon polygon;
+  };
+  /// All there are.
+  const std::vector<LooseEdge>& loose() const { return loose_; }
 
  private:
-  struct Loose {
-    CellBlocks::Edge edge;
-    bool is_quad;
-    std::uint32_t polygon;  ///< among the block's
-  };
   /// Of a block.
   struct Made {
     std::vector<Quad> quads;  ///< of names: a point's number in the uniform mesh, or first_cube_ and a cube's
     std::vector<Triangle> triangles;
     std::vector<std::uint32_t> kept;  ///< points on edges
-    std::vector<Loose> loose;
+    std::vector<LooseEdge> loose;     ///< with numbers among the block's polygons
   };
 
   std::uint32_t name_of(const Region& region) const {
@@ -114,9 +113,8 @@ class Filling {
     }
     const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
     const bool is_quad = polygon.corners == 4;
-    if (polygon.loose)
-      made.loose.push_back(
-          {edge, is_quad, static_cast<std::uint32_t>(is_quad ? made.quads.size() : made.triangles.size())});
+    const auto number = static_cast<std::uint32_t>(is_quad ? made.quads.size() : made.triangles.size());
+    if (polygon.loose) made.loose.push_back({edge, {number, is_quad}});
     std::array<std::uint32_t, 4> names{};
     for (int i = 0; i < polygon.corners; ++i) names[i] = name_of(polygon.regions[i]);
     if (!is_quad) {
@@ -147,7 +145,7 @@ class Filling {
   const std::uint32_t first_cube_;     ///< name of the first
   std::vector<std::uint32_t> number_;  ///< by name
   std::vector<Made> made_;             ///< by block
-  std::vector<std::pair<CellBlocks::Edge, LoosePolygon>> loose_;
+  std::vector<LooseEdge> loose_;
 };
 
 }  // namespace
@@ -155,17 +153,15 @@ class Filling {
 RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
                          std::span<const float> tolerance, const FilePoints& file, RunContext& context) {
   Regions regions(cells, points, tolerance, file, context);
-  std::size_t splits = 0;
-  const auto prove = [&](RegionProof& proof) {
-    Stage stage(context, "prove regions");
-    splits += proof.run();
-  };
   RegionProof proof = [&] {
     Stage stage(context, "prepare the proof");
     return RegionProof(regions, polygons, points, tolerance, context);
   }();
-  for (;;) {
-    prove(proof);
+  for (std::size_t splits = 0;;) {
+    splits += [&] {
+      Stage stage(context, "prove regions");
+      return proof.run();
+    }();
     Filling filling(regions, polygons, points, context);
     RegionMesh mesh = [&] {
       Stage stage(context, "connect regions");
@@ -173,7 +169,7 @@ RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, 
     }();
     Stage stage(context, "test loose polygons");
     std::vector<LoosePolygon> tested;
-    for (const auto& [edge, polygon] : filling.loose()) tested.push_back(polygon);
+    for (const auto& loose : filling.loose()) tested.push_back(loose.polygon);
     const std::vector<std::size_t> meeting =
         loose_polygons_that_meet(mesh.points, mesh.quads, mesh.triangles, tested, context);
     if (meeting.empty()) {
@@ -181,7 +177,7 @@ RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, 
       context.figure("loose_polygons", double(tested.size()));
       return mesh;
     }
-    for (const std::size_t i : meeting) proof.call_bold(filling.loose()[i].first);
+    for (const std::size_t i : meeting) proof.call_bold(filling.loose()[i].edge);
   }
 }
 
