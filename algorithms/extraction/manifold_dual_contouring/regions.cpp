@@ -24,8 +24,8 @@ constexpr double kLeastAgreement = 0.93;
 /// what it stands for, but on the surface.
 constexpr double kPullToMean = 0.02;
 /// Steps from a cell whose polygons the rule of envelopes does not cover (uniform_mesh.h) to the nearest cell that may
-/// become part of a cube. Its polygons lie within the cells next to it, and those of a cube within the cube and the cells next
-/// to that.
+/// become part of a cube. Its polygons lie within the cells next to it, and those of a cube, if they are not loose, within the
+/// cube and the cells next to that.
 constexpr int kAway = 3;
 
 /// Level at which a plane of the lattice comes to lie within a cube, by its coordinate in the block; beyond kLevels if never.
