@@ -245,6 +245,33 @@ void RegionShell::gather(std::int32_t block, const std::array<int, 3>& corner, c
             [&](const Triangle& t) { scratch.fans.push_back(t); });
 }
 
+/// The triangles of S beside these sides, at the polygon's own crossing edge, face up along the pillars at
+/// their ends; so they are on the polygon's side of the wall there.
+bool RegionShell::starts_at_borders(const RegionPolygon& polygon, const Scratch& scratch) const {
+  for (int i = 0; i < polygon.corners; ++i) {
+    const int j = polygon.next(i);
+    const Region &a = polygon.regions[i], &b = polygon.regions[j];
+    if (a.merged() || b.merged()) continue;
+    const std::uint32_t p = cells_.point(a.block, a.cell, 0), q = cells_.point(b.block, b.cell, 0);
+    bool starts = false;
+    const auto look_at = [&](const Triangle& t) {
+      if (std::ranges::count(t, p) + std::ranges::count(t, q) < 2) return;
+      const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+      starts = normal.dot(scratch.pillars[static_cast<std::size_t>(i)]) > 0 &&
+               normal.dot(scratch.pillars[static_cast<std::size_t>(j)]) > 0;
+    };
+    polygons_.polygons_of(
+        polygon.crossing,
+        [&](const Quad& quad) {
+          look_at({quad[0], quad[1], quad[2]});
+          look_at({quad[0], quad[2], quad[3]});
+        },
+        look_at);
+    if (!starts) return false;
+  }
+  return true;
+}
+
 bool RegionShell::holds(const RegionPolygon& polygon) const {
   Scratch& scratch = *scratch_.local();
   scratch.regions = polygon.corners;
@@ -260,6 +287,7 @@ bool RegionShell::holds(const RegionPolygon& polygon) const {
       scratch.cubes[static_cast<std::size_t>(i)].upper[a] = static_cast<float>(lower[a] + region.side());
     }
   }
+  if (!starts_at_borders(polygon, scratch)) return false;
   scratch.open.clear();
   polygon.for_each_triangle([&](int a, int b, int c) { scratch.open.push_back({a, b, c}); });
   scratch.highest = most;

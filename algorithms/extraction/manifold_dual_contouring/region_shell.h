@@ -30,7 +30,10 @@ namespace hermesh {
 ///     line of it;
 ///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and
 ///     stay between its lid and its bottom;
-///   - S is there, a triangle of one of the cells that the polygon's regions are made of.
+///   - S is there, a triangle of one of the cells that the polygon's regions are made of;
+///   - at sides between two cells that are alone, beyond which T may be S, S goes on into the prism: else it
+///   could bulge
+///     out between T and the place where the lines of the prism meet it.
 /// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at
 /// all, because the lines that do are an open and a closed set: S has no border, and leaves by the walls
 /// alone. So each point of T has one of S no farther away than the tolerance. And as S comes to T's
@@ -63,6 +66,7 @@ class RegionShell {
   std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t layer) const;
   void describe(std::size_t block, std::uint32_t first_quad);
   void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
+  bool starts_at_borders(const RegionPolygon& polygon, const Scratch& scratch) const;
   void gather(const RegionPolygon& polygon, Scratch& scratch) const;
   void gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3], const int (&to)[3],
               Scratch& scratch) const;
