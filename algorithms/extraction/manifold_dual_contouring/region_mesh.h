@@ -18,9 +18,9 @@ struct RegionMesh {
   LargeArray<Quad> quads;
 };
 
-/// Closed, oriented, manifold and free of self-intersection if that is, and within
-/// the tolerance of it both ways, but never farther than RegionShell::kFarthest (region_proof.h). The same
-/// bytes for every number of threads.
+/// Closed, oriented, manifold and free of self-intersection if the uniform mesh is, and within the tolerance of
+/// it both ways, but never farther than RegionShell::kFarthest (region_proof.h). The same bytes for every number
+/// of threads.
 /// @param points of the uniform mesh: those of cells lie within their cells, and those of fanned edges are
 /// behind them
 /// @param tolerance by point, those on fanned edges included; voxels

@@ -254,19 +254,12 @@ bool RegionShell::starts_at_borders(const RegionPolygon& polygon, const Scratch&
     if (a.merged() || b.merged()) continue;
     const std::uint32_t p = cells_.point(a.block, a.cell, 0), q = cells_.point(b.block, b.cell, 0);
     bool starts = false;
-    const auto look_at = [&](const Triangle& t) {
+    for_each_triangle_of(polygon.crossing, [&](const Triangle& t) {
       if (std::ranges::count(t, p) + std::ranges::count(t, q) < 2) return;
-      const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+      const Vector3d normal = normal_of(t);
       starts = normal.dot(scratch.pillars[static_cast<std::size_t>(i)]) > 0 &&
                normal.dot(scratch.pillars[static_cast<std::size_t>(j)]) > 0;
-    };
-    polygons_.polygons_of(
-        polygon.crossing,
-        [&](const Quad& quad) {
-          look_at({quad[0], quad[1], quad[2]});
-          look_at({quad[0], quad[2], quad[3]});
-        },
-        look_at);
+    });
     if (!starts) return false;
   }
   return true;
@@ -361,7 +354,7 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, bool is_ther
     return double(std::min({tolerance_[t[0]], tolerance_[t[1]], tolerance_[t[2]]}));
   };
   const auto faces = [&](const ShellPrism& prism, const Triangle& t) {
-    const Vector3d normal = (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+    const Vector3d normal = normal_of(t);
     return std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; });
   };
   const auto meeting_of = [&](const Triangle& t, std::size_t p, unsigned between) {
@@ -405,16 +398,9 @@ RegionShell::Answer RegionShell::look(const RegionPolygon& polygon, bool is_ther
            meet(prisms[p], corners_of(t), tolerance_of(t)) == Meeting::good &&
            reaches_into(prisms[p], corners_of(t));
   };
-  const auto look_at = [&](const Triangle& t) {
+  for_each_triangle_of(polygon.crossing, [&](const Triangle& t) {
     for (std::size_t p = 0; p < prisms.size(); ++p) answer.is_there = answer.is_there || is_witness(t, p);
-  };
-  polygons_.polygons_of(
-      polygon.crossing,
-      [&](const Quad& q) {
-        look_at({q[0], q[1], q[2]});
-        look_at({q[0], q[2], q[3]});
-      },
-      look_at);
+  });
   if (answer.is_there) return answer;
   for (shell_kernels::Window& window : scratch.windows) window.facing = 0;
   found = find();

@@ -4,6 +4,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -72,6 +73,18 @@ class RegionShell {
               Scratch& scratch) const;
   Answer look(const RegionPolygon& polygon, bool is_there, Scratch& scratch) const;
   Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
+  Eigen::Vector3d normal_of(const Triangle& t) const {
+    return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+  }
+  /// Calls f(Triangle) for those that a crossing edge has in S.
+  template <class F>
+  void for_each_triangle_of(const CellBlocks::Edge& edge, F&& f) const {
+    const auto halves = [&](const Quad& q) {
+      f(Triangle{q[0], q[1], q[2]});
+      f(Triangle{q[0], q[2], q[3]});
+    };
+    polygons_.polygons_of(edge, halves, f);
+  }
 
   const Regions& regions_;
   const CellBlocks& cells_;
