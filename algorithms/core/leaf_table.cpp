@@ -347,27 +347,62 @@ bool LeafTable::is_complete(RunContext& context) const {
   });
   if (!complete) return false;
   // Tiles as large as a node or larger: only those unlike the background need a look, and there are few.
+  const std::vector<openvdb::CoordBBox> tiles = large_tiles_unlike_background(context);
+  parallel_blocks(tiles.size(), context, [&](std::size_t i) {
+    if (complete && meets_background(tiles[i])) complete = false;
+  });
+  return complete;
+}
+
+std::vector<openvdb::CoordBBox> LeafTable::large_tiles_unlike_background(RunContext& context) const {
   const bool background = rule_(tree_->background());
-  openvdb::FloatTree::ValueAllCIter it = tree_->cbeginValueAll();
-  it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 2);
-  Accessor access(*tree_);
-  for (; it; ++it) {
-    if (rule_(*it) == background) continue;
-    const openvdb::CoordBBox box = it.getBoundingBox();
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int side : {-1, 1}) {
-        Coord there = box.min();
-        there[axis] += side > 0 ? box.dim()[axis] : -1;
-        // Smaller tiles beyond were compared with this one from their own side.
-        for (int a = 0; a < box.dim()[(axis + 1) % 3]; a += TreeNode::DIM)
-          for (int b = 0; b < box.dim()[(axis + 2) % 3]; b += TreeNode::DIM) {
-            Coord at = there;
-            at[(axis + 1) % 3] += a, at[(axis + 2) % 3] += b;
-            if (!access.probeConstNode<TreeNode>(at) && rule_(access.getValue(at)) == background) return false;
-          }
+  std::vector<openvdb::CoordBBox> found;
+  const auto add = [&](const Coord& lower, int width) {
+    found.push_back(openvdb::CoordBBox::createCube(lower, width));
+  };
+  for (auto it = tree_->root().cbeginValueAll(); it; ++it)
+    if (rule_(*it) != background) add(it.getCoord(), LargeNode::DIM);
+  std::vector<const LargeNode*> nodes;
+  tree_->getNodes(nodes);
+  // An iterator over the tiles takes longer than all else that is done with a leaf's signs.
+  constexpr std::size_t kTogether = 64;
+  static_assert(LargeNode::NUM_VALUES % kTogether == 0);
+  for (const LargeNode* node : nodes) {
+    context.check();
+    const auto* const table = node->getTable();
+    for (std::size_t word = 0; word < LargeNode::NUM_VALUES / kTogether; ++word) {
+      const auto child =
+          node->getChildMask().template getWord<std::uint64_t>(static_cast<openvdb::Index>(word));
+      std::uint64_t unlike = 0;
+      for (std::size_t bit = 0; bit < kTogether; ++bit)
+        unlike |= static_cast<std::uint64_t>(rule_(table[kTogether * word + bit].getValue()) != background)
+                  << bit;
+      for (unlike &= ~child; unlike != 0; unlike &= unlike - 1) {
+        const auto slot = kTogether * word + static_cast<std::size_t>(std::countr_zero(unlike));
+        add(node->offsetToGlobalCoord(static_cast<openvdb::Index>(slot)), TreeNode::DIM);
       }
+    }
   }
-  return true;
+  return found;
+}
+
+/// True if a tile as large as a node or larger touches another one with the background's sign.
+bool LeafTable::meets_background(const openvdb::CoordBBox& box) const {
+  const bool background = rule_(tree_->background());
+  Accessor access(*tree_);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {-1, 1}) {
+      Coord there = box.min();
+      there[axis] += side > 0 ? box.dim()[axis] : -1;
+      // Smaller tiles beyond were compared with this one from their own side.
+      for (int a = 0; a < box.dim()[(axis + 1) % 3]; a += TreeNode::DIM)
+        for (int b = 0; b < box.dim()[(axis + 2) % 3]; b += TreeNode::DIM) {
+          Coord at = there;
+          at[(axis + 1) % 3] += a, at[(axis + 2) % 3] += b;
+          if (!access.probeConstNode<TreeNode>(at) && rule_(access.getValue(at)) == background) return true;
+        }
+    }
+  return false;
 }
 
 std::vector<Coord> LeafTable::missing_leaves(RunContext& context) const {

@@ -64,7 +64,8 @@ class LeafTable {
  private:
   static constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
   using Leaf = openvdb::FloatTree::LeafNodeType;
-  using TreeNode = openvdb::FloatTree::RootNodeType::ChildNodeType::ChildNodeType;
+  using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
+  using TreeNode = LargeNode::ChildNodeType;
   static constexpr int kWords = 64;  ///< of a mask of 16³ bits
   using NodeMask = std::array<std::uint64_t, kWords>;
 
@@ -84,6 +85,8 @@ class LeafTable {
   void read_signs(RunContext& context);
   bool is_complete(RunContext& context) const;
   bool tiles_meet(const Node& node) const;
+  std::vector<openvdb::CoordBBox> large_tiles_unlike_background(RunContext& context) const;
+  bool meets_background(const openvdb::CoordBBox& tile) const;
   bool differs_from_tile_below(std::size_t leaf, int axis) const;
   std::int32_t find(const Node& node, std::uint32_t slot) const;
   static void find_three(const Node& node, std::uint32_t slot, std::int32_t* result);

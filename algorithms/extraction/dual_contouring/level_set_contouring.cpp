@@ -101,7 +101,7 @@ class LevelSetContourer {
   PolygonMesh extract() {
     PolygonMesh mesh;
     mesh.origin = placement_.origin;
-    reserve_huge(mesh.points, points_);
+    reserve_huge(mesh.points, points_ + 1);  // connecting reads a number beyond the last
     mesh.points.resize(points_);
     mesh.quads.resize(quads_);
     LargeArray<float> offsets(quads_ + leaf_kernels::kLargestVector);

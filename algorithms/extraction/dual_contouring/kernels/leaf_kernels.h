@@ -99,7 +99,7 @@ struct ConnectInput {
   /// Cells of the leaf and its lower neighbours, at dx + 2dy + 4dz with the offsets turned positive; null where there is
   /// no leaf or none of its cells is needed.
   const LeafCells* cells[8];
-  const float* points;   ///< of the mesh
+  const float* points;   ///< of the mesh; one number more can be read
   const float* offsets;  ///< of the leaf's crossing edges; kLargestVector more can be read
   float corner[3];       ///< where the leaf's first sample is in the mesh's coordinates
   float to_voxels[3][4];  ///< by axis of the mesh: what a step along it is in voxels, and 0
