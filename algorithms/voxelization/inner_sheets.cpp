@@ -43,45 +43,74 @@ struct Piece : Facet {
 
 using Voxel = std::array<std::int32_t, 3>;
 
-/// Which voxels are suspicious; each thread has its own, since it keeps the block that it looked up last.
+/// Which voxels are suspicious.
+struct Suspects {
+  std::vector<VoxelBits> voxels;      ///< by block
+  std::vector<std::uint32_t> blocks;  ///< those with some
+};
+
+/// Whether pieces are near such voxels; each thread has its own, since it keeps the block that it looked up
+/// last.
 class Suspicion {
  public:
-  Suspicion(const std::vector<VoxelBits>& suspicious, const BlockTable& blocks)
-      : suspicious_(suspicious), finder_(blocks) {}
+  Suspicion(const Suspects& suspects, const Band& band, const BlockTable& blocks)
+      : suspects_(suspects), band_(band), finder_(blocks) {}
 
-  /// Whether such a voxel is in or next to the piece's box.
+  /// Whether a suspicious voxel is in or next to the piece's box.
   bool touches(const Piece& piece) {
     Voxel from, to;
-    for (int a = 0; a < 3; ++a) {
-      const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
-      from[std::size_t(a)] = std::int32_t(std::floor(low));
-      to[std::size_t(a)] = std::int32_t(std::floor(high));
+    BlockAt low, high;
+    double blocks = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int axis = static_cast<int>(a);
+      const auto [least, most] =
+          std::minmax({piece.corner[0][axis], piece.corner[1][axis], piece.corner[2][axis]});
+      from[a] = std::int32_t(std::floor(least)), low[a] = from[a] >> 3;
+      to[a] = std::int32_t(std::floor(most)), high[a] = to[a] >> 3;
+      blocks *= high[a] - low[a] + 1;
     }
-    for (std::int32_t x = from[0]; x <= to[0]; ++x)
-      for (std::int32_t y = from[1]; y <= to[1]; ++y)
-        for (std::int32_t z = from[2]; z <= to[2]; ++z)
-          if (has({x, y, z})) return true;
+    // A large triangle has more blocks in its box than there are with suspicious voxels.
+    if (blocks > static_cast<double>(suspects_.blocks.size()))
+      return std::ranges::any_of(suspects_.blocks,
+                                 [&](std::uint32_t b) { return has(b, band_.blocks[b], from, to); });
+    for (std::int32_t x = low[0]; x <= high[0]; ++x)
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t z = low[2]; z <= high[2]; ++z) {
+          const std::uint32_t block = finder_.find({x, y, z});
+          if (block != BlockTable::kNone && has(block, {x, y, z}, from, to)) return true;
+        }
     return false;
   }
 
  private:
-  bool has(const Voxel& voxel) {
-    const std::uint32_t block = finder_.find(tile_of(voxel));
-    if (block == BlockTable::kNone) return false;
-    const unsigned place = place_in_tile(voxel);
-    return suspicious_[block][place >> 6] >> (place & 63) & 1;
+  /// Whether one of the block's is in the box.
+  bool has(std::uint32_t block, const BlockAt& at, const Voxel& from, const Voxel& to) const {
+    int first[3], last[3];  // in the block
+    for (std::size_t a = 0; a < 3; ++a) {
+      first[a] = std::max(from[a] - 8 * at[a], 0);
+      last[a] = std::min(to[a] - 8 * at[a], 7);
+      if (first[a] > last[a]) return false;
+    }
+    const std::uint64_t row = (std::uint64_t(2) << last[2]) - (std::uint64_t(1) << first[2]);
+    std::uint64_t plane = 0;
+    for (int y = first[1]; y <= last[1]; ++y) plane |= row << (8 * y);
+    for (int x = first[0]; x <= last[0]; ++x)
+      if (suspects_.voxels[block][std::size_t(x)] & plane) return true;
+    return false;
   }
 
-  const std::vector<VoxelBits>& suspicious_;
+  const Suspects& suspects_;
+  const Band& band_;
   BlockFinder finder_;
 };
 
 /// What a thread asks about pieces.
 class Prober {
  public:
-  Prober(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
-         const std::vector<VoxelBits>& suspicious, bool thorough, const WindingNumber* winding)
-      : probe_(soup, bins, inside, thorough, winding), suspicion_(suspicious, bins.blocks()) {}
+  Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
+         const std::vector<VoxelBits>& inside, const Suspects& suspects, bool thorough,
+         const WindingNumber* winding)
+      : probe_(soup, bins, inside, thorough, winding), suspicion_(suspects, band, bins.blocks()) {}
 
   Side side(const Vector3d& q, const Vector3d& normal) { return probe_.side(q, normal); }
   bool suspicious(const Piece& piece) { return suspicion_.touches(piece); }
@@ -170,11 +199,11 @@ class Finder {
       }
     });
     spread_over_neighbours(marked, counts);
-    suspicious_.assign(band_.blocks.size(), VoxelBits{});
+    suspects_.voxels.assign(band_.blocks.size(), VoxelBits{});
     for (std::uint32_t i = 0; i < marked.size(); ++i)
       for_each_voxel(counts, i, [&](const Voxel& voxel) { suspect_around(voxel); });
-    for (std::uint32_t i = 0; i < suspicious_.size(); ++i)
-      if (suspicious_[i] != VoxelBits{}) suspects_.push_back(i);
+    for (std::uint32_t i = 0; i < marked.size(); ++i)
+      if (suspects_.voxels[i] != VoxelBits{}) suspects_.blocks.push_back(i);
   }
 
   /// Calls f(voxel) for the bits of a block.
@@ -235,7 +264,7 @@ class Finder {
           const std::uint64_t row = (std::uint64_t(2) << z1) - (std::uint64_t(1) << z0);
           std::uint64_t plane = 0;
           for (int i = y0; i <= y1; ++i) plane |= row << (8 * i);
-          for (int i = x0; i <= x1; ++i) suspicious_[block][std::size_t(i)] |= plane;
+          for (int i = x0; i <= x1; ++i) suspects_.voxels[block][std::size_t(i)] |= plane;
         }
   }
 
@@ -321,28 +350,39 @@ class Finder {
 
   /// All that touch a suspicious voxel.
   std::vector<std::uint32_t> find_triangles() const {
-    std::vector<std::vector<std::uint32_t>> lists(suspects_.size());
-    parallel_blocks(suspects_.size(), context_, [&](std::size_t i) {
-      add_triangles(suspects_[i], lists[i]);
-      Suspicion suspicion(suspicious_, bins_.blocks());
-      std::erase_if(lists[i], [&](std::uint32_t t) { return !suspicion.touches(Piece(soup_.corners(t))); });
+    std::vector<std::vector<std::uint32_t>> small(suspects_.blocks.size());
+    const auto keep_those_that_touch = [&](std::vector<std::uint32_t>& triangles) {
+      Suspicion suspicion(suspects_, band_, bins_.blocks());
+      std::erase_if(triangles, [&](std::uint32_t t) { return !suspicion.touches(Piece(soup_.corners(t))); });
+    };
+    parallel_blocks(small.size(), context_, [&](std::size_t i) {
+      add_small_triangles(suspects_.blocks[i], small[i]);
+      keep_those_that_touch(small[i]);
     });
+    // A large triangle is under many blocks.
     std::vector<std::uint32_t> triangles;
-    for (const auto& list : lists) triangles.insert(triangles.end(), list.begin(), list.end());
-    std::sort(triangles.begin(), triangles.end());
-    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    const auto sort = [&] {
+      std::sort(triangles.begin(), triangles.end());
+      triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+    };
+    for (const std::uint32_t block : suspects_.blocks) {
+      const std::span<const std::uint32_t> large = bins_.large(block);
+      triangles.insert(triangles.end(), large.begin(), large.end());
+    }
+    sort();
+    keep_those_that_touch(triangles);
+    for (const auto& list : small) triangles.insert(triangles.end(), list.begin(), list.end());
+    sort();
     return triangles;
   }
 
-  void add_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
+  void add_small_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
     const BlockAt& at = band_.blocks[block];
     bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         if (cluster.box.low[a] > at[a] * 8.0 + 9.0 || cluster.box.high[a] < at[a] * 8.0 - 1.0) return;
       triangles.insert(triangles.end(), cluster.triangles.begin(), cluster.triangles.end());
     });
-    const std::span<const std::uint32_t> large = bins_.large(block);
-    triangles.insert(triangles.end(), large.begin(), large.end());
   }
 
   std::vector<Remains> cut_all(const std::vector<std::uint32_t>& triangles) const {
@@ -403,8 +443,10 @@ class Finder {
     }
     std::sort(order.begin(), order.end());
     tbb::enumerable_thread_specific<Prober> probers(
-        [&] { return Prober(soup_, bins_, inside_, suspicious_, thorough, winding); });
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), 64), [&](const auto& range) {
+        [&] { return Prober(soup_, bins_, band_, inside_, suspects_, thorough, winding); });
+    // One at a time where there are few: a large triangle may take as long as thousands of small ones.
+    const std::size_t together = std::clamp<std::size_t>(order.size() / 1024, 1, 64);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), together), [&](const auto& range) {
       Prober& prober = probers.local();
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         context_.check();
@@ -448,8 +490,7 @@ class Finder {
   const Band& band_;
   const std::vector<VoxelBits>& inside_;
   const RunContext& context_;
-  std::vector<VoxelBits> suspicious_;
-  std::vector<std::uint32_t> suspects_;
+  Suspects suspects_;
 };
 
 }  // namespace
