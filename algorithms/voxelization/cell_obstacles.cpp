@@ -14,8 +14,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Some hundred kilobytes of each.
-constexpr std::size_t kMostBlocks = 256, kMostObstacles = 2000;
+/// Some hundred kilobytes of the one, some megabytes of the other: where sheets cross a block may hold thousands, and to
+/// file them again costs more than what is asked of them.
+constexpr std::size_t kMostBlocks = 256, kMostObstacles = 20000;
 
 /// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all did.
 template <class F>
