@@ -33,8 +33,7 @@ namespace hermesh {
 ///     stay between its lid and its bottom;
 ///   - S is there, a triangle of one of the cells that the polygon's regions are made of;
 ///   - at sides between two cells that are alone, beyond which T may be S, S goes on into the prism: else it
-///   could bulge
-///     out between T and the place where the lines of the prism meet it.
+///     could bulge out between T and the place where the lines of the prism meet it.
 /// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at
 /// all, because the lines that do are an open and a closed set: S has no border, and leaves by the walls
 /// alone. So each point of T has one of S no farther away than the tolerance. And as S comes to T's
@@ -55,36 +54,13 @@ class RegionShell {
   bool holds(const RegionPolygon& polygon) const;
 
  private:
-  struct Scratch;
-  /// About the triangles of a polygon that are open.
-  struct Answer {
-    unsigned shown;  ///< a bit each; nothing is, unless S is there
-    bool is_there;   ///< S has been found in the prism of one of them
-    bool never;      ///< the polygon cannot be shown to hold
-  };
+  class Search;
+  struct Buffers;
 
   /// Crossing edges with a quad.
   std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t layer) const;
   void describe(std::size_t block, std::uint32_t first_quad);
   void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
-  bool starts_at_borders(const RegionPolygon& polygon, const Scratch& scratch) const;
-  void gather(const RegionPolygon& polygon, Scratch& scratch) const;
-  void gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3], const int (&to)[3],
-              Scratch& scratch) const;
-  Answer look(const RegionPolygon& polygon, bool is_there, Scratch& scratch) const;
-  Corners corners_of(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
-  Eigen::Vector3d normal_of(const Triangle& t) const {
-    return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
-  }
-  /// Calls f(Triangle) for those that a crossing edge has in S.
-  template <class F>
-  void for_each_triangle_of(const CellBlocks::Edge& edge, F&& f) const {
-    const auto halves = [&](const Quad& q) {
-      f(Triangle{q[0], q[1], q[2]});
-      f(Triangle{q[0], q[2], q[3]});
-    };
-    polygons_.polygons_of(edge, halves, f);
-  }
 
   const Regions& regions_;
   const CellBlocks& cells_;
@@ -99,7 +75,7 @@ class RegionShell {
   std::array<LargeArray<float>, 3>
       in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
   shell_kernels::Look* const look_ = shell_kernels::chosen();
-  mutable tbb::enumerable_thread_specific<std::unique_ptr<Scratch>> scratch_;
+  mutable tbb::enumerable_thread_specific<std::unique_ptr<Buffers>> buffers_;
 };
 
 }  // namespace hermesh
