@@ -237,6 +237,34 @@ TEST(Voxelize, WallsOfAGapStayWhereInnerSheetsGo) {
   EXPECT_NEAR(at(v, 0, 0, 7), -std::hypot(0.35, 1.8), 0.1) << "the bar's bottom above the gap";
 }
 
+TEST(Voxelize, UnionOfABoxAndATurnedOne) {
+  // A few triangles, each of whose boxes holds more blocks than have anything to do with the seam. Outside,
+  // the distance to the union is that to the nearer box.
+  const Vector3d half(70.3, 61.7, 50.2), turned_half(90.1, 20.4, 30.6);
+  PolygonMesh mesh = box(-half, half), turned = box(-turned_half, turned_half);
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(0.7, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()))
+          .toRotationMatrix();
+  for (Eigen::Vector3f& p : turned.points) p = (turn * p.cast<double>()).cast<float>();
+  append(mesh, turned);
+  const Voxelization v = run(mesh);
+  // Negative inside.
+  const auto distance = [](const Vector3d& p, const Vector3d& to) {
+    const Vector3d beyond = p.cwiseAbs() - to;
+    return beyond.maxCoeff() > 0 ? beyond.cwiseMax(0.0).norm() : beyond.maxCoeff();
+  };
+  std::size_t wrong = 0, outside = 0;
+  for (auto voxel = v.distance->cbeginValueOn(); voxel; ++voxel) {
+    const openvdb::Coord c = voxel.getCoord();
+    const Vector3d p(c.x(), c.y(), c.z());
+    const double truth = std::min(distance(p, half), distance(turn.transpose() * p, turned_half));
+    outside += truth > 0;
+    wrong += truth > 0 ? std::abs(*voxel - truth) > 1e-3 : *voxel > 1e-3;
+  }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_GT(outside, 200'000u);
+}
+
 TEST(Voxelize, NestedShellsAreFilledOrKept) {
   PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
   append(mesh, sphere({0, 0, 0}, 10.0), true);
