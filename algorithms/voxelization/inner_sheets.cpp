@@ -29,6 +29,7 @@ struct Piece : Facet {
     return std::max(
         {(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
   }
+  double area() const { return 0.5 * normal().norm(); }
   /// Halves of the longest side.
   std::array<Piece, 2> halves() const {
     int longest = 0;
@@ -123,6 +124,7 @@ class Prober {
 /// What of a triangle is left.
 struct Remains {
   bool seen_inner = false, some_inner = false;
+  double inner_area = 0, doubtful_area = 0;
   std::vector<Piece> outer;
   std::vector<Piece> doubtful;  ///< of which something is unknown
 };
@@ -150,12 +152,15 @@ void cut(const Piece& piece, const Vector3d& normal, Prober& prober, bool last, 
   const bool seam = inner > 0 && (outer > 0 || (unknown > 0 && size > kMiddle));
   if (seam && size > kFine)
     for (const Piece& half : piece.halves()) cut(half, normal, prober, last, remains);
-  else if (unknown > 0 && !last)
+  else if (unknown > 0 && !last) {
     remains.doubtful.push_back(piece);
-  else if (inner > unknown)
+    remains.doubtful_area += piece.area();
+  } else if (inner > unknown) {
     remains.some_inner = true;
-  else
+    remains.inner_area += piece.area();
+  } else {
     remains.outer.push_back(piece);
+  }
 }
 
 class Finder {
@@ -397,23 +402,28 @@ class Finder {
   }
 
   /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
-  /// them, and only winding numbers tell an overlap from a gap. They are asked where inner sheets are the rule,
-  /// and what is doubtful are the seams between them: parts of a model that overlap. Where as much is doubtful as
-  /// is inner, these are the folds and crevices of a scan, of which nothing goes far; their walls stay. For winding
-  /// numbers and the search for ways along a crevice take longer than all the rest of the signs; of a small model
-  /// they are asked in any case.
+  /// them, and only winding numbers tell an overlap from a gap. They are asked where inner sheets are the
+  /// rule, and what is doubtful are the seams between them: parts of a model that overlap. Where as much is
+  /// doubtful as is inner, these are the folds and crevices of a scan, of which nothing goes far; their walls
+  /// stay. For winding numbers and the search for ways along a crevice take longer than all the rest of the
+  /// signs; of a small model they are asked as well where little is doubtful.
   void settle_doubts(const std::vector<std::uint32_t>& triangles, std::vector<Remains>& remains) const {
     std::vector<std::uint32_t> doubtful;
     std::size_t seen_inner = 0, pieces = 0;
+    double inner_area = 0, doubtful_area = 0;
     for (std::uint32_t i = 0; i < remains.size(); ++i) {
       if (!remains[i].doubtful.empty()) doubtful.push_back(i);
       seen_inner += remains[i].seen_inner ? 1 : 0;
       pieces += remains[i].doubtful.size();
+      inner_area += remains[i].inner_area;
+      doubtful_area += remains[i].doubtful_area;
     }
     if (doubtful.empty() || seen_inner == 0) return leave_doubts(doubtful, remains);
-    constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one
+    constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one, or inner area to doubtful area
     constexpr std::size_t kFewPieces = 5000, kSmallModel = 50'000;  // some tenths of a second
-    const bool small = pieces <= kFewPieces && soup_.size() <= kSmallModel;
+    // Of large triangles nearly all have doubtful places, along the edges of parts, however little these are.
+    const bool little = pieces <= kFewPieces || inner_area >= double(kTheRule) * doubtful_area;
+    const bool small = little && soup_.size() <= kSmallModel;
     if (!small && seen_inner < kTheRule * doubtful.size()) return leave_doubts(doubtful, remains);
     const OrientedWinding winding(soup_);
     if (!winding.usable()) return leave_doubts(doubtful, remains);

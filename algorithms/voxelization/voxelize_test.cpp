@@ -253,15 +253,21 @@ TEST(Voxelize, UnionOfABoxAndATurnedOne) {
     const Vector3d beyond = p.cwiseAbs() - to;
     return beyond.maxCoeff() > 0 ? beyond.cwiseMax(0.0).norm() : beyond.maxCoeff();
   };
-  std::size_t wrong = 0, outside = 0;
+  std::size_t wrong = 0, outside = 0, stray = 0;
+  double nearest = 0;
   for (auto voxel = v.distance->cbeginValueOn(); voxel; ++voxel) {
     const openvdb::Coord c = voxel.getCoord();
     const Vector3d p(c.x(), c.y(), c.z());
     const double truth = std::min(distance(p, half), distance(turn.transpose() * p, turned_half));
     outside += truth > 0;
     wrong += truth > 0 ? std::abs(*voxel - truth) > 1e-3 : *voxel > 1e-3;
+    // Inside, the surface is no nearer than that of the box that the place is deeper in.
+    if (truth <= 0) nearest = std::max(nearest, *voxel - truth);
+    stray += truth < -3.11;
   }
   EXPECT_EQ(wrong, 0u);
+  EXPECT_LT(nearest, 0.11) << "seams may be 0.1 off";
+  EXPECT_EQ(stray, 0u);
   EXPECT_GT(outside, 200'000u);
 }
 
