@@ -44,6 +44,14 @@ struct Piece : Facet {
 
 using Voxel = std::array<std::int32_t, 3>;
 
+/// Bits of a layer's voxels from a row and a place in it to others, all included.
+std::uint64_t layer_bits(int first_y, int last_y, int first_z, int last_z) {
+  const std::uint64_t row = (std::uint64_t(2) << last_z) - (std::uint64_t(1) << first_z);
+  std::uint64_t bits = 0;
+  for (int y = first_y; y <= last_y; ++y) bits |= row << (8 * y);
+  return bits;
+}
+
 /// Which voxels are suspicious.
 struct Suspects {
   std::vector<VoxelBits> voxels;      ///< by block
@@ -92,11 +100,9 @@ class Suspicion {
       last[a] = std::min(to[a] - 8 * at[a], 7);
       if (first[a] > last[a]) return false;
     }
-    const std::uint64_t row = (std::uint64_t(2) << last[2]) - (std::uint64_t(1) << first[2]);
-    std::uint64_t plane = 0;
-    for (int y = first[1]; y <= last[1]; ++y) plane |= row << (8 * y);
+    const std::uint64_t layer = layer_bits(first[1], last[1], first[2], last[2]);
     for (int x = first[0]; x <= last[0]; ++x)
-      if (suspects_.voxels[block][std::size_t(x)] & plane) return true;
+      if (suspects_.voxels[block][std::size_t(x)] & layer) return true;
     return false;
   }
 
@@ -266,10 +272,8 @@ class Finder {
           const auto [x0, x1] = within(0, x);
           const auto [y0, y1] = within(1, y);
           const auto [z0, z1] = within(2, z);
-          const std::uint64_t row = (std::uint64_t(2) << z1) - (std::uint64_t(1) << z0);
-          std::uint64_t plane = 0;
-          for (int i = y0; i <= y1; ++i) plane |= row << (8 * i);
-          for (int i = x0; i <= x1; ++i) suspects_.voxels[block][std::size_t(i)] |= plane;
+          const std::uint64_t layer = layer_bits(y0, y1, z0, z1);
+          for (int i = x0; i <= x1; ++i) suspects_.voxels[block][std::size_t(i)] |= layer;
         }
   }
 
@@ -422,9 +426,9 @@ class Finder {
     constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one, or inner area to doubtful area
     constexpr std::size_t kFewPieces = 5000, kSmallModel = 50'000;  // some tenths of a second
     // Of large triangles nearly all have doubtful places, along the edges of parts, however little these are.
-    const bool little = pieces <= kFewPieces || inner_area >= double(kTheRule) * doubtful_area;
-    const bool small = little && soup_.size() <= kSmallModel;
-    if (!small && seen_inner < kTheRule * doubtful.size()) return leave_doubts(doubtful, remains);
+    const bool little_doubt = pieces <= kFewPieces || inner_area >= double(kTheRule) * doubtful_area;
+    const bool quick = little_doubt && soup_.size() <= kSmallModel;
+    if (!quick && seen_inner < kTheRule * doubtful.size()) return leave_doubts(doubtful, remains);
     const OrientedWinding winding(soup_);
     if (!winding.usable()) return leave_doubts(doubtful, remains);
     for_each_triangle(triangles, doubtful, true, &winding.number(),

@@ -479,6 +479,7 @@ bool RegionShell::Search::has_witness(unsigned prisms) {
     for (std::size_t p = 0; p < buffers_.prisms.size(); ++p) look_at(t, p);
   });
   if (found_one) return true;
+  // What faces up and lies between lid and bottom is good, and was left out by the kernels; here all count.
   note_what_faces_up(false);
   const Found found = scan();
   for_each_near(found, [&](const Triangle& t, std::size_t p, bool) { look_at(t, p); });
