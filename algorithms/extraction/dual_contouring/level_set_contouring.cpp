@@ -1,6 +1,7 @@
 #include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 
 #include <sys/mman.h>
+#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <atomic>
@@ -107,10 +108,7 @@ class LevelSetContourer {
     LargeArray<float> offsets(quads_ + leaf_kernels::kLargestVector);
     {
       const Stage stage(context_, "place points");
-      parallel_blocks(live_.size(), context_, [&](std::size_t i) {
-        if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
-        place(live_[i], {mesh.points.data()->data(), offsets.data()});
-      });
+      place_all({mesh.points.data()->data(), offsets.data()});
     }
     const Stage stage(context_, "connect");
     const bool mirrors = placement_.mirrors();
@@ -187,11 +185,32 @@ class LevelSetContourer {
     }
   }
 
-  void place(std::size_t leaf, leaf_kernels::PlaceOutput output) {
+  /// @param output of the first leaf
+  void place_all(const leaf_kernels::PlaceOutput& output) {
+    const Plain plain(options_);
+    leaf_kernels::PlaceRules rules{};
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column) rules.linear[row][column] = placement_.linear(row, column);
+    rules.truncation = static_cast<float>(options_.truncation);
+    rules.reach = static_cast<float>(options_.reach);
+    rules.plain = &plain;
+    tbb::enumerable_thread_specific<std::unique_ptr<leaf_kernels::LaterCells>> later_cells(
+        [] { return std::make_unique<leaf_kernels::LaterCells>(); });
+    parallel_blocks(live_.size(), context_, [&](std::size_t i) {
+      if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
+      leaf_kernels::LaterCells& later = *later_cells.local();
+      place(live_[i], rules, output, later);
+      if (later.count >= leaf_kernels::LaterCells::kEnough) kernels_.place_later(rules, later);
+    });
+    for (const auto& later : later_cells) kernels_.place_later(rules, *later);
+  }
+
+  void place(std::size_t leaf, const leaf_kernels::PlaceRules& rules, leaf_kernels::PlaceOutput output,
+             leaf_kernels::LaterCells& later) {
     const LeafCells& cells = cells_[leaf];
     const bool optimal = options_.placement == DualContouringOptions::Placement::optimal;
-    const Plain plain(options_);
     leaf_kernels::PlaceInput input{};
+    input.rules = &rules;
     input.signs = upper_signs(upper_[leaf]);
     input.cells = &cells;
     std::optional<LeafStencils> stencils;
@@ -199,19 +218,16 @@ class LevelSetContourer {
       stencils.emplace(volume_, leaf).fill(input);
     else
       find_corner_samples(leaf, input);
-    input.truncation = static_cast<float>(options_.truncation);
-    input.reach = static_cast<float>(options_.reach);
-    input.plain = &plain;
     input.isovalue = table_.rule().isovalue;
     input.scale = table_.rule().scale;
     const Eigen::Vector3d corner = corner_of(leaf);
-    for (int row = 0; row < 3; ++row) {
-      input.corner[row] = corner[row];
-      for (int column = 0; column < 3; ++column) input.linear[row][column] = placement_.linear(row, column);
-    }
+    for (int axis = 0; axis < 3; ++axis) input.corner[axis] = corner[axis];
     output.points += 3 * std::size_t{cells.first_point};
     output.offsets += cells.first_quad;
-    (optimal ? kernels_.place_optimal : kernels_.place_average)(input, output);
+    if (optimal)
+      kernels_.place_optimal(input, output, later);
+    else
+      kernels_.place_average(input, output);
   }
 
   const SampledVolume& volume_;

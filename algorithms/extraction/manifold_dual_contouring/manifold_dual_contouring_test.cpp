@@ -76,6 +76,26 @@ TEST(ManifoldDualContouring, SphereStaysWithinTheTolerance) {
   }
 }
 
+TEST(ManifoldDualContouring, AveragePlacementNeedsNoNormals) {
+  FloatHermite hermite = TurnedCube().hermite();
+  const auto average = [&] {
+    RunContext context;
+    const ManifoldDualContouringOptions options{
+        .tolerance = 0, .uniform = {.placement = DualContouringOptions::Placement::average}};
+    return manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+  };
+  const PolygonMesh with_normals = average();  // by vector code
+  for (EdgeCrossing& crossing : hermite.crossings) crossing.normal = {};
+  const PolygonMesh without = average();
+  ASSERT_EQ(with_normals.points.size(), without.points.size());
+  for (std::size_t i = 0; i < without.points.size(); ++i)
+    EXPECT_LT((with_normals.points[i] - without.points[i]).norm(), 1e-5f) << i;
+  // Every cell's edges of the cube are cut off: the mean of crossings lies within the cube, if not on a face
+  // of it.
+  EXPECT_LT(volume(with_normals), 8000.0 - 12 * 20 * 0.01);
+  EXPECT_GT(volume(with_normals), 8000.0 - 12 * 20 * 0.5);
+}
+
 TEST(ManifoldDualContouring, TurnedCubeNeedsFewTrianglesAndKeepsItsCorners) {
   const TurnedCube cube;
   const PolygonMesh mesh = contour(cube.hermite(), 0.1);

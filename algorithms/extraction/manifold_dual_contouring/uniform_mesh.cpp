@@ -105,7 +105,7 @@ class Contourer {
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
-      const BlockMask placed = place_flat_cells(block, mesh.points);
+      const BlockMask placed = place_plain_cells(block, mesh.points);
       std::uint32_t number = cells_[block].first_code;
       for_each_bit(cells_[block].active, [&](int cell) {
         const int signs = cells_.corner_signs(number);
@@ -133,12 +133,12 @@ class Contourer {
     return cells_.is_plain(signs) && !cells_.is_joint(block, cell);
   }
 
-  /// Most cells by vector code: plain ones whose planes are nearly parallel. Returns which.
-  BlockMask place_flat_cells(std::int32_t block, std::vector<Vector3d>& points) const {
+  /// Most cells by vector code: plain ones, if they are placed optimally only those whose planes are nearly
+  /// parallel. Returns which.
+  BlockMask place_plain_cells(std::int32_t block, std::vector<Vector3d>& points) const {
     BlockMask placed{};
-    if (options_.placement == DualContouringOptions::Placement::average ||
-        options_.truncation < leaf_kernels::kLeastTruncation)
-      return placed;
+    const bool average = options_.placement == DualContouringOptions::Placement::average;
+    if (!average && options_.truncation < leaf_kernels::kLeastTruncation) return placed;
     thread_local CellRecords records;
     if (!records.read(cells_, block)) return placed;
     constexpr std::size_t kMost = 512 + leaf_kernels::kLargestVector;
@@ -155,14 +155,18 @@ class Contourer {
     });
     for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
     float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
-    kernels_.place_flat({.records = records.data(),
-                         .cell = cell.data(),
-                         .count = static_cast<int>(found),
-                         .truncation = static_cast<float>(options_.truncation),
-                         .margin = static_cast<float>(cells_.margin()),
-                         .most_error = static_cast<float>(reach_ > 0 ? kWorthLeaving * kWorthLeaving : 1e6),
-                         .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
-                        out, is_placed.data());
+    const leaf_kernels::PlainCells plain{records.data(), cell.data(), static_cast<int>(found)};
+    if (average) {
+      kernels_.place_mean(plain, out);
+      is_placed.fill(1);
+    } else {
+      kernels_.place_flat(plain,
+                          {.truncation = static_cast<float>(options_.truncation),
+                           .margin = static_cast<float>(cells_.margin()),
+                           .most_error = static_cast<float>(reach_ > 0 ? kWorthLeaving * kWorthLeaving : 1e6),
+                           .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
+                          out, is_placed.data());
+    }
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
       placed[static_cast<std::size_t>(cell[i] >> 6)] |= std::uint64_t{1} << (cell[i] & 63);

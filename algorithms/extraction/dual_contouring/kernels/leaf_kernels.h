@@ -49,16 +49,20 @@ class PlainCode {
   ~PlainCode() = default;
 };
 
-/// What a leaf's cells are placed from. Average placement reads the values of the leaf and its upper neighbours alone, and
-/// of what else a LeafInput has only the signs, the
-/// isovalue and the scale.
-struct PlaceInput : edge_kernels::LeafInput {
-  const LeafCells* cells;
-  double corner[3];     ///< where the leaf's first sample is in the mesh's coordinates
+/// The same for all leaves.
+struct PlaceRules {
   double linear[3][3];  ///< voxels to mesh, by row
   /// For optimal placement alone.
   float truncation, reach;  ///< as in DualContouringOptions; the truncation is no less than kLeastTruncation
   const PlainCode* plain;
+};
+
+/// What a leaf's cells are placed from. Average placement reads the values of the leaf and its upper
+/// neighbours alone, and of what else a LeafInput has only the signs, the isovalue and the scale.
+struct PlaceInput : edge_kernels::LeafInput {
+  const LeafCells* cells;
+  double corner[3];  ///< where the leaf's first sample is in the mesh's coordinates
+  const PlaceRules* rules;
 };
 /// Below it single precision cannot tell which singular values are to be dropped.
 inline constexpr float kLeastTruncation = 0.03f;
@@ -70,11 +74,14 @@ struct RecordCube {
   static int number(int axis, int x, int y, int z) { return kOfAxis * axis + kX * x + kY * y + z; }
 };
 
-/// Cells to be placed if their planes are nearly parallel.
-struct FlatCells {
+/// Single cells, with one sheet each.
+struct PlainCells {
   const float (*records)[4];  ///< a RecordCube
   const std::uint16_t* cell;  ///< 64x + 8y + z; kLargestVector more can be read, and are cells, too
   int count;
+};
+/// What is flat enough.
+struct FlatPlaces {
   float truncation;  ///< no less than kLeastTruncation
   float margin;      ///< places are so far off the cell's faces
   /// Square of the distance from the planes, root mean square, where the minimiser lies within the cell, and
@@ -88,10 +95,32 @@ struct PlaceOutput {
   float* offsets;  ///< of the leaf's crossing edges, from their first sample, in voxels
 };
 
+/// Cells of several leaves whose planes are not nearly parallel, or whose minimiser lies outside of them. A
+/// leaf has some few, which would leave most lanes of a vector idle.
+struct LaterCells {
+  /// When there are this many they had better be placed; a leaf may add 512.
+  static constexpr int kEnough = 64, kMost = kEnough + 512 + kLargestVector;
+  static constexpr int kSums = 14;
+
+  int count = 0;
+  float sums[kSums][kMost];     ///< of their planes
+  float place[3][kMost];        ///< from the cell's centre: of those that are not general, the minimiser
+  bool general[kMost];          ///< has more than one large eigenvalue
+  float records[kMost][12][4];  ///< of the cell's edges, by axis, in that by place, as in a RecordCube
+  struct Target {
+    float* point;
+    double corner[3];  ///< the leaf's
+    std::uint16_t cell;
+  } target[kMost];
+};
+
 /// The mean of each cell's crossings.
 using PlaceAverage = void(const PlaceInput& input, const PlaceOutput& output);
-/// The minimiser of each cell's quadratic error function, as dual_contouring() places it.
-using PlaceOptimal = void(const PlaceInput& input, const PlaceOutput& output);
+/// The minimiser of each cell's quadratic error function, as dual_contouring() places it, but for the cells
+/// that are added to `later`, which has less than kEnough.
+using PlaceOptimal = void(const PlaceInput& input, const PlaceOutput& output, LaterCells& later);
+/// Places them, and forgets them.
+using PlaceLater = void(const PlaceRules& rules, LaterCells& later);
 
 /// What a leaf's quads are made from.
 struct ConnectInput {
@@ -109,7 +138,10 @@ struct ConnectInput {
 /// Of each cell the minimiser of its quadratic error function, held within the cell; `placed` is 0 where it
 /// is another case: more than one large eigenvalue, or too large an error.
 /// @param place by axis, from the cell's first corner; room for kLargestVector more
-using PlaceFlat = void(const FlatCells& cells, float* const* place, std::uint8_t* placed);
+using PlaceFlat = void(const PlainCells& cells, const FlatPlaces& flat, float* const* place,
+                       std::uint8_t* placed);
+/// Of each cell the mean of its crossings. @param place as above
+using PlaceMean = void(const PlainCells& cells, float* const* place);
 
 /// One quad for each crossing edge that starts in the leaf, four point numbers each, by axis, in that by sample.
 using Connect = void(const ConnectInput& input, std::uint32_t* quads);
@@ -118,7 +150,9 @@ struct Kernels {
   Count* count;
   PlaceAverage* place_average;
   PlaceOptimal* place_optimal;
+  PlaceLater* place_later;
   PlaceFlat* place_flat;
+  PlaceMean* place_mean;
   Connect* connect;
 };
 
