@@ -1,8 +1,11 @@
 #include "algorithms/voxelization/surface_probe.h"
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
+
+#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -16,6 +19,12 @@ constexpr std::size_t kKept = 8;
 /// Steps of at most a voxel that a crevice is followed.
 constexpr int kSteps = 8;
 constexpr int kWays = 8;  ///< directions along a sheet
+
+/// The corner of a cell that is up from it along x if bit 2 is set, along y if bit 1 is and along z if bit 0
+/// is.
+CellObstacles::Voxel corner(const CellObstacles::Voxel& cell, unsigned i) {
+  return {cell[0] + std::int32_t(i >> 2), cell[1] + std::int32_t(i >> 1 & 1), cell[2] + std::int32_t(i & 1)};
+}
 
 }  // namespace
 
@@ -53,21 +62,29 @@ int SurfaceProbe::inside_at(const Voxel& voxel) {
   return int(inside_[block][place >> 6] >> (place & 63) & 1);
 }
 
+void SurfaceProbe::enter(const Voxel& cell) {
+  if (has_cell_ && cell == cell_) return;
+  cell_ = cell;
+  has_cell_ = true;
+  inside_corners_ = outside_corners_ = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const int inside = inside_at(corner(cell, i));
+    if (inside == 2) continue;
+    (inside == 1 ? inside_corners_ : outside_corners_) |= 1u << i;
+  }
+}
+
 /// By straight ways to the corners of the cell that p is in.
 Side SurfaceProbe::seen_from(const Vector3d& p) {
-  Voxel lower;
-  for (int a = 0; a < 3; ++a) lower[std::size_t(a)] = std::int32_t(std::floor(p[a]));
-  bool inside_seen = false;
-  for (int i = 0; i < 8; ++i) {
-    const Voxel voxel{lower[0] + (i >> 2), lower[1] + (i >> 1 & 1), lower[2] + (i & 1)};
-    const int inside = inside_at(voxel);
-    if (inside == 2 || (inside == 1 && inside_seen)) continue;
-    const Vector3d to(voxel[0], voxel[1], voxel[2]);
-    if (!obstacles_.is_free_in(lower, p, to)) continue;
-    if (inside == 0) return Side::outer;
-    inside_seen = true;
-  }
-  return inside_seen ? Side::inner : Side::unknown;
+  enter({floor_to_int(p[0]), floor_to_int(p[1]), floor_to_int(p[2])});
+  const auto sees_one = [&](unsigned corners) {
+    for (; corners != 0; corners &= corners - 1) {
+      const Voxel voxel = corner(cell_, unsigned(std::countr_zero(corners)));
+      if (obstacles_.is_free_in(cell_, p, Vector3d(voxel[0], voxel[1], voxel[2]))) return true;
+    }
+    return false;
+  };
+  return sees_one(outside_corners_) ? Side::outer : sees_one(inside_corners_) ? Side::inner : Side::unknown;
 }
 
 /// Moves p to the middle between what is in the way along the normal, and returns how wide the gap is there,

@@ -28,6 +28,7 @@ class SurfaceProbe {
   using Voxel = CellObstacles::Voxel;
 
   int inside_at(const Voxel& voxel);
+  void enter(const Voxel& cell);
   Side seen_from(const Eigen::Vector3d& p);
   double centre(Eigen::Vector3d& p, const Eigen::Vector3d& normal);
   Side follow(Eigen::Vector3d p, const Eigen::Vector3d& normal);
@@ -38,6 +39,10 @@ class SurfaceProbe {
   const WindingNumber* winding_;
   BlockFinder finder_;
   CellObstacles obstacles_;
+  /// The cell that was looked into last.
+  Voxel cell_{};
+  bool has_cell_ = false;
+  unsigned inside_corners_ = 0, outside_corners_ = 0;  ///< a bit each; neither where there is no block
 };
 
 }  // namespace hermesh
