@@ -90,7 +90,7 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
 }
 
 TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
-  // A tile of 8³, one of 128³ and one of 4096³, all inside, in a background that is outside.
+  // A tile of 8³, then one of 128³ as well, inside, in a background that is outside.
   const auto grid = openvdb::FloatGrid::create(3.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->tree().addTile(1, Coord(0, 0, 0), -3.0f, false);

@@ -175,7 +175,9 @@ TEST_F(BadInputTest, UnknownNamesAndOptionValues) {
   refuse({"--voxelizer", "nonsense"}, {"nonsense", "openvdb"});
   refuse({"--nonsense"}, {"--nonsense"});
   refuse({"-o", "nonsense=1"}, {"nonsense", "dual-contouring"});
-  refuse({"-o", "nonsense"}, {"nonsense"});
+  refuse({"-o", "nonsense"}, {"nonsense", "key=value"});
+  expect_refusal(2, {"remesh", "cube.off", "-o", "out.ply", "--resolution", "10"},
+                 {"out.ply", "key=value", "without -o"});
   refuse({"-o", "placement=nonsense"}, {"placement", "nonsense", "average"});
   refuse({"-o", "placement=average", "-o", "placement=optimal"}, {"placement", "twice"});
   refuse({"--extractor", "openvdb", "-o", "adaptivity=2"}, {"adaptivity", "2"});

@@ -1,16 +1,18 @@
 // hermesh combine: the union, intersection or difference of two solids, as Hermite data and back to a mesh.
+#include "algorithms/hermite/combine.h"
+
 #include <CLI/CLI.hpp>
 #include <memory>
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
-#include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
+#include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
 
 namespace hermesh::cli {
@@ -83,8 +85,11 @@ void add_combine(CLI::App& app, Session& session) {
   command->add_option("B", arguments->second, kMeshIn)->required();
   command->add_option("OUT", arguments->out, kMeshOut)->required();
   add_voxelize_options(*command, arguments->voxelizing);
-  command->add_option("-o", arguments->options, "key=value, an option of the extractor dual-contouring; may be repeated")
-      ->allow_extra_args(false);
+  command
+      ->add_option("-o", arguments->options,
+                   "key=value, an option of the extractor dual-contouring; may be repeated")
+      ->allow_extra_args(false)
+      ->check(key_value());
   command->callback([arguments, &session] {
     session.command = [arguments, &session] { return run_combine(*arguments, session); };
   });

@@ -47,7 +47,8 @@ void add_extract_options(CLI::App& command, ExtractArguments& arguments, const s
                   "Value of the surface, in the units of the grid (default: 0)")
       ->check(finite_number());
   command.add_option("-o", arguments.options, "key=value, an option of the extractor; may be repeated")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->check(key_value());
   add_adaptivity_options(command, arguments.adaptivity);
 }
 

@@ -18,4 +18,16 @@ inline CLI::Validator finite_number() {
       "");
 }
 
+/// An option of a variant. Elsewhere -o is often the output, so that is what a value without '=' is taken
+/// for.
+inline CLI::Validator key_value() {
+  return CLI::Validator(
+      [](const std::string& given) {
+        return given.find('=') != std::string::npos ? std::string()
+                                                    : "takes key=value, an option of a variant, not '" +
+                                                          given + "'; the output is named without -o";
+      },
+      "");
+}
+
 }  // namespace hermesh::cli
