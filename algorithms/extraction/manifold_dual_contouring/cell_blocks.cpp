@@ -274,10 +274,7 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
   Around result;
   result.axis = edge.axis;
   for (int i = 0; i < 4; ++i) {
-    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
-    at[(edge.axis + 1) % 3] += kAround[i][0];
-    at[(edge.axis + 2) % 3] += kAround[i][1];
-    const Cell cell = locate(edge.block, at[0], at[1], at[2]);
+    const Cell cell = cell_around(edge, i);
     result.cells[i] = cell;
     result.sheets[i] = &sheets(cell.block, cell.cell);
     const CellSheets& loops = *result.sheets[i];  // of a joint of one point they do not tell of its cuts

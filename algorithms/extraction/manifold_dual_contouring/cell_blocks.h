@@ -146,15 +146,19 @@ class CellBlocks {
   }
   Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
   Around around(const Edge& edge) const;
+  /// One of the four cells around a crossing edge, in the order of around().
+  Cell cell_around(const Edge& edge, int i) const {
+    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
+    at[(edge.axis + 1) % 3] += kAround[i][0];
+    at[(edge.axis + 2) % 3] += kAround[i][1];
+    return locate(edge.block, at[0], at[1], at[2]);
+  }
 
   /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint,
   /// has several sheets or an ambiguous face.
   bool plain_points(const Edge& edge, std::array<std::uint32_t, 4>& points) const {
-    for (std::size_t i = 0; i < 4; ++i) {
-      int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
-      at[(edge.axis + 1) % 3] += kAround[i][0];
-      at[(edge.axis + 2) % 3] += kAround[i][1];
-      const Cell cell = locate(edge.block, at[0], at[1], at[2]);
+    for (int i = 0; i < 4; ++i) {
+      const Cell cell = cell_around(edge, i);
       const Block& block = blocks_[cell.block];
       const std::size_t number = code_at(cell.block, cell.cell);
       if (!plain_[codes_[number]] || test(block.joints, cell.cell)) return false;

@@ -10,9 +10,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Cells around an edge, as steps along the two other axes, counter-clockwise.
-constexpr int kSteps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
-
 /// What a segment keeps from the border of a face's common part, in sides of it.
 constexpr double kFromBorder = 1e-3;
 
@@ -78,10 +75,7 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
   std::array<Region, 4> around;
   for (std::size_t i = 0; i < 4; ++i) {
-    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
-    at[u] += kSteps[i][0];
-    at[v] += kSteps[i][1];
-    const CellBlocks::Cell cell = regions.cells().locate(edge.block, at[0], at[1], at[2]);
+    const CellBlocks::Cell cell = regions.cells().cell_around(edge, static_cast<int>(i));
     around[i] = regions.at(cell.block, cell.cell);
   }
   RegionRing ring;
