@@ -195,7 +195,7 @@ class LevelSetContourer {
     rules.reach = static_cast<float>(options_.reach);
     rules.plain = &plain;
     tbb::enumerable_thread_specific<std::unique_ptr<leaf_kernels::LaterCells>> later_cells(
-        [] { return std::make_unique<leaf_kernels::LaterCells>(); });
+        [] { return std::make_unique_for_overwrite<leaf_kernels::LaterCells>(); });
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
       if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
       leaf_kernels::LaterCells& later = *later_cells.local();
