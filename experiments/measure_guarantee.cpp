@@ -259,11 +259,14 @@ class SubjectMeasurement {
   void measure_all(Subject subject) {
     // Rows of the two ways to merge stand side by side.
     if (input_.parameters.is("merging", "regions")) subject.label += ", regions";
+    if (input_.parameters.is("placement", "average")) subject.label += ", means";
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
       const Contender ours = {kGuaranteed,
-                              {{"tolerance", readable_exactly(tolerance)}, {"merging", input_.parameters.text("merging")}}};
+                              {{"tolerance", readable_exactly(tolerance)},
+                               {"merging", input_.parameters.text("merging")},
+                               {"placement", input_.parameters.text("placement")}}};
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
@@ -510,8 +513,9 @@ Measurement guarantee_measurement() {
            {"tolerances",
             "0.1 1",
             "of the adaptive meshes, in voxels",
-            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2"}},
+            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8"}},
            {"merging", "collapses", "option of the extractor", {"collapses", "regions"}},
+           {"placement", "optimal", "option of the extractor", {"optimal", "average"}},
            {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
            {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
            {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},

@@ -28,8 +28,9 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       told_(grid.joint_sheets()),
       blocks_(grid.blocks().size()) {
   Stage stage(context, "find cells");
+  std::array<bool, 256> is_plain;  // by signs of the corners
   for (std::size_t signs = 0; signs < 256; ++signs)
-    plain_[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
+    is_plain[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
   parallel_blocks(n, context, [&](std::size_t b) {
@@ -55,7 +56,10 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
       found[b].push_back(static_cast<std::uint8_t>(code));
+      if (!is_plain[static_cast<std::size_t>(code)])
+        block.special[static_cast<std::size_t>(cell >> 6)] |= std::uint64_t{1} << (cell & 63);
     });
+    for (std::size_t word = 0; word < 8; ++word) block.special[word] |= block.joints[word];
     codes[b] = before;
   });
   codes_.resize(exclusive_scan(codes, "cells"));
@@ -66,7 +70,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   cut_ambiguous_faces(context);
   parallel_blocks(n, context, [&](std::size_t b) {
     std::uint16_t later = 0;
-    for_each_bit(blocks_[b].active, [&](int cell) {
+    for_each_bit(blocks_[b].special, [&](int cell) {
       const int sheets = point_count(static_cast<std::int32_t>(b), cell);
       if (sheets <= 1) return;
       blocks_[b].several.emplace_back(static_cast<std::uint16_t>(cell), later);
@@ -89,7 +93,7 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   std::vector<std::vector<Face>> faces(blocks_.size());
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
-    for_each_bit(blocks_[b].active, [&](int cell) {
+    for_each_bit(blocks_[b].special, [&](int cell) {
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
@@ -262,6 +266,20 @@ CellBlocks::Edge CellBlocks::edge_of_cell(std::int32_t block, int cell, int edge
   const std::array<int, 3> d = edge_offset(edge);
   const Cell there = locate(block, (cell >> 6) + d[0], ((cell >> 3) & 7) + d[1], (cell & 7) + d[2]);
   return {there.block, there.cell, edge_axis(edge)};
+}
+
+int CellBlocks::crossings_on(const Edge& first, int length) const {
+  if (first.block < 0) return 0;
+  const BlockMask& crossing = source(first.block).crossing[static_cast<std::size_t>(first.axis)];
+  const int word = first.sample >> 6, bit = first.sample & 63;
+  if (first.axis == 0) {
+    int found = 0;
+    for (int k = 0; k < length; ++k) found += test(crossing, first.sample + 64 * k);
+    return found;
+  }
+  const std::uint64_t line =
+      first.axis == 1 ? 0x0101010101010101u >> (8 * (8 - length)) : 0xffu >> (8 - length);
+  return bits_in((crossing[static_cast<std::size_t>(word)] >> bit) & line);
 }
 
 Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge, const EdgeCrossing& crossing) const {

@@ -49,6 +49,7 @@ class CellBlocks {
     BlockMask inside{};
     BlockMask active{};  ///< cells with a crossing edge, by their first corner
     BlockMask joints{};  ///< of these, those with a cut
+    BlockMask special{};  ///< of these, joints and those of several sheets or with an ambiguous face
     BlockMask joined{};  ///< of the active ones, those with an ambiguous face whose inside is joined
     SheetsOfBlock joined_sheets;
     std::uint32_t first_point = 0, first_code = 0;
@@ -90,6 +91,8 @@ class CellBlocks {
   std::uint32_t cell_number(std::int32_t block, int cell) const {
     return static_cast<std::uint32_t>(code_at(block, cell));
   }
+  /// By corner the inside bits of all cells of a block.
+  std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
   /// Inside bits of the corners of the cell of that number.
   int corner_signs(std::uint32_t number) const { return codes_[number]; }
 
@@ -141,6 +144,8 @@ class CellBlocks {
   bool is_crossed(const Edge& edge) const {
     return edge.block >= 0 && test(source_[edge.block].crossing[edge.axis], edge.sample);
   }
+  /// How many are crossed of so many edges of a block, up to 8, that follow one another in a line.
+  int crossings_on(const Edge& first, int length) const;
   Eigen::Vector3d crossing_point(const Edge& edge) const {
     return crossing_point(edge, grid_.crossing(edge.block, edge.sample, edge.axis));
   }
@@ -161,13 +166,13 @@ class CellBlocks {
       const Cell cell = cell_around(edge, i);
       const Block& block = blocks_[cell.block];
       const std::size_t number = code_at(cell.block, cell.cell);
-      if (!plain_[codes_[number]] || test(block.joints, cell.cell)) return false;
+      if (test(block.special, cell.cell)) return false;
       points[i] = block.first_point + static_cast<std::uint32_t>(number - block.first_code);
     }
     return true;
   }
-  /// Whether the cell with these corners, if it is no joint, has one sheet and no ambiguous face.
-  bool is_plain(int corner_signs) const { return plain_[static_cast<std::size_t>(corner_signs)]; }
+  /// Whether an active cell is no joint, has one sheet and no ambiguous face.
+  bool is_plain(std::int32_t block, int cell) const { return !test(blocks_[block].special, cell); }
 
   /// Whether the surface is held to the segments of the face between cells i and i+1 around an edge.
   bool is_explicit(const Around& around, int i) const {
@@ -215,7 +220,6 @@ class CellBlocks {
     return told ? told->sheets : 1;
   }
   bool sign_of_added(const HermiteView::Block& block) const;
-  std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
   BlockMask cells_with_cuts(std::int32_t block) const;
 
   double margin_for_rounding() const;
@@ -226,7 +230,6 @@ class CellBlocks {
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;
   std::vector<Block> blocks_;
-  std::array<bool, 256> plain_;      ///< by signs of the corners
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;
 };

@@ -1,5 +1,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 
+#include <algorithm>
+
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/envelope.h"
 
@@ -12,17 +14,21 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 
 }  // namespace
 
-EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points, RunContext& context)
-    : cells_(cells), edges_(cells.size()) {
+EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points,
+                           const EdgeMasks* only, RunContext& context)
+    : cells_(cells), only_(only), edges_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
+    if (only_ && std::ranges::none_of((*only_)[b], [](const BlockMask& mask) { return any(mask); })) return;
     PlainPoints near;
     near.read(cells_, block);
     std::array<EdgeCrossing, 3 * 512> crossings;
     cells_.grid().crossings(block, crossings.data());
     const EdgeCrossing* next = crossings.data();
-    cells_.for_each_crossing_edge(
-        block, [&](const CellBlocks::Edge& edge) { decide(edge, (next++)->offset, points, &near); });
+    cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
+      const double offset = (next++)->offset;
+      if (test(edges(block, edge.axis), edge.sample)) decide(edge, offset, points, &near);
+    });
   });
   number_all(context);
 }
@@ -62,8 +68,7 @@ void EdgePolygons::number_all(RunContext& context) {
     const auto block = static_cast<std::int32_t>(b);
     for (int axis = 0; axis < 3; ++axis) {
       const BlockMask& fanned = edges_[b].fanned[static_cast<std::size_t>(axis)];
-      const int fans = count(fanned),
-                all = count(cells_.source(block).crossing[static_cast<std::size_t>(axis)]);
+      const int fans = count(fanned), all = count(edges(block, axis));
       crossing_points[b] += static_cast<std::uint64_t>(fans);
       quads[b] += static_cast<std::uint64_t>(all - fans);
       for_each_bit(fanned, [&](int sample) {

@@ -14,12 +14,23 @@
 
 namespace hermesh {
 
+/// By block and axis.
+using EdgeMasks = std::vector<std::array<BlockMask, 3>>;
+
 class EdgePolygons {
  public:
-  /// Decides for each edge what it becomes, by the places of the cells' points (index space relative to the placement's
-  /// base). Points on fanned edges get the numbers from cells.point_count() on. No cell is held yet.
+  /// Decides for each edge what it becomes, by the places of the cells' points (index space relative to the
+  /// placement's base). Points on fanned edges get the numbers from cells.point_count() on. No cell is held
+  /// yet.
+  /// @param only the crossing edges that have polygons here, all if null; outlives this
   /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
-  EdgePolygons(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
+  EdgePolygons(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, const EdgeMasks* only,
+               RunContext& context);
+
+  const BlockMask& edges(std::int32_t block, int axis) const {
+    const auto b = static_cast<std::size_t>(block), a = static_cast<std::size_t>(axis);
+    return only_ ? (*only_)[b][a] : cells_.source(block).crossing[a];
+  }
 
   /// Whether the cell would have explicit faces of its own if it were held to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
@@ -97,6 +108,7 @@ class EdgePolygons {
                     const std::vector<Eigen::Vector3d>& points) const;
 
   const CellBlocks& cells_;
+  const EdgeMasks* const only_;
   std::vector<BlockEdges> edges_;
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
 };

@@ -2,28 +2,67 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
-#include "algorithms/core/large_array.h"
-#include "algorithms/core/polygon_mesh.h"
-#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
+#include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
 
 namespace hermesh {
 
-struct LoosePolygon {
-  std::uint32_t number;
-  bool is_quad;  ///< a number of the mesh's quads, else of its triangles
+/// A triangle, or a quad that is cut from its first corner to its third.
+struct NamedPolygon {
+  std::uint64_t name;  ///< no other polygon's
+  int corners;
+  std::array<std::uint32_t, 4> names;  ///< of the corners: those of the same name are the same point
+  std::array<Eigen::Vector3d, 4> points;
 };
 
-/// Which of them meet another polygon in more than the corners and the edge that they share, or may do so, or
-/// themselves where they are quads; ascending.
-/// @param quads each is cut from its first corner to its third
-/// @throws Cancelled
-std::vector<std::size_t> loose_polygons_that_meet(const std::vector<Eigen::Vector3d>& points,
-                                                  const LargeArray<Quad>& quads,
-                                                  const std::vector<Triangle>& triangles,
-                                                  const std::vector<LoosePolygon>& loose,
-                                                  RunContext& context);
+/// Which polygons meet another one in more than the corners and the edge that they share, or may do so, or
+/// themselves where they are quads.
+class LoosePolygons {
+ public:
+  explicit LoosePolygons(std::vector<NamedPolygon> tested);
+
+  /// Of the polygons around, which may be one of those that are tested. Safe to call for several at once.
+  void test_against(const NamedPolygon& polygon);
+  /// The places, in the list given, of those that meet what they were tested against; ascending.
+  std::vector<std::size_t> that_meet() const;
+
+ private:
+  struct Tested {
+    NamedTriangle triangle;
+    Box3 box;
+    std::size_t polygon;
+    int half;  ///< of a quad
+  };
+  /// Triangles by the cubes of a lattice that their boxes touch.
+  class ByPlace {
+   public:
+    void add(std::uint32_t triangle, const Box3& box);
+    /// Before the first question.
+    void sort();
+    /// Calls f(triangle) for those that share a cube with the box, some of them more than once.
+    template <class F>
+    void for_each_near(const Box3& box, F&& f) const;
+
+   private:
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< places and triangles, ascending
+    std::unordered_map<std::uint64_t, std::pair<std::size_t, std::size_t>>
+        ranges_;  ///< of each place's entries
+  };
+
+  template <class F>
+  static void for_each_triangle(const NamedPolygon& polygon, F&& f);
+  bool shares_diagonal(const Tested& tested, const Triangle& t) const;
+
+  std::vector<NamedPolygon> polygons_;
+  std::vector<Tested> tested_;
+  ByPlace by_place_;
+  std::vector<std::uint8_t> meets_;  ///< by polygon
+};
 
 }  // namespace hermesh

@@ -2,24 +2,45 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 using Indices = std::vector<std::size_t>;
 
+/// Which polygon of a mesh: its quads and its triangles are numbered apart.
+struct Which {
+  std::size_t number;
+  bool is_quad;
+};
+const Which kFirstTriangle{0, false}, kSecondTriangle{1, false}, kFirstQuad{0, true};
+
 struct Mesh {
   std::vector<Vector3d> points;
-  LargeArray<Quad> quads;
+  std::vector<Quad> quads;
   std::vector<Triangle> triangles;
 
-  Indices that_meet(const std::vector<LoosePolygon>& loose) const {
-    RunContext context;
-    return loose_polygons_that_meet(points, quads, triangles, loose, context);
+  NamedPolygon polygon(const Which& which) const {
+    NamedPolygon result{2 * which.number + which.is_quad, which.is_quad ? 4 : 3, {}, {}};
+    if (which.is_quad)
+      result.names = quads[which.number];
+    else
+      std::ranges::copy(triangles[which.number], result.names.begin());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(result.corners); ++i)
+      result.points[i] = points[result.names[i]];
+    return result;
+  }
+  Indices that_meet(const std::vector<Which>& tested) const {
+    std::vector<NamedPolygon> polygons;
+    for (const Which& which : tested) polygons.push_back(polygon(which));
+    LoosePolygons loose(polygons);
+    for (std::size_t i = 0; i < quads.size(); ++i) loose.test_against(polygon({i, true}));
+    for (std::size_t i = 0; i < triangles.size(); ++i) loose.test_against(polygon({i, false}));
+    return loose.that_meet();
   }
 };
-
-const LoosePolygon kFirstTriangle{0, false}, kSecondTriangle{1, false}, kFirstQuad{0, true};
 
 Mesh two_triangles(double second_is_raised_by) {
   const Vector3d up(0, 0, second_is_raised_by);

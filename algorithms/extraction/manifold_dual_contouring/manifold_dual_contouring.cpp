@@ -51,6 +51,7 @@ class FieldAtPoints {
   FieldAtPoints(const AdaptivityField* field, const IndexToWorld& placement)
       : evaluator_(field, placement), base_(placement.base) {}
 
+  bool is_constant() const { return !evaluator_.simplifies_outside() && !evaluator_.has_scale(); }
   bool leaves_out(const Eigen::Vector3d& p) const {
     return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
   }
@@ -102,21 +103,33 @@ std::vector<float> tolerances(const std::vector<Eigen::Vector3d>& points, const 
   return result;
 }
 
+CellTolerances cell_tolerances(const CellBlocks& cells, const FieldAtPoints& field, double tolerance,
+                               const RunContext& context) {
+  if (field.is_constant()) return CellTolerances(static_cast<float>(tolerance));
+  std::vector<float> result(cells.cell_count());
+  parallel_blocks(cells.size(), context, [&](std::size_t b) {
+    const auto block = static_cast<std::int32_t>(b);
+    for_each_bit(cells[block].active, [&](int cell) {
+      result[cells.cell_number(block, cell)] =
+          field.tolerance(cells.corner(block, cell) + Eigen::Vector3d::Constant(0.5), tolerance);
+    });
+  });
+  return CellTolerances(std::move(result));
+}
+
 Polygons as_they_are(UniformMesh uniform) {
   return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads)};
 }
 
 Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions& options, const FieldAtPoints& field,
                     const FilePoints& file, RunContext& context) {
-  Polygons result;
-  with_uniform_cells(grid, options.uniform, file, context,
-                     [&](const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh) {
-                       report(mesh, context);
-                       const std::vector<float> asked = tolerances(mesh.points, field, options.tolerance, context);
-                       RegionMesh merged = merge_regions(cells, polygons, mesh.points, asked, file, context);
-                       result = {std::move(merged.points), std::move(merged.triangles), std::move(merged.quads)};
-                     });
-  return result;
+  UniformCells uniform(grid, options.uniform, file, context);
+  const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context),
+                            options.flatness};
+  const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average;
+  RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
+  report(uniform.mesh(), context);
+  return {std::move(merged.points), std::move(merged.triangles), std::move(merged.quads)};
 }
 
 Polygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
@@ -175,6 +188,7 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   options.tolerance = input.options.number("tolerance");
   if (const double world = input.options.number("tolerance_world"); world > 0)
     options.tolerance = world / input.level_set.voxel_size();
+  options.flatness = input.options.number("flatness");
   if (input.options.is("merging", "regions")) options.merging = ManifoldDualContouringOptions::Merging::regions;
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
@@ -194,12 +208,21 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
                   .fallback = "0",
                   .help = "the same in world units, instead of tolerance where it is greater than 0",
                   .maximum = 1e30});
-  options.insert(options.begin() + 2,
-                 {.name = "merging",
-                  .fallback = "collapses",
-                  .help = "collapses: fewest polygons; regions: cubes of cells become one point each, many times as fast, "
-                          "with points held in their cells (reach=0) and distances of two voxels at most",
-                  .choices = {"collapses", "regions"}});
+  options.insert(options.begin() + 2, {.name = "merging",
+                                       .fallback = "collapses",
+                                       .help = "collapses: fewest polygons; regions: cubes of up to 8 cells "
+                                               "a side become one point each, many times "
+                                               "as fast, with points held in their cells (reach=0); fastest "
+                                               "where tolerance is above 2 voxels and "
+                                               "placement=average",
+                                       .choices = {"collapses", "regions"}});
+  options.insert(options.begin() + 3,
+                 {.name = "flatness",
+                  .fallback = "0",
+                  .help = "with merging=regions: how far a cube's point may be from the planes of its "
+                          "crossings, in voxels, root "
+                          "mean square, if tolerance allows more; 0 for what tolerance allows",
+                  .maximum = 1e6});
   return options;
 }
 

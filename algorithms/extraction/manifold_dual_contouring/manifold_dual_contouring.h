@@ -18,6 +18,7 @@ struct ManifoldDualContouringOptions {
     regions     ///< those of cubes of 2³, 4³ and 8³ cells: many times as fast (region_mesh.h). Points stay within their cells.
   };
   Merging merging = Merging::collapses;
+  double flatness = 0;            ///< of regions (RegionOptions)
   DualContouringOptions uniform;  ///< placement of the uniform mesh's points
 };
 

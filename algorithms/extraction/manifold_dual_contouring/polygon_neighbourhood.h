@@ -94,6 +94,7 @@ class PolygonNeighbourhood {
     auto made = std::make_unique<List>();
     cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
       made->first.push_back(static_cast<std::uint32_t>(made->triangles.size()));
+      if (!test(polygons_.edges(block, edge.axis), edge.sample)) return;
       const auto add = [&](const Triangle& t) { made->triangles.push_back(t); };
       polygons_.polygons_of(
           edge,

@@ -2,183 +2,341 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/loose_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// Makes the polygons block by block, with names instead of numbers, and numbers them when all points are
-/// known.
-class Filling {
+/// The polygons that have a cube at a corner, block by block, and those of the uniform mesh elsewhere.
+/// Corners have names that do not change: first cells' points, as the uniform mesh numbers them, then cubes,
+/// then points on fanned edges.
+class RegionPolygons {
  public:
-  Filling(const Regions& regions, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
-          RunContext& context)
+  RegionPolygons(const Regions& regions, const std::vector<Vector3d>& points)
       : regions_(regions),
         cells_(regions.cells()),
-        polygons_(polygons),
         points_(points),
-        context_(context),
-        first_cube_(static_cast<std::uint32_t>(polygons.point_count())),
-        number_(polygons.point_count() + regions.cube_count()),
-        made_(cells_.size()) {
-    check_indices(number_.size(), "points and cubes");
+        first_cube_(static_cast<std::uint32_t>(cells_.point_count())),
+        lone_edges_(cells_.size()),
+        made_(cells_.size()) {}
+
+  /// Makes those anew of blocks whose regions are others than they were.
+  void update(const std::vector<std::uint8_t>& changed, RunContext& context) {
+    Stage stage(context, "connect regions");
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      if (!changed[b]) return;
+      lone_edges_[b] = regions_.lone_edges(static_cast<std::int32_t>(b));
+      made_[b] = {};
+      for_each_edge(b, regions_.merged_edges(static_cast<std::int32_t>(b)),
+                    [&](const CellBlocks::Edge& edge) { make(edge, made_[b]); });
+    });
   }
 
-  RegionMesh run() {
-    const std::size_t n = cells_.size();
+  const EdgeMasks& lone_edges() const { return lone_edges_; }
+  std::size_t loose_count() const {
+    std::size_t sum = 0;
+    for (const Made& made : made_) sum += made.loose.size();
+    return sum;
+  }
+
+  /// Edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
+  /// Such a polygon is within a block of its edge's, so two of them can only meet if those are at most two
+  /// apart.
+  std::vector<CellBlocks::Edge> loose_that_meet(const std::vector<std::uint8_t>& changed,
+                                                RunContext& context) const {
+    Stage stage(context, "test loose polygons");
+    const std::vector<std::uint8_t> tested = two_on(changed), near = two_on(tested);
+    return that_meet(tested, [&](LoosePolygons& loose) {
+      parallel_blocks(made_.size(), context, [&](std::size_t b) {
+        if (!near[b]) return;
+        for (const Polygon& polygon : made_[b].polygons) loose.test_against(named(polygon));
+      });
+    });
+  }
+
+  /// Edges of loose polygons that meet others of the uniform mesh.
+  std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) const {
+    Stage stage(context, "test loose polygons");
+    return that_meet(std::vector<std::uint8_t>(made_.size(), 1), [&](LoosePolygons& loose) {
+      parallel_blocks(made_.size(), context, [&](std::size_t b) {
+        std::uint64_t part = 0;
+        for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
+          const auto test = [&](auto corners) {
+            Polygon polygon{name_of(edge, ++part), static_cast<int>(corners.size()), {}};
+            std::ranges::transform(corners, polygon.names.begin(),
+                                   [&](std::uint32_t point) { return name_of(point); });
+            loose.test_against(named(polygon));
+          };
+          fine.polygons_of(edge, test, test);
+        });
+      });
+    });
+  }
+
+  /// @param fine has the polygons of lone edges
+  RegionMesh mesh(const EdgePolygons& fine, RunContext& context) const {
+    Stage stage(context, "connect regions");
+    const std::size_t n = cells_.size(),
+                      names = cells_.point_count() + regions_.cube_count() + fine.fanned_edges();
+    check_indices(names, "points and cubes");
+    const std::unique_ptr<std::uint32_t[]> number(
+        new std::uint32_t[names]);  // by name; most are never written
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
-    parallel_blocks(n, context_, [&](std::size_t b) {
-      const auto block = static_cast<std::int32_t>(b);
-      Made& made = made_[b];
-      for_each_cell_point(block, [&](const Region&) { ++points[b]; }, [&](std::uint32_t) { ++points[b]; });
-      regions_.for_each_outer_edge(block, [&](const CellBlocks::Edge& edge) { make(edge, made); });
-      points[b] += made.kept.size();
-      quads[b] = made.quads.size();
-      triangles[b] = made.triangles.size();
+    parallel_blocks(n, context, [&](std::size_t b) {
+      for_each_point(b, fine, [&](std::uint32_t) { ++points[b]; });
+      for_each_polygon(
+          b, fine, [&](const Quad&) { ++quads[b]; }, [&](const Triangle&) { ++triangles[b]; });
     });
     RegionMesh mesh;
     mesh.points.resize(exclusive_scan(points, "points"));
     mesh.quads.resize(exclusive_scan(quads, "quads"));
     mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
-    parallel_blocks(n, context_, [&](std::size_t b) {
+    parallel_blocks(n, context, [&](std::size_t b) {
       auto at = static_cast<std::uint32_t>(points[b]);
-      const auto keep = [&](std::uint32_t point) {
-        number_[point] = at;
-        mesh.points[at++] = points_[point];
-      };
-      for_each_cell_point(
-          static_cast<std::int32_t>(b),
-          [&](const Region& region) {
-            number_[name_of(region)] = at;
-            mesh.points[at++] = regions_.point(region);
-          },
-          keep);
-      for (const std::uint32_t point : made_[b].kept) keep(point);
+      for_each_point(b, fine, [&](std::uint32_t name) {
+        number[name] = at;
+        mesh.points[at++] = place(name);
+      });
     });
-    parallel_blocks(n, context_, [&](std::size_t b) {
-      const Made& made = made_[b];
-      const auto numbered = [&](auto polygon) {
-        for (std::uint32_t& corner : polygon) corner = number_[corner];
-        return polygon;
+    parallel_blocks(n, context, [&](std::size_t b) {
+      Quad* quad = mesh.quads.data() + quads[b];
+      Triangle* triangle = mesh.triangles.data() + triangles[b];
+      const auto numbered = [&](auto corners) {
+        for (std::uint32_t& corner : corners) corner = number[corner];
+        return corners;
       };
-      std::ranges::transform(made.quads, mesh.quads.data() + quads[b], numbered);
-      std::ranges::transform(made.triangles, mesh.triangles.data() + triangles[b], numbered);
+      for_each_polygon(
+          b, fine, [&](const Quad& q) { *quad++ = numbered(q); },
+          [&](const Triangle& t) { *triangle++ = numbered(t); });
     });
-    for (std::size_t b = 0; b < n; ++b)
-      for (LooseEdge loose : made_[b].loose) {
-        loose.polygon.number += static_cast<std::uint32_t>((loose.polygon.is_quad ? quads : triangles)[b]);
-        loose_.push_back(loose);
-      }
     return mesh;
   }
 
-  struct LooseEdge {
-    CellBlocks::Edge edge;
-    LoosePolygon polygon;
-  };
-  /// All there are.
-  const std::vector<LooseEdge>& loose() const { return loose_; }
-
  private:
+  struct Polygon {
+    std::uint64_t name;
+    int corners;
+    std::array<std::uint32_t, 4> names;
+  };
   /// Of a block.
   struct Made {
-    std::vector<Quad> quads;  ///< of names: a point's number in the uniform mesh, or first_cube_ and a cube's
-    std::vector<Triangle> triangles;
-    std::vector<std::uint32_t> kept;  ///< points on edges
-    std::vector<LooseEdge> loose;     ///< with numbers among the block's polygons
+    std::vector<Polygon> polygons;
+    std::vector<std::pair<CellBlocks::Edge, std::uint32_t>> loose;  ///< with places among the polygons
   };
 
+  template <class F>
+  static void for_each_edge(std::size_t block, const std::array<BlockMask, 3>& edges, F&& f) {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(edges[static_cast<std::size_t>(axis)], [&](int sample) {
+        f(CellBlocks::Edge{static_cast<std::int32_t>(block), sample, axis});
+      });
+  }
+
+  std::uint32_t first_fan() const { return first_cube_ + static_cast<std::uint32_t>(regions_.cube_count()); }
   std::uint32_t name_of(const Region& region) const {
     return region.merged() ? first_cube_ + regions_.number(region)
                            : cells_.point(region.block, region.cell, 0);
   }
-
-  void make(const CellBlocks::Edge& edge, Made& made) const {
-    const RegionRing ring = ring_of(regions_, edge);
-    if (!ring.has_polygon()) return;
-    if (!ring.any_merged) {
-      if (polygons_.is_fanned(edge)) made.kept.push_back(polygons_.crossing_point(edge));
-      polygons_.polygons_of(
-          edge, [&](const Quad& q) { made.quads.push_back(q); },
-          [&](const Triangle& t) { made.triangles.push_back(t); });
-      return;
-    }
-    const RegionPolygon polygon = *polygon_of(regions_, edge, ring);
-    const bool is_quad = polygon.corners == 4;
-    const auto number = static_cast<std::uint32_t>(is_quad ? made.quads.size() : made.triangles.size());
-    if (polygon.loose) made.loose.push_back({edge, {number, is_quad}});
-    std::array<std::uint32_t, 4> names{};
-    for (int i = 0; i < polygon.corners; ++i) names[i] = name_of(polygon.regions[i]);
-    if (!is_quad) {
-      polygon.for_each_triangle([&](int a, int b, int c) {
-        made.triangles.push_back({names[a], names[b], names[c]});
-      });
-      return;
-    }
-    const int d = polygon.diagonal;
-    Quad q = {names[d], names[d + 1], names[d + 2], names[(d + 3) % 4]};
-    if (!polygon.outwards) std::swap(q[1], q[3]);
-    made.quads.push_back(q);
+  /// Of a point of the uniform mesh.
+  std::uint32_t name_of(std::uint32_t point) const {
+    return point < first_cube_ ? point : point - first_cube_ + first_fan();
+  }
+  /// Of a polygon. @param part 0 for that of regions
+  static std::uint64_t name_of(const CellBlocks::Edge& edge, std::uint64_t part) {
+    return (part << 44) + (static_cast<std::uint64_t>(edge.block) << 11 |
+                           static_cast<std::uint64_t>(edge.axis << 9 | edge.sample));
+  }
+  const Vector3d& place(std::uint32_t name) const {
+    if (name < first_cube_) return points_[name];
+    return name < first_fan() ? regions_.place(name - first_cube_)
+                              : points_[name - first_fan() + first_cube_];
+  }
+  NamedPolygon named(const Polygon& polygon) const {
+    NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i)
+      result.points[i] = place(polygon.names[i]);
+    return result;
   }
 
-  /// Calls cube(Region) and kept(point of the uniform mesh).
-  template <class Cube, class Kept>
-  void for_each_cell_point(std::int32_t block, Cube&& cube, Kept&& kept) const {
-    regions_.for_each(block, cube, [&](int cell) {
-      for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet) kept(cells_.point(block, cell, sheet));
+  /// @param test called with the loose polygons of some blocks
+  template <class F>
+  std::vector<CellBlocks::Edge> that_meet(const std::vector<std::uint8_t>& blocks, F&& test) const {
+    std::vector<NamedPolygon> polygons;
+    std::vector<CellBlocks::Edge> edges;
+    for (std::size_t b = 0; b < made_.size(); ++b) {
+      if (!blocks[b]) continue;
+      for (const auto& [edge, polygon] : made_[b].loose) {
+        polygons.push_back(named(made_[b].polygons[polygon]));
+        edges.push_back(edge);
+      }
+    }
+    std::vector<CellBlocks::Edge> result;
+    if (polygons.empty()) return result;
+    LoosePolygons loose(std::move(polygons));
+    test(loose);
+    for (const std::size_t i : loose.that_meet()) result.push_back(edges[i]);
+    return result;
+  }
+
+  void make(const CellBlocks::Edge& edge, Made& made) const {
+    const RegionPolygon polygon = *polygon_of(regions_, edge, ring_of(regions_, edge));
+    if (polygon.loose) made.loose.emplace_back(edge, static_cast<std::uint32_t>(made.polygons.size()));
+    Polygon result{name_of(edge, 0), polygon.corners, {}};
+    for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i)
+      result.names[i] = name_of(polygon.regions[(static_cast<std::size_t>(polygon.diagonal) + i) %
+                                                static_cast<std::size_t>(polygon.corners)]);
+    if (!polygon.outwards)
+      std::swap(result.names[1], result.names[static_cast<std::size_t>(polygon.corners - 1)]);
+    made.polygons.push_back(result);
+  }
+
+  /// Calls quad(Quad) or triangle(Triangle), of names.
+  template <class OnQuad, class OnTriangle>
+  void for_each_polygon(std::size_t b, const EdgePolygons& fine, OnQuad&& quad, OnTriangle&& triangle) const {
+    for (const Polygon& polygon : made_[b].polygons) {
+      const auto& p = polygon.names;
+      if (polygon.corners == 4)
+        quad(Quad{p[0], p[1], p[2], p[3]});
+      else
+        triangle(Triangle{p[0], p[1], p[2]});
+    }
+    const auto named = [&](auto corners) {
+      for (std::uint32_t& corner : corners) corner = name_of(corner);
+      return corners;
+    };
+    for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
+      fine.polygons_of(
+          edge, [&](const Quad& q) { quad(named(q)); }, [&](const Triangle& t) { triangle(named(t)); });
     });
+  }
+
+  /// Calls f(name) for those of the mesh's points that a block has.
+  template <class F>
+  void for_each_point(std::size_t b, const EdgePolygons& fine, F&& f) const {
+    const auto block = static_cast<std::int32_t>(b);
+    regions_.for_each_cube(block, [&](const Region& cube) { f(name_of(cube)); });
+    regions_.for_each_alone(block, [&](int cell) {
+      for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet)
+        f(cells_.point(block, cell, sheet));
+    });
+    for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
+      if (fine.is_fanned(edge)) f(name_of(fine.crossing_point(edge)));
+    });
+  }
+
+  /// Blocks at most two from those.
+  std::vector<std::uint8_t> two_on(const std::vector<std::uint8_t>& blocks) const {
+    std::vector<std::uint8_t> result = blocks;
+    std::vector<std::size_t> last, next;
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      if (blocks[b]) last.push_back(b);
+    for (int step = 0; step < 2; ++step) {
+      for (const std::size_t b : last)
+        for (const std::int32_t there : cells_.source(static_cast<std::int32_t>(b)).neighbours)
+          if (there >= 0 && !std::exchange(result[static_cast<std::size_t>(there)], 1))
+            next.push_back(static_cast<std::size_t>(there));
+      last = std::exchange(next, {});
+    }
+    return result;
   }
 
   const Regions& regions_;
   const CellBlocks& cells_;
-  const EdgePolygons& polygons_;
   const std::vector<Vector3d>& points_;
-  RunContext& context_;
-  const std::uint32_t first_cube_;     ///< name of the first
-  std::vector<std::uint32_t> number_;  ///< by name
-  std::vector<Made> made_;             ///< by block
-  std::vector<LooseEdge> loose_;
+  const std::uint32_t first_cube_;  ///< name
+  EdgeMasks lone_edges_;            ///< by block and axis: those whose polygons are of the uniform mesh
+  std::vector<Made> made_;          ///< by block
 };
+
+std::vector<BlockMask> all_active(const CellBlocks& cells) {
+  std::vector<BlockMask> result(cells.size());
+  for (std::size_t b = 0; b < cells.size(); ++b) result[b] = cells[static_cast<std::int32_t>(b)].active;
+  return result;
+}
+
+/// By point of the uniform mesh, those on fanned edges included.
+std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolygons& polygons,
+                                        const CellTolerances& tolerance, RunContext& context) {
+  std::vector<float> result(polygons.point_count());
+  parallel_blocks(cells.size(), context, [&](std::size_t b) {
+    const auto block = static_cast<std::int32_t>(b);
+    for_each_bit(cells[block].active, [&](int cell) {
+      for (int sheet = 0; sheet < cells.point_count(block, cell); ++sheet)
+        result[cells.point(block, cell, sheet)] = tolerance.least(cells, block, cell, 1);
+    });
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(polygons.fanned(block, axis), [&](int sample) {
+        float least = std::numeric_limits<float>::max();
+        for (const CellBlocks::Cell& cell : cells.around({block, sample, axis}).cells)
+          least = std::min(least, tolerance.least(cells, cell.block, cell.cell, 1));
+        result[polygons.crossing_point({block, sample, axis})] = least;
+      });
+  });
+  return result;
+}
+
+/// @param connect() the polygons of the uniform mesh, of lone edges at least
+template <class Connect>
+RegionMesh merge(const Regions& regions, const std::vector<Vector3d>& points, RegionProof& proof,
+                 Connect&& connect, RunContext& context) {
+  RegionPolygons merged(regions, points);
+  const auto call_bold = [&](const std::vector<CellBlocks::Edge>& meeting) {
+    for (const CellBlocks::Edge& edge : meeting) proof.call_bold(edge);
+    return !meeting.empty();
+  };
+  for (std::size_t splits = 0;;) {
+    splits += proof.run();
+    const std::vector<std::uint8_t> changed = proof.take_changed();
+    merged.update(changed, context);
+    if (call_bold(merged.loose_that_meet(changed, context))) continue;
+    const auto& fine = connect(merged.lone_edges());
+    if (call_bold(merged.loose_that_meet(fine, context))) continue;
+    context.figure("split_regions", double(splits));
+    context.figure("loose_polygons", double(merged.loose_count()));
+    return merged.mesh(fine, context);
+  }
+}
 
 }  // namespace
 
-RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Vector3d>& points,
-                         std::span<const float> tolerance, const FilePoints& file, RunContext& context) {
-  Regions regions(cells, points, tolerance, file, context);
-  RegionProof proof = [&] {
-    Stage stage(context, "prepare the proof");
-    return RegionProof(regions, polygons, points, tolerance, context);
-  }();
-  for (std::size_t splits = 0;;) {
-    splits += [&] {
-      Stage stage(context, "prove regions");
-      return proof.run();
-    }();
-    Filling filling(regions, polygons, points, context);
-    RegionMesh mesh = [&] {
-      Stage stage(context, "connect regions");
-      return filling.run();
-    }();
-    Stage stage(context, "test loose polygons");
-    std::vector<LoosePolygon> tested;
-    for (const auto& loose : filling.loose()) tested.push_back(loose.polygon);
-    const std::vector<std::size_t> meeting =
-        loose_polygons_that_meet(mesh.points, mesh.quads, mesh.triangles, tested, context);
-    if (meeting.empty()) {
-      context.figure("split_regions", double(splits));
-      context.figure("loose_polygons", double(tested.size()));
-      return mesh;
-    }
-    for (const std::size_t i : meeting) proof.call_bold(filling.loose()[i].edge);
+RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptions& options,
+                         const FilePoints& file, RunContext& context) {
+  const CellBlocks& cells = uniform.cells();
+  const std::vector<Vector3d>& points = uniform.mesh().points;
+  if (options.tolerance.least() > RegionSlabs::kLeast) {
+    if (!in_hulls) uniform.place(all_active(cells), context);
+    Regions regions(cells, points, options, file, context);
+    RegionSlabs slabs(regions, in_hulls ? nullptr : &points, context);
+    RegionProof proof(regions, slabs, uniform, context);
+    std::optional<EdgePolygons> fine;
+    return merge(
+        regions, points, proof,
+        [&](const EdgeMasks& lone) -> const EdgePolygons& {
+          return fine.emplace(uniform.connect(&lone, context));
+        },
+        context);
   }
+  uniform.place(all_active(cells), context);
+  const EdgePolygons fine = uniform.connect(nullptr, context);
+  Regions regions(cells, points, options, file, context);
+  const std::vector<float> tolerance = tolerances_of_points(cells, fine, options.tolerance, context);
+  const RegionShell shell = [&] {
+    Stage stage(context, "prepare the proof");
+    return RegionShell(regions, fine, points, tolerance, context);
+  }();
+  RegionProof proof(regions, shell, context);
+  return merge(
+      regions, points, proof, [&](const EdgeMasks&) -> const EdgePolygons& { return fine; }, context);
 }
 
 }  // namespace hermesh

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <span>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {
 
@@ -18,14 +18,12 @@ struct RegionMesh {
   LargeArray<Quad> quads;
 };
 
-/// Closed, oriented, manifold and free of self-intersection if the uniform mesh is, and within the tolerance of
-/// it both ways, but never farther than RegionShell::kFarthest (region_proof.h). The same bytes for every number
-/// of threads.
-/// @param points of the uniform mesh: those of cells lie within their cells, and those of fanned edges are
-/// behind them
-/// @param tolerance by point, those on fanned edges included; voxels
+/// Closed, oriented, manifold and free of self-intersection if the uniform mesh is, and within the tolerance
+/// of it both ways (region_proof.h). The same bytes for every number of threads.
+/// @param uniform with no points made yet
+/// @param in_hulls whether its points lie in the hull of their cells' crossings, as means do
 /// @throws Error for more points or polygons than 32 bits can number; Cancelled
-RegionMesh merge_regions(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
-                         std::span<const float> tolerance, const FilePoints& file, RunContext& context);
+RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptions& options,
+                         const FilePoints& file, RunContext& context);
 
 }  // namespace hermesh

@@ -26,23 +26,47 @@ FloatHermite sphere(double radius) {
   return sample({.value = [=](const Vector3d& p) { return p.norm() - radius; }, .gradient = [](const Vector3d& p) { return p; }});
 }
 
-PolygonMesh contour(const FloatHermite& hermite, double tolerance) {
+PolygonMesh contour(const FloatHermite& hermite, double tolerance, double flatness = 0) {
   RunContext context;
-  return manifold_dual_contouring(
-      view_of(hermite, context),
-      {.tolerance = tolerance, .merging = ManifoldDualContouringOptions::Merging::regions, .uniform = {}}, nullptr, context);
+  return manifold_dual_contouring(view_of(hermite, context),
+                                  {.tolerance = tolerance,
+                                   .merging = ManifoldDualContouringOptions::Merging::regions,
+                                   .flatness = flatness,
+                                   .uniform = {}},
+                                  nullptr, context);
+}
+
+/// Distances of a mesh's corners and middles of edges and triangles from a sphere about the origin, at most.
+double farthest_from_sphere(const PolygonMesh& mesh, double radius) {
+  double farthest = 0;
+  for (const Triangle& t : triangulated(mesh))
+    for (const Vector3d& weights :
+         {Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0), Vector3d(Vector3d(1, 1, 1) / 3.0)}) {
+      const Vector3d place =
+          weights[0] * mesh.world(t[0]) + weights[1] * mesh.world(t[1]) + weights[2] * mesh.world(t[2]);
+      farthest = std::max(farthest, std::abs(place.norm() - radius));
+    }
+  return farthest;
 }
 
 TEST(RegionMesh, FewPointsThatAreNearASphere) {
-  constexpr double kRadius = 20.0, kTolerance = 0.5;
+  constexpr double kRadius = 20.0;
   const FloatHermite hermite = sphere(kRadius);
-  const PolygonMesh fine = contour(hermite, 0.0), coarse = contour(hermite, kTolerance);
-  EXPECT_LT(coarse.points.size(), fine.points.size() / 6);
+  const PolygonMesh fine = contour(hermite, 0.0);
   // The uniform mesh is within 0.05 voxel of the sphere: a chord of at most 3 voxels is 0.056 deep.
-  for (const Triangle& t : triangulated(coarse))
-    for (const Vector3d& weights : {Vector3d(1, 0, 0), Vector3d(0.5, 0.5, 0), Vector3d(Vector3d(1, 1, 1) / 3.0)})
-      EXPECT_NEAR((weights[0] * coarse.world(t[0]) + weights[1] * coarse.world(t[1]) + weights[2] * coarse.world(t[2])).norm(),
-                  kRadius, kTolerance + 0.06);
+  const PolygonMesh coarse = contour(hermite, 0.5);
+  EXPECT_LT(coarse.points.size(), fine.points.size() / 6);
+  EXPECT_LT(farthest_from_sphere(coarse, kRadius), 0.56);
+  const PolygonMesh coarser = contour(hermite, 4.0);
+  EXPECT_LT(coarser.points.size(), fine.points.size() / 15);
+  EXPECT_LT(farthest_from_sphere(coarser, kRadius), 4.06);
+}
+
+TEST(RegionMesh, FlatnessKeepsCubesSmall) {
+  const FloatHermite hermite = sphere(20.0);
+  const PolygonMesh coarse = contour(hermite, 4.0), flat = contour(hermite, 4.0, 0.03);
+  EXPECT_GT(flat.points.size(), 2 * coarse.points.size());
+  EXPECT_LT(farthest_from_sphere(flat, 20.0), farthest_from_sphere(coarse, 20.0) / 2);
 }
 
 /// V − E + F of triangles that are closed.
@@ -59,7 +83,7 @@ TEST(RegionMesh, HasTheUniformMeshesTopology) {
                                        }});
   const PolygonMesh fine = contour(hermite, 0.0);
   EXPECT_EQ(euler_characteristic(fine), 0);
-  for (const double tolerance : {0.3, 1.0}) {
+  for (const double tolerance : {0.3, 1.0, 3.0, 6.0}) {
     const PolygonMesh coarse = contour(hermite, tolerance);
     EXPECT_LT(coarse.points.size(), fine.points.size()) << tolerance;
     EXPECT_EQ(euler_characteristic(coarse), 0) << tolerance;
@@ -105,19 +129,21 @@ FloatHermite waves() {
 
 TEST(RegionMesh, SameBytesAtAnyThreadCount) {
   const FloatHermite hermite = waves();
-  std::vector<PolygonMesh> meshes;
-  for (const std::size_t threads : {1, 2, 7}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    meshes.push_back(contour(hermite, 0.3));
+  for (const double tolerance : {0.3, 4.0}) {
+    std::vector<PolygonMesh> meshes;
+    for (const std::size_t threads : {1, 2, 7}) {
+      tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      meshes.push_back(contour(hermite, tolerance));
+    }
+    EXPECT_LT(meshes[0].points.size(), contour(hermite, 0).points.size() / 2);
+    EXPECT_TRUE(meshes[0] == meshes[1]);
+    EXPECT_TRUE(meshes[0] == meshes[2]);
   }
-  EXPECT_LT(meshes[0].points.size(), contour(hermite, 0).points.size() / 2);
-  EXPECT_TRUE(meshes[0] == meshes[1]);
-  EXPECT_TRUE(meshes[0] == meshes[2]);
 }
 
 TEST(RegionMesh, SameBytesAtEverySimdLevel) {
   const FloatHermite hermite = waves();
-  for (const double tolerance : {0.0, 0.3}) {
+  for (const double tolerance : {0.0, 0.3, 4.0}) {
     std::vector<PolygonMesh> meshes;
     for (const SimdLevel level : available_simd_levels()) {
       setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
@@ -135,17 +161,38 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
   RunContext context;
   const auto view = view_of(hermite, context);
   const FilePoints file(view.placement());
-  with_uniform_cells(view, {.reach = 0}, file, context,
-                     [&](const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh) {
-                       const std::vector<float> wide(mesh.points.size(), 1.0f), narrow(mesh.points.size(), 1e-4f);
-                       Regions regions(cells, mesh.points, wide, file, context);
-                       EXPECT_GT(regions.cube_count(), 100u);
-                       RegionProof(regions, polygons, mesh.points, narrow, context).run();
-                       std::size_t cubes = 0;
-                       for (std::size_t b = 0; b < cells.size(); ++b)
-                         regions.for_each(static_cast<std::int32_t>(b), [&](const Region&) { ++cubes; }, [](int) {});
-                       EXPECT_EQ(cubes, 0u);
-                     });
+  UniformCells uniform(view, {.placement = DualContouringOptions::Placement::average, .reach = 0}, file,
+                       context);
+  const CellBlocks& cells = uniform.cells();
+  const auto cubes = [&](const Regions& regions) {
+    std::size_t sum = 0;
+    for (std::size_t b = 0; b < cells.size(); ++b)
+      regions.for_each_cube(static_cast<std::int32_t>(b), [&](const Region&) { ++sum; });
+    return sum;
+  };
+  std::vector<BlockMask> all(cells.size());
+  for (std::size_t b = 0; b < cells.size(); ++b) all[b] = cells[static_cast<std::int32_t>(b)].active;
+  uniform.place(all, context);
+  const EdgePolygons polygons = uniform.connect(nullptr, context);
+  {
+    RegionOptions options{CellTolerances(1.0f)};
+    Regions regions(cells, uniform.mesh().points, options, file, context);
+    EXPECT_GT(cubes(regions), 20u);
+    options.tolerance = CellTolerances(1e-4f);
+    const std::vector<float> narrow(polygons.point_count(), 1e-4f);
+    const RegionShell shell(regions, polygons, uniform.mesh().points, narrow, context);
+    RegionProof(regions, shell, context).run();
+    EXPECT_EQ(cubes(regions), 0u);
+  }
+  {
+    RegionOptions options{CellTolerances(4.0f)};
+    Regions regions(cells, uniform.mesh().points, options, file, context);
+    EXPECT_GT(cubes(regions), 20u);
+    options.tolerance = CellTolerances(1e-4f);
+    RegionSlabs slabs(regions, nullptr, context);
+    RegionProof(regions, slabs, uniform, context).run();
+    EXPECT_EQ(cubes(regions), 0u);
+  }
 }
 
 /// A box along the axes: what is flat merges right up to the cells that an edge passes through.

@@ -38,6 +38,19 @@ int shorter_diagonal(const RegionPolygon& polygon) {
 
 }  // namespace
 
+Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, int i) {
+  const Region &a = polygon.regions[i], &b = polygon.regions[polygon.next(i)],
+               &smaller = a.level < b.level ? a : b;
+  const int across = polygon.across[i];
+  const Vector3d &p = polygon.points[i], &q = polygon.points[polygon.next(i)];
+  Vector3d place = p + (polygon.start[across] - p[across]) / (q[across] - p[across]) * (q - p);
+  const Vector3d lower = cells.corner(smaller.block, smaller.cell);
+  for (const int axis : {(across + 1) % 3, (across + 2) % 3})
+    place[axis] = std::clamp(place[axis], lower[axis] + kFromBorder * smaller.side(),
+                             lower[axis] + (1 - kFromBorder) * smaller.side());
+  return place;
+}
+
 int crossings_around_face(const Regions& regions, const RegionPolygon& polygon, int i) {
   const Region &a = polygon.regions[i], &b = polygon.regions[polygon.next(i)],
                &smaller = a.level < b.level ? a : b;
@@ -51,18 +64,8 @@ int crossings_around_face(const Regions& regions, const RegionPolygon& polygon, 
       int first[3] = {at[0], at[1], at[2]};
       first[other] += step;
       const CellBlocks::Cell cell = cells.locate(smaller.block, first[0], first[1], first[2]);
-      found += crossings_on({cell.block, cell.cell, along}, smaller.side(), cells);
+      found += cells.crossings_on({cell.block, cell.cell, along}, smaller.side());
     }
-  return found;
-}
-
-int crossings_on(const CellBlocks::Edge& first, int length, const CellBlocks& cells) {
-  if (first.block < 0) return 0;
-  constexpr int kStep[3] = {64, 8, 1};
-  const BlockMask& crossing = cells.source(first.block).crossing[static_cast<std::size_t>(first.axis)];
-  int found = 0;
-  for (int k = 0, sample = first.sample; k < length; ++k, sample += kStep[first.axis])
-    found += test(crossing, sample);
   return found;
 }
 

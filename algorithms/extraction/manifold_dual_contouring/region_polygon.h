@@ -44,8 +44,9 @@ struct RegionPolygon {
 /// i and the next.
 int crossings_around_face(const Regions& regions, const RegionPolygon& polygon, int side);
 
-/// How many are crossed of so many edges of a block that follow one another in a line.
-int crossings_on(const CellBlocks::Edge& first, int length, const CellBlocks& cells);
+/// Of the common part of the same two faces: where the segment between their points passes it, or a
+/// place beside that, off its border.
+Eigen::Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, int side);
 
 /// The regions around an edge, from corner to corner: fewer than three if there is no polygon.
 struct RegionRing {

@@ -3,17 +3,17 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
-#include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_shell.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_slabs.h"
 #include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {
 
@@ -33,37 +33,61 @@ namespace hermesh {
 /// (kAway in regions.cpp). Loose polygons may reach farther, and have one diagonal in common; they are tested
 /// against all others (loose_polygons.h).
 ///
-/// **Distance.** See region_shell.h.
+/// **Distance.** Of tolerances that are small, see region_shell.h, for which all of S must be there; of large
+/// ones region_slabs.h.
 class RegionProof {
  public:
-  /// @param tolerance by point, those on fanned edges included; voxels
-  RegionProof(Regions& regions, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
-              std::span<const float> tolerance, RunContext& context);
+  /// With slabs. @param uniform makes the points of cells that are alone
+  RegionProof(Regions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context);
+  /// With a shell. All points that the uniform mesh has in cells have been made.
+  RegionProof(Regions& regions, const RegionShell& shell, RunContext& context);
 
   /// Splits until all polygons keep the promises, but for whether loose ones meet others.
   /// @returns how many cubes were split
   /// @throws Cancelled
   std::size_t run();
 
+  /// By block, whether polygons there are others than when this was asked last.
+  std::vector<std::uint8_t> take_changed();
+
   /// The largest cube around the edge is to be split when run() is called again.
   void call_bold(const CellBlocks::Edge& edge);
 
  private:
-  void call_bold(const Region& region);
+  RegionProof(Regions& regions, RegionSlabs* slabs, const RegionShell* shell, UniformCells* uniform,
+              RunContext& context);
+
+  void place_lone_points();
+  void begin_slabs();
   void look_at_polygons();
-  bool holds(const CellBlocks::Edge& edge);
-  bool is_crossed_once(const RegionPolygon& polygon) const;
-  bool is_manifold(const RegionPolygon& polygon) const;
+  void look_at_polygons(std::size_t block);
+  bool is_shown(const CellBlocks::Edge& edge, const RegionRing& ring) const;
+  void look_at_slabs();
   std::size_t split();
+
+  void call_bold(const Region& region);
+  bool is_bold(const Region& region);
+  bool is_manifold(const RegionPolygon& polygon) const;
+  bool is_crossed_once(const RegionPolygon& polygon) const;
+  template <class F>
+  void for_each_touched(std::size_t block, F&& f) const;
 
   Regions& regions_;
   const CellBlocks& cells_;
-  const RegionShell shell_;
+  RegionSlabs* const slabs_;        ///< either these
+  const RegionShell* const shell_;  ///< or this; the other one is null,
+  UniformCells* const uniform_;     ///< and this goes with the first
   RunContext& context_;
-  std::vector<std::uint8_t> bold_;  ///< by cube: to be split
-  /// By block and axis: edges whose polygons are not known to be near.
-  std::vector<std::array<BlockMask, 3>> open_;
-  std::vector<std::uint8_t> any_bold_;               ///< by block
+  std::vector<std::array<std::uint64_t, Regions::kLevels>>
+      bold_;                            ///< by block and level, less 1: cubes to be split
+  std::vector<std::uint8_t> any_bold_;  ///< by block
+  std::vector<std::uint8_t> changed_;   ///< by block: stirred since take_changed()
+  // Cells by block:
+  std::vector<BlockMask> fresh_;    ///< of cubes that were split (all at the beginning),
+  std::vector<BlockMask> stirred_;  ///< or next to one
+  bool is_fresh_ = true;            ///< nothing was looked at yet
+  EdgeMasks open_;                  ///< by block and axis: edges whose polygons are not shown; with a shell
+  EdgeMasks loose_;                 ///< by block and axis: edges of loose polygons; with slabs
   std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };

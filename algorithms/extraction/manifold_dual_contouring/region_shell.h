@@ -22,7 +22,8 @@
 
 namespace hermesh {
 
-/// Of merged polygons T beside the uniform mesh S: a shell about T (Jiang et al. 2020).
+/// For tolerances of up to kFarthest: of merged polygons T beside the uniform mesh S, a shell about T (Jiang
+/// et al. 2020).
 ///
 /// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between
 /// the corners of a triangle directions are interpolated; over each triangle stands a prism, as far up and

@@ -5,12 +5,14 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_cubes.h"
+#include "algorithms/extraction/manifold_dual_contouring/region_proposals.h"
 
 namespace hermesh {
 
@@ -24,16 +26,15 @@ struct Region {
   bool operator==(const Region& other) const = default;
 };
 
-/// Which cells share a point. Begins with all cubes that look flat enough, and gets finer by split().
+/// Which cells share a point. Begins with all cubes that are proposed (region_proposals.h), and gets finer by
+/// split().
 class Regions {
  public:
-  static constexpr int kLevels = 3;
+  static constexpr int kLevels = kCubeLevels;
 
-  /// A cube is proposed where the surface within it is one disc (by its Euler characteristic, and because those of its
-  /// octants are discs that hang together) whose border crosses the cube's edges, none of its cells is fixed, and one place within it is near the planes of all
-  /// its crossings for the tolerance.
-  /// @param tolerance by point, those on fanned edges included; voxels; where it is 0 or less a cell stays alone
-  Regions(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, std::span<const float> tolerance,
+  /// @param points of the uniform mesh; only those of cells that are alone are ever looked at
+  /// @param options outlive this
+  Regions(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, const RegionOptions& options,
           const FilePoints& file, RunContext& context);
 
   /// Of an active cell.
@@ -54,50 +55,49 @@ class Regions {
   Eigen::Vector3d normal(const Region& region) const;
   /// The least of its cells.
   float tolerance(const Region& region) const {
-    return region.merged() ? cubes_[number(region)].tolerance
-                           : tolerance_[cells_.point(region.block, region.cell, 0)];
+    return options_.tolerance.least(cells_, region.block, region.cell, region.side());
   }
-  bool is_alone(std::int32_t block, int cell) const { return !at(block, cell).merged(); }
   std::size_t cube_count() const { return cubes_.size(); }
-  /// Of a cube, from 0.
+  /// Of a cube, by its number.
+  const Eigen::Vector3d& place(std::uint32_t cube) const { return cubes_[cube].place; }
+  /// Of a cube, from 0; it is the same for good.
   std::uint32_t number(const Region& cube) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
     const std::uint64_t before = (std::uint64_t{1} << cube_of(cube.cell, cube.level)) - 1;
     return own.first_cube[cube.level - 1u] +
            static_cast<std::uint32_t>(bits_in(own.proposed[cube.level - 1u] & before));
   }
-  /// Gives way to the cubes that were proposed within it, or to single cells.
-  void split(const Region& region) {
-    blocks_[static_cast<std::size_t>(region.block)].alive[region.level - 1] &=
-        ~(std::uint64_t{1} << cube_of(region.cell, region.level));
-  }
+  /// Gives way to the cubes that are proposed within it, or to single cells; but only as propose_parts() is
+  /// called. Safe to call for several blocks at once.
+  void split(const Region& region);
+  /// Within cubes of whole blocks that were split. There are more cubes then. @throws Cancelled
+  void propose_parts(RunContext& context);
 
-  void split_all() {
-    for (BlockRegions& block : blocks_) block.alive = {};
+  /// Cells of a block that belong to cubes, whether the surface passes through them or not.
+  const BlockMask& merged(std::int32_t block) const {
+    return blocks_[static_cast<std::size_t>(block)].merged;
   }
+  /// By axis the crossing edges of a block that have three regions or more around them, one of them a cube.
+  std::array<BlockMask, 3> merged_edges(std::int32_t block) const;
+  /// By axis the crossing edges of a block that have no cube around them.
+  std::array<BlockMask, 3> lone_edges(std::int32_t block) const;
 
-  /// By axis the crossing edges of a block, but for those that have one and the same cube all around them.
-  std::array<BlockMask, 3> outer_edges(std::int32_t block) const;
-  /// Calls f(CellBlocks::Edge) for them.
+  /// Calls f(Region) for the cubes of a block, in ascending order by level.
   template <class F>
-  void for_each_outer_edge(std::int32_t block, F&& f) const {
-    const std::array<BlockMask, 3> edges = outer_edges(block);
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(edges[static_cast<std::size_t>(axis)], [&](int sample) { f(CellBlocks::Edge{block, sample, axis}); });
-  }
-
-  /// Calls f(Region) for the cubes of a block, and g(cell) for its active cells that are alone, each in ascending order.
-  template <class F, class G>
-  void for_each(std::int32_t block, F&& f, G&& g) const {
+  void for_each_cube(std::int32_t block, F&& f) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(block)];
     for (int level = kLevels; level > 0; --level)
-      for (std::uint64_t alive = own.alive[level - 1]; alive != 0; alive &= alive - 1) {
+      for (std::uint64_t alive = own.alive[level - 1u]; alive != 0; alive &= alive - 1) {
         const Region region = region_of(block, std::countr_zero(alive), level);
         if (level == kLevels || at(block, region.cell) == region) f(region);
       }
-    for_each_bit(cells_[block].active, [&](int cell) {
-      if (is_alone(block, cell)) g(cell);
-    });
+  }
+  /// Calls f(cell) for the active cells of a block that are alone, in ascending order.
+  template <class F>
+  void for_each_alone(std::int32_t block, F&& f) const {
+    BlockMask alone = cells_[block].active;
+    for (std::size_t word = 0; word < 8; ++word) alone[word] &= ~merged(block)[word];
+    for_each_bit(alone, f);
   }
 
   const CellBlocks& cells() const { return cells_; }
@@ -107,32 +107,20 @@ class Regions {
   struct BlockRegions {
     std::array<std::uint64_t, kLevels> proposed{}, alive{};  ///< by level, less 1: a bit a cube
     std::array<std::uint32_t, kLevels> first_cube{};
+    BlockMask merged{};
+    bool wants_parts = false;
   };
-  class Proposals;
-
-  static int cube_of(int cell, int level) {
-    const int bits = 3 - level;
-    return ((((cell >> 6) >> level) << bits | ((cell >> 3) & 7) >> level) << bits) | (cell & 7) >> level;
-  }
-  static int first_cell(int cube, int level) {
-    const int bits = 3 - level, mask = (1 << bits) - 1;
-    return sample_index((cube >> (2 * bits)) << level, ((cube >> bits) & mask) << level, (cube & mask) << level);
-  }
+  static void find_merged(BlockRegions& block);
+  std::array<BlockMask, 3> inner_faces(std::int32_t block) const;
   static Region region_of(std::int32_t block, int cube, int level) {
     return {block, static_cast<std::uint16_t>(first_cell(cube, level)), static_cast<std::uint16_t>(level)};
   }
-  struct Cube {
-    Eigen::Vector3d place;  ///< rounded for the file
-    Eigen::Vector3f normal;
-    float tolerance;
-  };
-
   const CellBlocks& cells_;
   const std::vector<Eigen::Vector3d>& points_;
-  const std::span<const float> tolerance_;
+  const RegionOptions& options_;
   const FilePoints& file_;
   std::vector<BlockRegions> blocks_;
-  std::vector<Cube> cubes_;
+  std::vector<ProposedCube> cubes_;  ///< by number
 };
 
 }  // namespace hermesh

@@ -32,10 +32,8 @@ class Trials {
     std::vector<Cells> tried(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
-      std::uint32_t number = cells_[block].first_code;
-      for_each_bit(cells_[block].active, [&](int cell) {
-        const bool is_plain = cells_.is_plain(cells_.corner_signs(number++)) && !cells_.is_joint(block, cell);
-        if (!is_plain && is_tried({block, cell})) tried[b].push_back({block, cell});
+      for_each_bit(cells_[block].special, [&](int cell) {
+        if (is_tried({block, cell})) tried[b].push_back({block, cell});
       });
     });
     tried_ = joined(tried);

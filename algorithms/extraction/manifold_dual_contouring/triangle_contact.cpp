@@ -101,19 +101,26 @@ bool certainly_apart(const Corners& a, const Corners& b, int shared) {
   return half_planes_apart(a[1] - o, a[2] - o, b[2] - o);
 }
 
-bool certainly_apart(Triangle a, Triangle b, const std::vector<Vector3d>& points) {
-  int shared = 0;  // corners, to the front in the same order in both
-  for (int i = 0; i < 3; ++i)
-    for (int j = shared; j < 3; ++j)
-      if (a[i] == b[j]) {
-        std::swap(a[i], a[shared]);
-        std::swap(b[j], b[shared]);
+bool certainly_apart(NamedTriangle a, NamedTriangle b) {
+  std::size_t shared = 0;  // corners, to the front in the same order in both
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = shared; j < 3; ++j)
+      if (a.names[i] == b.names[j]) {
+        std::swap(a.names[i], a.names[shared]);
+        std::swap(a.corners[i], a.corners[shared]);
+        std::swap(b.names[j], b.names[shared]);
+        std::swap(b.corners[j], b.corners[shared]);
         ++shared;
         break;
       }
-  if (shared == 3) return false;
-  const auto corners = [&](const Triangle& t) { return Corners{points[t[0]], points[t[1]], points[t[2]]}; };
-  return certainly_apart(corners(a), corners(b), shared);
+  return shared < 3 && certainly_apart(a.corners, b.corners, static_cast<int>(shared));
+}
+
+bool certainly_apart(Triangle a, Triangle b, const std::vector<Vector3d>& points) {
+  const auto named = [&](const Triangle& t) {
+    return NamedTriangle{t, {points[t[0]], points[t[1]], points[t[2]]}};
+  };
+  return certainly_apart(named(a), named(b));
 }
 
 }  // namespace hermesh

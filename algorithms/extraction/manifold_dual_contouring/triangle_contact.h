@@ -17,6 +17,13 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 /// planes (Gottschalk et al. 1996, with the planes through a shared corner or edge as closed ones).
 bool certainly_apart(const Corners& a, const Corners& b, int shared);
 
+/// Corners of the same name are the same point. False if all are.
+struct NamedTriangle {
+  Triangle names;
+  Corners corners;
+};
+bool certainly_apart(NamedTriangle a, NamedTriangle b);
+
 /// The same of two triangles of a mesh, by numbers of its points; false if they have all corners in common.
 bool certainly_apart(Triangle a, Triangle b, const std::vector<Eigen::Vector3d>& points);
 

@@ -87,32 +87,48 @@ class Contourer {
       : numbers_(numbers), cells_(grid, context), options_(options),
         reach_(std::min(options.reach, kFarthestFromCell)), file_(file), wishes_(cells_.size()) {}
 
-  /// Polygons are made unless `use` is given.
-  UniformMesh run(RunContext& context, const CellUser* use = nullptr) {
-    UniformMesh mesh;
-    place_points(mesh, context);
+  const CellBlocks& cells() const { return cells_; }
+
+  UniformMesh run(RunContext& context) {
+    UniformMesh mesh = without_points();
+    place_points(
+        mesh, [&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
     let_points_leave(mesh, context);
-    connect(mesh, context, use);
+    const EdgePolygons polygons = connect(mesh, nullptr, context);
+    fill(polygons, mesh, context);
+    if (numbers_) number_polygons(polygons, mesh, context);
+    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
+    for_each_wisher(mesh, [&](double outside) { mesh.escaped += outside > 0; });
     return mesh;
   }
 
- private:
-  void place_points(UniformMesh& mesh, RunContext& context) {
-    Stage stage(context, "place points");
+  /// What takes no memory before it is written, but for the counts of cells.
+  UniformMesh without_points() const {
+    UniformMesh mesh;
     // With room for the few points that come to lie on edges, without which all would move then.
     mesh.points.reserve(cells_.point_count() + cells_.point_count() / 32);
     mesh.points.resize(cells_.point_count());
+    for (std::size_t b = 0; b < cells_.size(); ++b) {
+      mesh.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
+      mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
+    }
+    return mesh;
+  }
+
+  /// @param wanted(b) active cells of a block
+  template <class Wanted>
+  void place_points(UniformMesh& mesh, Wanted&& wanted, RunContext& context) {
+    Stage stage(context, "place points");
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
-      const BlockMask placed = place_plain_cells(block, mesh.points);
-      std::uint32_t number = cells_[block].first_code;
-      for_each_bit(cells_[block].active, [&](int cell) {
-        const int signs = cells_.corner_signs(number);
-        const std::uint32_t point = cells_[block].first_point + (number++ - cells_[block].first_code);
+      const BlockMask asked = wanted(b);
+      if (!any(asked)) return;
+      const BlockMask placed = place_plain_cells(block, asked, mesh.points);
+      for_each_bit(asked, [&](int cell) {
         if (test(placed, cell)) return;
-        if (is_plain(block, cell, signs)) {
-          mesh.points[point] = file_.rounded(place_plain(block, cell, signs));
+        if (cells_.is_plain(block, cell)) {
+          mesh.points[cells_.point(block, cell, 0)] = file_.rounded(place_plain(block, cell));
           return;
         }
         const int sheets = cells_.point_count(block, cell);
@@ -121,21 +137,31 @@ class Contourer {
           mesh.points[cells_.point(block, cell, sheet)] = file_.rounded(place(block, cell, sheet, sheets));
       });
     });
-    for (std::size_t b = 0; b < cells_.size(); ++b) {
-      mesh.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
-      mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
-      mesh.several_sheets += several[b];
-    }
+    for (const std::uint32_t found : several) mesh.several_sheets += found;
   }
 
-  /// Whether the cell's corners tell all.
-  bool is_plain(std::int32_t block, int cell, int signs) const {
-    return cells_.is_plain(signs) && !cells_.is_joint(block, cell);
+  /// The points of fanned edges come behind those of cells.
+  /// @param edges those that are wanted, all crossing ones if null
+  EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) const {
+    EdgePolygons polygons = [&] {
+      Stage stage(context, "connect");
+      return EdgePolygons(cells_, mesh.points, edges, context);
+    }();
+    double farthest = 0;
+    for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
+    for (const CellBlocks::Cell& cell :
+         hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
+      mesh.meeting_joints.emplace_back(cell.block, cell.cell);
+    mesh.held = polygons.held_cells();
+    mesh.fanned_edges = polygons.fanned_edges();
+    return polygons;
   }
 
-  /// Most cells by vector code: plain ones, if they are placed optimally only those whose planes are nearly
-  /// parallel. Returns which.
-  BlockMask place_plain_cells(std::int32_t block, std::vector<Vector3d>& points) const {
+ private:
+  /// Most of these cells by vector code: plain ones, if they are placed optimally only those whose planes are
+  /// nearly parallel. Returns which.
+  BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted,
+                              std::vector<Vector3d>& points) const {
     BlockMask placed{};
     const bool average = options_.placement == DualContouringOptions::Placement::average;
     if (!average && options_.truncation < leaf_kernels::kLeastTruncation) return placed;
@@ -147,11 +173,10 @@ class Contourer {
     std::array<std::uint8_t, kMost> is_placed;
     std::array<std::uint32_t, kMost> point;
     std::size_t found = 0;
-    std::uint32_t number = cells_[block].first_code;
-    for_each_bit(cells_[block].active, [&](int at) {
-      point[found] = cells_[block].first_point + (number - cells_[block].first_code);
-      cell[found] = static_cast<std::uint16_t>(at);
-      found += is_plain(block, at, cells_.corner_signs(number++));
+    for_each_bit(wanted, [&](int at) {
+      if (!cells_.is_plain(block, at)) return;
+      point[found] = cells_.point(block, at, 0);
+      cell[found++] = static_cast<std::uint16_t>(at);
     });
     for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
     float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
@@ -176,8 +201,8 @@ class Contourer {
     return placed;
   }
 
-  /// Of a cell whose corners tell all.
-  Vector3d place_plain(std::int32_t block, int cell, int signs) {
+  Vector3d place_plain(std::int32_t block, int cell) {
+    const int signs = cells_.corner_signs(cells_.cell_number(block, cell));
     const Vector3d corner = cells_.corner(block, cell);
     Qef qef(corner + Vector3d::Constant(0.5));
     for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
@@ -305,24 +330,6 @@ class Contourer {
     return true;
   }
 
-  void connect(UniformMesh& mesh, RunContext& context, const CellUser* use) {
-    EdgePolygons polygons = [&] {
-      Stage stage(context, "connect");
-      return EdgePolygons(cells_, mesh.points, context);
-    }();
-    double farthest = 0;
-    for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
-    for (const CellBlocks::Cell& cell : hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
-      mesh.meeting_joints.emplace_back(cell.block, cell.cell);
-    mesh.held = polygons.held_cells();
-    if (!use) fill(polygons, mesh, context);
-    if (numbers_) number_polygons(polygons, mesh, context);
-    mesh.fanned_edges = polygons.fanned_edges();
-    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
-    for_each_wisher(mesh, [&](double outside) { mesh.escaped += outside > 0; });
-    if (use) (*use)(cells_, polygons, mesh);
-  }
-
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
     Stage stage(context, "connect");
     mesh.quads.resize(polygons.quad_count());
@@ -392,10 +399,44 @@ UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& o
   return uniform_mesh(HermiteCells(grid), options, file, context);
 }
 
-void with_uniform_cells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
-                        RunContext& context, const CellUser& use) {
-  const HermiteCells cells(grid);
-  Contourer(cells, options, file, context, nullptr).run(context, &use);
+struct UniformCells::Made {
+  Made(const HermiteView& view, const DualContouringOptions& options, const FilePoints& file,
+       RunContext& context)
+      : grid(view),
+        contourer(grid, options, file, context, nullptr),
+        mesh(contourer.without_points()),
+        placed(contourer.cells().size()) {}
+
+  const HermiteCells grid;
+  Contourer contourer;
+  UniformMesh mesh;
+  std::vector<BlockMask> placed;
+};
+
+UniformCells::UniformCells(const HermiteView& grid, const DualContouringOptions& options,
+                           const FilePoints& file, RunContext& context)
+    : made_(std::make_unique<Made>(grid, options, file, context)) {}
+UniformCells::~UniformCells() = default;
+
+const CellBlocks& UniformCells::cells() const { return made_->contourer.cells(); }
+const UniformMesh& UniformCells::mesh() const { return made_->mesh; }
+
+void UniformCells::place(const std::vector<BlockMask>& wanted, RunContext& context) {
+  made_->contourer.place_points(
+      made_->mesh,
+      [&](std::size_t b) {
+        BlockMask missing;
+        for (std::size_t word = 0; word < missing.size(); ++word) {
+          missing[word] = wanted[b][word] & ~made_->placed[b][word];
+          made_->placed[b][word] |= wanted[b][word];
+        }
+        return missing;
+      },
+      context);
+}
+
+EdgePolygons UniformCells::connect(const EdgeMasks* edges, RunContext& context) {
+  return made_->contourer.connect(made_->mesh, edges, context);
 }
 
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,

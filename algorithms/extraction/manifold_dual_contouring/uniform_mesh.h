@@ -34,7 +34,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -69,10 +69,29 @@ struct UniformMesh {
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context);
 
-/// The same, but its polygons are not made: `use` gets what they would be made of, and the mesh with all but them. It may take the points.
-using CellUser = std::function<void(const CellBlocks& cells, const EdgePolygons& polygons, UniformMesh& mesh)>;
-void with_uniform_cells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
-                        RunContext& context, const CellUser& use);
+/// The uniform mesh of points that keep to their cells (`reach` is 0), made only where it is asked for.
+class UniformCells {
+ public:
+  UniformCells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+               RunContext& context);
+  ~UniformCells();
+
+  const CellBlocks& cells() const;
+  /// Points are where they were asked for, polygons nowhere.
+  const UniformMesh& mesh() const;
+  /// The points of active cells, by block. @throws Cancelled
+  void place(const std::vector<BlockMask>& wanted, RunContext& context);
+  /// The polygons of crossing edges all of whose cells have their points, and the points on those that are
+  /// fanned.
+  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must
+  /// be among them, and those within three cells of one: else nothing is promised. They outlive the result.
+  /// @throws Cancelled
+  EdgePolygons connect(const EdgeMasks* edges, RunContext& context);
+
+ private:
+  struct Made;
+  std::unique_ptr<Made> made_;
+};
 
 /// The edge that each polygon belongs to, numbered by block, axis and sample among the crossing edges.
 struct PolygonEdges {

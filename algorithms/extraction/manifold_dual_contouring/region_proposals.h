@@ -1,0 +1,95 @@
+// Cubes of cells that look as if they could share a point.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+#include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+
+namespace hermesh {
+
+/// In voxels, by the number of an active cell (CellBlocks::cell_number); or one for all.
+class CellTolerances {
+ public:
+  explicit CellTolerances(float all) : all_(all) {}
+  explicit CellTolerances(std::vector<float> by_cell) : by_cell_(std::move(by_cell)) {}
+  /// Of all cells.
+  float least() const { return by_cell_.empty() ? all_ : *std::ranges::min_element(by_cell_); }
+  /// The least of the active cells of a cube; `first` and `side` in cells of the block.
+  float least(const CellBlocks& cells, std::int32_t block, int first, int side) const;
+
+ private:
+  float all_ = 0;
+  std::vector<float> by_cell_;
+};
+
+struct RegionOptions {
+  CellTolerances tolerance;  ///< where it is 0 or less a cell stays alone
+  double flatness = 0;  ///< how far a cube's point may be from the planes of its crossings, voxels, root mean
+                        ///< square; 0: what the tolerance lets hope for
+};
+
+struct ProposedCube {
+  Eigen::Vector3d place;   ///< of its point, rounded for the file
+  Eigen::Vector3f normal;  ///< mean of those of its crossings
+};
+
+/// A cube is proposed where the surface within it is one disc whose border crosses the cube's edges, none of
+/// its cells is near a special one, and one place within it is near the planes of all its crossings for the
+/// tolerance. One of these for each thread.
+class RegionProposals {
+ public:
+  RegionProposals(const CellBlocks& cells, const RegionOptions& options, const FilePoints& file)
+      : cells_(cells), options_(options), file_(file) {}
+
+  /// All cells of a block. @returns whether it is proposed
+  bool propose_whole(std::int32_t block, ProposedCube& cube);
+  /// Of 2³ and 4³ cells: a bit each in `proposed`, and their cubes by level and bit.
+  void propose_parts(std::int32_t block, std::array<std::uint64_t, 2>& proposed,
+                     std::vector<ProposedCube>& cubes);
+
+ private:
+  /// Of planes through crossings, about the middle of the block.
+  struct Sum {
+    /// Of products of a plane's normal and distance, by row; and of normals, and places with how many they
+    /// are.
+    std::array<Eigen::Array4f, 4> products = filled<4>();
+    Eigen::Array4f normals = Eigen::Array4f::Zero(), places = Eigen::Array4f::Zero();
+
+    void add(const EdgeCrossing& crossing, const Eigen::Array4f& place);
+    void add(const Sum& other);
+    float count() const { return places[3]; }
+
+   private:
+    template <std::size_t N>
+    static std::array<Eigen::Array4f, N> filled() {
+      std::array<Eigen::Array4f, N> zeros;
+      zeros.fill(Eigen::Array4f::Zero());
+      return zeros;
+    }
+  };
+
+  void read(std::int32_t block);
+  template <class F>
+  void for_each_crossing(F&& f);
+  bool propose(int level, int cube, const Sum& sum, ProposedCube& result) const;
+  bool is_disc(int first, int side) const;
+  bool crosses_an_edge(int first, int side) const;
+  bool find_place(const Sum& sum, int first, int side, double tolerance, Eigen::Vector3d& place) const;
+
+  const CellBlocks& cells_;
+  const RegionOptions& options_;
+  const FilePoints& file_;
+  std::int32_t block_ = 0;
+  BlockMask free_{};                        ///< cells that may be part of a cube, active or not
+  std::array<BlockMask, 3> lower_faces_{};  ///< by axis: cells whose lower face the surface passes through
+  std::array<EdgeCrossing, 3 * 512> crossings_;
+  std::array<Sum, 64> sums_;
+};
+
+}  // namespace hermesh
