@@ -19,15 +19,15 @@ using Eigen::Vector3d;
 /// asked. Up to two voxels the proof knows distances well (region_shell.h); beyond, it looks at slabs
 /// (region_slabs.h) that are some six times as thick.
 double flatness_for(double tolerance) { return std::max(0.3 * std::min(tolerance, 2.0), 0.15 * tolerance); }
-/// Length of the mean of a cube's unit normals: what bends more than this, the proof would split.
-constexpr double kLeastAgreement = 0.93;
+/// Length of the mean of a cube's unit normals: what bends more than this, the proof would mostly split.
+double least_agreement_for(double tolerance) { return tolerance <= 2.0 ? 0.93 : 0.75; }
 /// How strongly the place is drawn to the mean of the crossings, against the planes: it should lie in the
 /// middle of what it stands for, but on the surface.
 constexpr double kPullToMean = 0.02;
-/// Steps from a cell whose polygons the rule of envelopes does not cover (uniform_mesh.h) to the nearest cell
-/// that may become part of a cube. Its polygons lie within the cells next to it, and those of a cube, if they
-/// are not loose, within the cube and the cells next to that.
-constexpr int kAway = 3;
+/// No cell becomes part of a cube that is at most so many steps from one whose polygons the rule of envelopes does not cover
+/// (uniform_mesh.h). Those lie within the cells next to it, and those of a cube, if they are not loose, within the cube and the
+/// cells next to that.
+constexpr int kAway = 2;
 
 constexpr int kStep[3] = {64, 8, 1};  ///< from a cell to the next
 
@@ -139,11 +139,10 @@ void RegionProposals::for_each_crossing(F&& f) {
 
 bool RegionProposals::propose(int level, int cube, const Sum& sum, ProposedCube& result) const {
   const int first = first_cell(cube, level), side = 1 << level;
+  const double tolerance = double(options_.tolerance.least(cells_, block_, first, side));
   const Eigen::Vector3f normal = sum.normals.head<3>();
-  if (!(double(normal.norm()) >= kLeastAgreement * double(sum.count()))) return false;
-  if (!crosses_an_edge(first, side)) return false;
-  const float tolerance = options_.tolerance.least(cells_, block_, first, side);
-  if (!(tolerance > 0) || !find_place(sum, first, side, double(tolerance), result.place)) return false;
+  if (!(tolerance > 0 && double(normal.norm()) >= least_agreement_for(tolerance) * double(sum.count()))) return false;
+  if (!crosses_an_edge(first, side) || !find_place(sum, first, side, tolerance, result.place)) return false;
   result.normal = normal.normalized();
   return true;
 }

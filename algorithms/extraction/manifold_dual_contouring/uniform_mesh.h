@@ -84,7 +84,7 @@ class UniformCells {
   /// The polygons of crossing edges all of whose cells have their points, and the points on those that are
   /// fanned.
   /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must
-  /// be among them, and those within three cells of one: else nothing is promised. They outlive the result.
+  /// be among them, and those within two cells of one: else nothing is promised. They outlive the result.
   /// @throws Cancelled
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context);
 
