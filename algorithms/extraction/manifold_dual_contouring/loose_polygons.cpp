@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 
 namespace hermesh {
@@ -37,18 +38,30 @@ void LoosePolygons::ByPlace::add(std::uint32_t triangle, const Box3& box) {
 
 void LoosePolygons::ByPlace::sort() {
   std::ranges::sort(entries_);
-  for (std::size_t first = 0, end; first < entries_.size(); first = end) {
+  std::size_t places = 0;
+  for (std::size_t i = 0; i < entries_.size(); ++i)
+    places += i == 0 || entries_[i].first != entries_[i - 1].first;
+  ranges_.assign(std::bit_ceil(4 * places + 1), Range{0, 0, 0});
+  for (std::uint32_t first = 0, end; first < entries_.size(); first = end) {
     for (end = first; end < entries_.size() && entries_[end].first == entries_[first].first;) ++end;
-    ranges_.emplace(entries_[first].first, std::pair(first, end));
+    ranges_[slot_of(entries_[first].first)] = {entries_[first].first, first, end};
+  }
+}
+
+/// Where it is, or would be.
+std::size_t LoosePolygons::ByPlace::slot_of(std::uint64_t place) const {
+  std::uint64_t slot = (place * 0x9e3779b97f4a7c15u) >> 32;
+  for (;; ++slot) {
+    const Range& range = ranges_[slot & (ranges_.size() - 1)];
+    if (range.first == range.end || range.place == place) return slot & (ranges_.size() - 1);
   }
 }
 
 template <class F>
 void LoosePolygons::ByPlace::for_each_near(const Box3& box, F&& f) const {
   for_each_place(box, [&](std::uint64_t place) {
-    const auto found = ranges_.find(place);
-    if (found == ranges_.end()) return;
-    for (std::size_t i = found->second.first; i < found->second.second; ++i) f(entries_[i].second);
+    const Range& range = ranges_[slot_of(place)];
+    for (std::uint32_t i = range.first; i < range.end; ++i) f(entries_[i].second);
   });
 }
 

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -51,8 +50,12 @@ class LoosePolygons {
 
    private:
     std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< places and triangles, ascending
-    std::unordered_map<std::uint64_t, std::pair<std::size_t, std::size_t>>
-        ranges_;  ///< of each place's entries
+    struct Range {
+      std::uint64_t place;
+      std::uint32_t first, end;  ///< none if they are equal
+    };
+    std::size_t slot_of(std::uint64_t place) const;
+    std::vector<Range> ranges_;  ///< of each place's entries, found by hashing
   };
 
   template <class F>

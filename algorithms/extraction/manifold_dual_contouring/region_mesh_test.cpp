@@ -83,7 +83,7 @@ TEST(RegionMesh, HasTheUniformMeshesTopology) {
                                        }});
   const PolygonMesh fine = contour(hermite, 0.0);
   EXPECT_EQ(euler_characteristic(fine), 0);
-  for (const double tolerance : {0.3, 1.0, 3.0, 6.0}) {
+  for (const double tolerance : {0.3, 1.0, 3.0, 6.0, 16.0}) {
     const PolygonMesh coarse = contour(hermite, tolerance);
     EXPECT_LT(coarse.points.size(), fine.points.size()) << tolerance;
     EXPECT_EQ(euler_characteristic(coarse), 0) << tolerance;
@@ -129,7 +129,7 @@ FloatHermite waves() {
 
 TEST(RegionMesh, SameBytesAtAnyThreadCount) {
   const FloatHermite hermite = waves();
-  for (const double tolerance : {0.3, 4.0}) {
+  for (const double tolerance : {0.3, 4.0, 16.0}) {
     std::vector<PolygonMesh> meshes;
     for (const std::size_t threads : {1, 2, 7}) {
       tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -143,7 +143,7 @@ TEST(RegionMesh, SameBytesAtAnyThreadCount) {
 
 TEST(RegionMesh, SameBytesAtEverySimdLevel) {
   const FloatHermite hermite = waves();
-  for (const double tolerance : {0.0, 0.3, 4.0}) {
+  for (const double tolerance : {0.0, 0.3, 4.0, 16.0}) {
     std::vector<PolygonMesh> meshes;
     for (const SimdLevel level : available_simd_levels()) {
       setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);

@@ -24,9 +24,9 @@ double least_agreement_for(double tolerance) { return tolerance <= 2.0 ? 0.93 : 
 /// How strongly the place is drawn to the mean of the crossings, against the planes: it should lie in the
 /// middle of what it stands for, but on the surface.
 constexpr double kPullToMean = 0.02;
-/// No cell becomes part of a cube that is at most so many steps from one whose polygons the rule of envelopes does not cover
-/// (uniform_mesh.h). Those lie within the cells next to it, and those of a cube, if they are not loose, within the cube and the
-/// cells next to that.
+/// No cell becomes part of a cube that is at most so many steps from one whose polygons the rule of envelopes
+/// does not cover (uniform_mesh.h). Those lie within the cells next to it, and those of a cube, if they are
+/// not loose, within the cube and the cells next to that.
 constexpr int kAway = 2;
 
 constexpr int kStep[3] = {64, 8, 1};  ///< from a cell to the next
@@ -141,7 +141,8 @@ bool RegionProposals::propose(int level, int cube, const Sum& sum, ProposedCube&
   const int first = first_cell(cube, level), side = 1 << level;
   const double tolerance = double(options_.tolerance.least(cells_, block_, first, side));
   const Eigen::Vector3f normal = sum.normals.head<3>();
-  if (!(tolerance > 0 && double(normal.norm()) >= least_agreement_for(tolerance) * double(sum.count()))) return false;
+  if (!(tolerance > 0 && double(normal.norm()) >= least_agreement_for(tolerance) * double(sum.count())))
+    return false;
   if (!crosses_an_edge(first, side) || !find_place(sum, first, side, tolerance, result.place)) return false;
   result.normal = normal.normalized();
   return true;

@@ -18,8 +18,11 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-/// Of places, far above what single precision makes of them within a block and in the file, in voxels.
+/// Of places, far above what single precision makes of them within a block and in the file, and beyond what
+/// kUnit does, in voxels.
 constexpr float kRounding = 1e-3f;
+/// Places in a block are kept in parts of a voxel, for there are as many as crossings.
+constexpr float kUnit = 4096;
 
 /// Of the cells of a box one on from each corner to the next.
 constexpr std::array<int, 3> corner_of(int number) { return {number & 1, (number >> 1) & 1, number >> 2}; }
@@ -96,7 +99,11 @@ struct RegionSlabs::Corners {
 };
 
 RegionSlabs::RegionSlabs(const Regions& regions, const std::vector<Vector3d>* points, RunContext& context)
-    : regions_(regions), cells_(regions.cells()), bins_(cells_.size()), first_(cells_.size()) {
+    : regions_(regions),
+      cells_(regions.cells()),
+      bins_(cells_.size()),
+      first_(cells_.size()),
+      all_hold_(double(regions.options().tolerance.least()) > std::sqrt(3.0) * 8) {
   Stage stage(context, "list crossings");
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b) {
@@ -111,7 +118,7 @@ RegionSlabs::RegionSlabs(const Regions& regions, const std::vector<Vector3d>* po
     first_[b] = static_cast<std::uint32_t>(first[b]);
     constexpr std::size_t kMost = 3 * 512 + 4 * 512;
     std::array<EdgeCrossing, 3 * 512> crossings;
-    std::array<std::array<float, 3>, kMost> places;
+    std::array<Place, kMost> places;
     std::array<std::uint8_t, kMost> bin;
     std::array<std::uint16_t, 65> next{};
     std::size_t found = 0;
@@ -119,7 +126,9 @@ RegionSlabs::RegionSlabs(const Regions& regions, const std::vector<Vector3d>* po
       const auto [x, y, z] = coordinates(cell);
       bin[found] = static_cast<std::uint8_t>((x >> 1) << 4 | (y >> 1) << 2 | z >> 1);
       ++next[bin[found] + 1u];
-      places[found++] = {place[0], place[1], place[2]};
+      for (std::size_t a = 0; a < 3; ++a)
+        places[found][a] = static_cast<std::uint16_t>(place[static_cast<int>(a)] * kUnit + 0.5f);
+      ++found;
     };
     cells_.grid().crossings(block, crossings.data());
     const EdgeCrossing* crossing = crossings.data();
@@ -179,8 +188,9 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
             for (std::size_t i = bins[static_cast<std::size_t>(row | first[2])],
                              end = bins[static_cast<std::size_t>(row | last[2]) + 1];
                  i < end; ++i) {
-              const float px = places[i][0] + shift[0], py = places[i][1] + shift[1],
-                          pz = places[i][2] + shift[2];
+              const float px = float(places[i][0]) / kUnit + shift[0],
+                          py = float(places[i][1]) / kUnit + shift[1],
+                          pz = float(places[i][2]) / kUnit + shift[2];
               if ((px >= lower[0]) & (px <= upper[0]) & (py >= lower[1]) & (py <= upper[1]) &
                   (pz >= lower[2]) & (pz <= upper[2]))
                 f(Vector3f(px, py, pz));
@@ -190,6 +200,7 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
 }
 
 void RegionSlabs::begin(const Region& cube) {
+  if (all_hold_) return;
   const std::array<int, 3> at = coordinates(cube.cell);
   Box box;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -248,6 +259,7 @@ RegionSlabs::Fan RegionSlabs::fan_of(const RegionPolygon& loose) const {
 }
 
 void RegionSlabs::add(const RegionPolygon& polygon) {
+  if (all_hold_) return;
   if (polygon.loose) {
     const Fan fan = fan_of(polygon);
     for_each_cube(polygon.crossing.block, fan.box, [&](const Region& cube) { widen(cube, fan.all()); });
@@ -356,6 +368,7 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
 }
 
 bool RegionSlabs::holds(const Region& cube) const {
+  if (all_hold_) return true;
   const Vector3d up = regions_.normal(cube), point = regions_.point(cube) - cells_.corner(cube.block, 0);
   const std::array<int, 3> at = coordinates(cube.cell);
   const double tolerance = double(regions_.tolerance(cube));

@@ -91,8 +91,10 @@ class RegionSlabs {
   std::vector<std::array<std::uint16_t, 65>>
       bins_;                                 ///< by block and cube of 2³ samples: where its places begin
   std::vector<std::uint32_t> first_;         ///< by block
-  LargeArray<std::array<float, 3>> places_;  ///< of crossings and points, in their block
+  using Place = std::array<std::uint16_t, 3>;
+  LargeArray<Place> places_;                 ///< of crossings and points, in their block
   std::vector<Slab> slabs_;                  ///< by cube, over its point
+  const bool all_hold_;                      ///< the tolerance is larger than the largest cubes are
 };
 
 }  // namespace hermesh

@@ -101,6 +101,7 @@ class Regions {
   }
 
   const CellBlocks& cells() const { return cells_; }
+  const RegionOptions& options() const { return options_; }
   const FilePoints& file() const { return file_; }
 
  private:
