@@ -19,10 +19,11 @@ namespace hermesh {
 
 /// Of a merged mesh T beside the uniform mesh S, whose cells' points lie within their cells.
 ///
-/// **Topology.** The cells of a cube are a disc of S (regions.h), which T shrinks to a point. That keeps the
-/// surface as it is if any two regions beside one another have one piece of border in common: if the border
-/// of the common part of their faces is crossed twice (and never not at all, see regions.h). Then each edge
-/// of T has two polygons, and as the border of a disc is one circle, so are the polygons around its point.
+/// **Topology.** The cells of a cube are a disc of S (region_proposals.h), which T shrinks to a point. That
+/// keeps the surface as it is if any two regions beside one another have one piece of border in common: if
+/// the border of the common part of their faces is crossed twice (and never not at all, see there). Then each
+/// edge of T has two polygons, and as the border of a disc is one circle, so are the polygons around its
+/// point.
 ///
 /// **No two polygons of T meet.** A region's point lies within its cube, so it sees each point of the cube's
 /// faces once. The common part of two regions' faces is cut into triangles from where the segment between the
@@ -30,8 +31,8 @@ namespace hermesh {
 /// with the regions' points. Those of one edge are its envelope; envelopes lie side by side, and a polygon
 /// that is not loose stays within its own (region_polygon.h, after Ju & Udeshi 2006). Polygons of cells of
 /// several sheets, or with ambiguous faces, are those of S, and too far from every cube to meet one of these
-/// (kAway in regions.cpp). Loose polygons may reach farther, and have one diagonal in common; they are tested
-/// against all others (loose_polygons.h).
+/// (kAway in region_proposals.cpp). Loose polygons may reach farther, and have one diagonal in common; they
+/// are tested against all others (loose_polygons.h).
 ///
 /// **Distance.** Of tolerances that are small, see region_shell.h, for which all of S must be there; of large
 /// ones region_slabs.h.
