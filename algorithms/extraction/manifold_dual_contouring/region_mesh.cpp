@@ -18,8 +18,8 @@ namespace {
 using Eigen::Vector3d;
 
 /// The polygons that have a cube at a corner, block by block, and those of the uniform mesh elsewhere.
-/// Corners have names that do not change: first cells' points, as the uniform mesh numbers them, then cubes,
-/// then points on fanned edges.
+/// Corners have names: first cells' points, as the uniform mesh numbers them, then cubes, which keep theirs
+/// when others are proposed, and then points on fanned edges, which do not.
 class RegionPolygons {
  public:
   RegionPolygons(const Regions& regions, const std::vector<Vector3d>& points)
@@ -225,7 +225,7 @@ class RegionPolygons {
   void for_each_point(std::size_t b, const EdgePolygons& fine, F&& f) const {
     const auto block = static_cast<std::int32_t>(b);
     regions_.for_each_cube(block, [&](const Region& cube) { f(name_of(cube)); });
-    regions_.for_each_alone(block, [&](int cell) {
+    for_each_bit(regions_.alone(block), [&](int cell) {
       for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet)
         f(cells_.point(block, cell, sheet));
     });

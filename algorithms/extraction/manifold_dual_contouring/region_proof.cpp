@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -81,11 +80,8 @@ std::vector<std::uint8_t> RegionProof::take_changed() {
 
 void RegionProof::place_lone_points() {
   std::vector<BlockMask> alone(cells_.size());
-  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-    const auto block = static_cast<std::int32_t>(b);
-    for (std::size_t word = 0; word < 8; ++word)
-      alone[b][word] = cells_[block].active[word] & ~regions_.merged(block)[word];
-  });
+  parallel_blocks(cells_.size(), context_,
+                  [&](std::size_t b) { alone[b] = regions_.alone(static_cast<std::int32_t>(b)); });
   uniform_->place(alone, context_);
 }
 

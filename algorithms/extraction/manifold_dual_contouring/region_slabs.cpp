@@ -24,9 +24,6 @@ constexpr float kRounding = 1e-3f;
 /// Places in a block are kept in parts of a voxel, for there are as many as crossings.
 constexpr float kUnit = 4096;
 
-/// Of the cells of a box one on from each corner to the next.
-constexpr std::array<int, 3> corner_of(int number) { return {number & 1, (number >> 1) & 1, number >> 2}; }
-
 std::array<int, 3> coordinates(int cell) { return {cell >> 6, (cell >> 3) & 7, cell & 7}; }
 
 template <class Compare>
@@ -74,7 +71,7 @@ struct RegionSlabs::Part {
 struct RegionSlabs::Corners {
   Corners(const Box& box, const Vector3d& up, const Slab& slab) {
     for (int c = 0; c < 8; ++c) {
-      const std::array<int, 3> at = corner_of(c);
+      const std::array<int, 3> at = corner_offset(c);
       Vector3d place;
       for (int a = 0; a < 3; ++a) {
         const auto i = static_cast<std::size_t>(a);

@@ -92,17 +92,15 @@ class Regions {
         if (level == kLevels || at(block, region.cell) == region) f(region);
       }
   }
-  /// Calls f(cell) for the active cells of a block that are alone, in ascending order.
-  template <class F>
-  void for_each_alone(std::int32_t block, F&& f) const {
-    BlockMask alone = cells_[block].active;
-    for (std::size_t word = 0; word < 8; ++word) alone[word] &= ~merged(block)[word];
-    for_each_bit(alone, f);
+  /// The active cells of a block that are alone.
+  BlockMask alone(std::int32_t block) const {
+    BlockMask result = cells_[block].active;
+    for (std::size_t word = 0; word < 8; ++word) result[word] &= ~merged(block)[word];
+    return result;
   }
 
   const CellBlocks& cells() const { return cells_; }
   const RegionOptions& options() const { return options_; }
-  const FilePoints& file() const { return file_; }
 
  private:
   struct BlockRegions {
