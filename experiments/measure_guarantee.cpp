@@ -260,13 +260,16 @@ class SubjectMeasurement {
     // Rows of the two ways to merge stand side by side.
     if (input_.parameters.is("merging", "regions")) subject.label += ", regions";
     if (input_.parameters.is("placement", "average")) subject.label += ", means";
+    if (!input_.parameters.is("largest_cube", "8"))
+      subject.label += ", cubes of " + input_.parameters.text("largest_cube");
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
       const Contender ours = {kGuaranteed,
                               {{"tolerance", readable_exactly(tolerance)},
                                {"merging", input_.parameters.text("merging")},
-                               {"placement", input_.parameters.text("placement")}}};
+                               {"placement", input_.parameters.text("placement")},
+                               {"largest_cube", input_.parameters.text("largest_cube")}}};
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
@@ -513,9 +516,10 @@ Measurement guarantee_measurement() {
            {"tolerances",
             "0.1 1",
             "of the adaptive meshes, in voxels",
-            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8"}},
+            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8", "2.5 4 8 14"}},
            {"merging", "collapses", "option of the extractor", {"collapses", "regions"}},
            {"placement", "optimal", "option of the extractor", {"optimal", "average"}},
+           {"largest_cube", "8", "option of the extractor", {"8", "4", "2"}},
            {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
            {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
            {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},

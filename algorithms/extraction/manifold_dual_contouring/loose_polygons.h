@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct NamedPolygon {
   int corners;
   std::array<std::uint32_t, 4> names;  ///< of the corners: those of the same name are the same point
   std::array<Eigen::Vector3d, 4> points;
+  /// Corners around which triangles are known not to meet (polygon_stars.h), a bit each.
+  unsigned settled = 0;
 };
 
 /// Which polygons meet another one in more than the corners and the edge that they share, or may do so, or
@@ -26,30 +29,25 @@ class LoosePolygons {
  public:
   explicit LoosePolygons(std::vector<NamedPolygon> tested);
 
-  /// Of the polygons around, which may be one of those that are tested. Safe to call for several at once.
-  void test_against(const NamedPolygon& polygon);
+  /// Of the polygons around, some that are near one another: with those that are tested among them, or
+  /// without. Safe to call for several lots at once.
+  void test_against(std::span<const NamedPolygon> polygons);
   /// The places, in the list given, of those that meet what they were tested against; ascending.
   std::vector<std::size_t> that_meet() const;
 
  private:
-  struct Tested {
-    NamedTriangle triangle;
-    Box3 box;
-    std::size_t polygon;
-    int half;  ///< of a quad
-  };
-  /// Triangles by the cubes of a lattice that their boxes touch.
+  /// Polygons by the cubes of a lattice that their boxes touch.
   class ByPlace {
    public:
-    void add(std::uint32_t triangle, const Box3& box);
+    void add(std::uint32_t polygon, const Box3& box);
     /// Before the first question.
     void sort();
-    /// Calls f(triangle) for those that share a cube with the box, some of them more than once.
+    /// Calls f(polygon, the cube) for those that share a cube with the box.
     template <class F>
     void for_each_near(const Box3& box, F&& f) const;
 
    private:
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< places and triangles, ascending
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< places and polygons, ascending
     struct Range {
       std::uint64_t place;
       std::uint32_t first, end;  ///< none if they are equal
@@ -58,12 +56,11 @@ class LoosePolygons {
     std::vector<Range> ranges_;  ///< of each place's entries, found by hashing
   };
 
-  template <class F>
-  static void for_each_triangle(const NamedPolygon& polygon, F&& f);
-  bool shares_diagonal(const Tested& tested, const Triangle& t) const;
+  struct Near;
+  void find_near(const Box3& box, Near& near) const;
 
   std::vector<NamedPolygon> polygons_;
-  std::vector<Tested> tested_;
+  std::vector<Box3> boxes_;  ///< theirs
   ByPlace by_place_;
   std::vector<std::uint8_t> meets_;  ///< by polygon
 };

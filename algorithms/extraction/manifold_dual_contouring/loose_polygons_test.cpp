@@ -22,22 +22,26 @@ struct Mesh {
   std::vector<Quad> quads;
   std::vector<Triangle> triangles;
 
-  NamedPolygon polygon(const Which& which) const {
+  NamedPolygon polygon(const Which& which, const std::vector<std::uint32_t>& settled) const {
     NamedPolygon result{2 * which.number + which.is_quad, which.is_quad ? 4 : 3, {}, {}};
     if (which.is_quad)
       result.names = quads[which.number];
     else
       std::ranges::copy(triangles[which.number], result.names.begin());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(result.corners); ++i)
+    for (std::size_t i = 0; i < static_cast<std::size_t>(result.corners); ++i) {
       result.points[i] = points[result.names[i]];
+      if (std::ranges::count(settled, result.names[i])) result.settled |= 1u << i;
+    }
     return result;
   }
-  Indices that_meet(const std::vector<Which>& tested) const {
+  Indices that_meet(const std::vector<Which>& tested, const std::vector<std::uint32_t>& settled = {}) const {
     std::vector<NamedPolygon> polygons;
-    for (const Which& which : tested) polygons.push_back(polygon(which));
+    for (const Which& which : tested) polygons.push_back(polygon(which, settled));
     LoosePolygons loose(polygons);
-    for (std::size_t i = 0; i < quads.size(); ++i) loose.test_against(polygon({i, true}));
-    for (std::size_t i = 0; i < triangles.size(); ++i) loose.test_against(polygon({i, false}));
+    std::vector<NamedPolygon> all;
+    for (std::size_t i = 0; i < quads.size(); ++i) all.push_back(polygon({i, true}, settled));
+    for (std::size_t i = 0; i < triangles.size(); ++i) all.push_back(polygon({i, false}, settled));
+    loose.test_against(all);
     return loose.that_meet();
   }
 };
@@ -105,6 +109,18 @@ TEST(LoosePolygons, HaveDiagonalsOfTheirOwn) {
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
   mesh.triangles.push_back({0, 2, 5});
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
+}
+
+/// Around a corner that somebody else has looked at nothing is tested, but everywhere else.
+TEST(LoosePolygons, NeedNoTestAroundSettledCorners) {
+  Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {1, 1, 0}},
+            {{0, 1, 3, 2}},
+            {{0, 1, 4}, {1, 4, 3}}};  // both within the quad
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}, {0}), Indices{0});
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}, {0, 3}), Indices{});
+  mesh.points[4] = {1, 1, 5};
+  mesh.triangles[0] = {4, 2, 1};  // passes through both
+  EXPECT_EQ(mesh.that_meet({kFirstQuad}, {0}), Indices{0});
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions
                     const FilePoints& file, RunContext& context) {
   UniformCells uniform(grid, options.uniform, file, context);
   const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context),
-                            options.flatness};
+                            options.flatness, options.largest_cube};
   const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average;
   RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
   report(uniform.mesh(), context);
@@ -189,6 +189,9 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   if (const double world = input.options.number("tolerance_world"); world > 0)
     options.tolerance = world / input.level_set.voxel_size();
   options.flatness = input.options.number("flatness");
+  options.largest_cube = input.options.is("largest_cube", "8")   ? 8
+                         : input.options.is("largest_cube", "4") ? 4
+                                                                 : 2;
   if (input.options.is("merging", "regions")) options.merging = ManifoldDualContouringOptions::Merging::regions;
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
@@ -223,6 +226,14 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
                           "crossings, in voxels, root "
                           "mean square, if tolerance allows more; 0 for what tolerance allows",
                   .maximum = 1e6});
+  options.insert(
+      options.begin() + 4,
+      {.name = "largest_cube",
+       .fallback = "8",
+       .help =
+           "with merging=regions: cells a side of the largest cubes; where flatness is below 0.2 or so, 4 "
+           "is as fast as 8, and nearer",
+       .choices = {"8", "4", "2"}});
   return options;
 }
 

@@ -18,7 +18,8 @@ struct ManifoldDualContouringOptions {
     regions     ///< those of cubes of 2³, 4³ and 8³ cells: many times as fast (region_mesh.h). Points stay within their cells.
   };
   Merging merging = Merging::collapses;
-  double flatness = 0;            ///< of regions (RegionOptions)
+  double flatness = 0;  ///< of regions (RegionOptions), as is the next
+  int largest_cube = 8;
   DualContouringOptions uniform;  ///< placement of the uniform mesh's points
 };
 

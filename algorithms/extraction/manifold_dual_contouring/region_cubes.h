@@ -21,12 +21,31 @@ constexpr int first_cell(int cube, int level) {
                       (cube & mask) << level);
 }
 
+/// Those of the next finer level that a cube of 4³ or 8³ cells is made of, a bit each.
+constexpr std::uint64_t parts_of(int cube, int level) {
+  const int bits = kCubeLevels - level, mask = (1 << bits) - 1;
+  const int x = 2 * (cube >> (2 * bits)), y = 2 * ((cube >> bits) & mask), z = 2 * (cube & mask);
+  std::uint64_t parts = 0;
+  for (int i = 0; i < 8; ++i)
+    parts |= std::uint64_t{1} << (((((x + (i >> 2)) << (bits + 1)) | (y + ((i >> 1) & 1))) << (bits + 1)) |
+                                  (z + (i & 1)));
+  return parts;
+}
+
 /// Bits of a cube in each of its words of a mask, less its first rows along y or z.
 constexpr std::uint64_t rows_of(int first, int side, int skip_y, int skip_z) {
   const std::uint64_t row = (((std::uint64_t{1} << side) - 1) >> skip_z << skip_z) << (first & 7);
   std::uint64_t rows = 0;
   for (int y = skip_y; y < side; ++y) rows |= row << (8 * (((first >> 3) & 7) + y));
   return rows;
+}
+
+/// The bits of a row of a level's cubes, as far apart as the cubes are wide.
+constexpr std::uint64_t spread(std::uint64_t row, int level) {
+  if (level == 2) return (row & 1) | (row & 2) << 3;
+  if (level > 2) return row;
+  row = (row | row << 2) & 0x33;
+  return (row | row << 1) & 0x55;
 }
 
 /// The cells of a level's cubes, a bit each.
@@ -36,9 +55,10 @@ constexpr BlockMask cells_of(std::uint64_t cubes, int level) {
   const int bits = kCubeLevels - level, across = 1 << bits, side = 1 << level;
   for (int x = 0; x < across; ++x) {
     std::uint64_t rows = 0;  // those of the cubes' first cells
-    for (int y = 0; y < across; ++y)
-      for (int z = 0; z < across; ++z)
-        rows |= ((cubes >> (((x << bits | y) << bits) | z)) & 1) << (side * (8 * y + z));
+    for (int y = 0; y < across; ++y) {
+      const std::uint64_t row = (cubes >> ((x << bits | y) << bits)) & ((1u << across) - 1);
+      rows |= spread(row, level) << (8 * side * y);
+    }
     for (int step = 1; step < side; step *= 2) rows |= rows << step | rows << (8 * step) | rows << (9 * step);
     for (int k = 0; k < side; ++k) result[static_cast<std::size_t>(x * side + k)] = rows;
   }

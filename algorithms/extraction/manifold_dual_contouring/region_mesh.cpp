@@ -5,10 +5,12 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/loose_polygons.h"
+#include "algorithms/extraction/manifold_dual_contouring/polygon_stars.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proof.h"
 
@@ -28,16 +30,20 @@ class RegionPolygons {
         points_(points),
         first_cube_(static_cast<std::uint32_t>(cells_.point_count())),
         lone_edges_(cells_.size()),
-        made_(cells_.size()) {}
+        made_(cells_.size()),
+        untested_(cells_.size()) {}
 
-  /// Makes those anew of blocks whose regions are others than they were.
-  void update(const std::vector<std::uint8_t>& changed, RunContext& context) {
+  /// Makes those of blocks anew where any are others than they were.
+  /// @param changed by block the samples whose edges may have others
+  void update(const std::vector<BlockMask>& changed, RunContext& context) {
     Stage stage(context, "connect regions");
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      if (!changed[b]) return;
-      lone_edges_[b] = regions_.lone_edges(static_cast<std::int32_t>(b));
+      if (!any(changed[b])) return;
+      for (std::size_t word = 0; word < 8; ++word) untested_[b][word] |= changed[b][word];
+      const auto block = static_cast<std::int32_t>(b);
+      lone_edges_[b] = regions_.lone_edges(block);
       made_[b] = {};
-      for_each_edge(b, regions_.merged_edges(static_cast<std::int32_t>(b)),
+      for_each_edge(b, regions_.merged_edges(block, lone_edges_[b]),
                     [&](const CellBlocks::Edge& edge) { make(edge, made_[b]); });
     });
   }
@@ -50,35 +56,32 @@ class RegionPolygons {
   }
 
   /// Edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
-  /// Such a polygon is within a block of its edge's, so two of them can only meet if those are at most two
-  /// apart.
-  std::vector<CellBlocks::Edge> loose_that_meet(const std::vector<std::uint8_t>& changed,
+  std::vector<CellBlocks::Edge> loose_that_meet(const std::vector<BlockMask>& changed,
                                                 RunContext& context) const {
     Stage stage(context, "test loose polygons");
-    const std::vector<std::uint8_t> tested = two_on(changed), near = two_on(tested);
-    return that_meet(tested, [&](LoosePolygons& loose) {
-      parallel_blocks(made_.size(), context, [&](std::size_t b) {
-        if (!near[b]) return;
-        for (const Polygon& polygon : made_[b].polygons) loose.test_against(named(polygon));
-      });
+    const std::vector<std::uint8_t> near = two_on(changed);
+    const PolygonStars stars = stars_of_loose(changed, near, context);
+    return that_meet(changed, near, &stars, context, [&](std::size_t b, auto&& test) {
+      for (const Polygon& polygon : made_[b].polygons)
+        test(polygon.sample(), [&] { return named(polygon, &stars); });
     });
   }
 
-  /// Edges of loose polygons that meet others of the uniform mesh.
-  std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) const {
+  /// Edges of loose polygons that meet others of the uniform mesh, where any of the two are new since this
+  /// was asked last.
+  std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "test loose polygons");
-    return that_meet(std::vector<std::uint8_t>(made_.size(), 1), [&](LoosePolygons& loose) {
-      parallel_blocks(made_.size(), context, [&](std::size_t b) {
-        std::uint64_t part = 0;
-        for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
-          const auto test = [&](auto corners) {
-            Polygon polygon{name_of(edge, ++part), static_cast<int>(corners.size()), {}};
-            std::ranges::transform(corners, polygon.names.begin(),
-                                   [&](std::uint32_t point) { return name_of(point); });
-            loose.test_against(named(polygon));
-          };
-          fine.polygons_of(edge, test, test);
-        });
+    const std::vector<BlockMask> changed = std::exchange(untested_, std::vector<BlockMask>(made_.size()));
+    return that_meet(changed, two_on(changed), nullptr, context, [&](std::size_t b, auto&& test) {
+      std::uint64_t part = 0;
+      for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
+        const auto on_polygon = [&](auto corners) {
+          Polygon polygon{name_of(edge, ++part), static_cast<int>(corners.size()), {}};
+          std::ranges::transform(corners, polygon.names.begin(),
+                                 [&](std::uint32_t point) { return name_of(point); });
+          test(edge.sample, [&] { return named(polygon, nullptr); });
+        };
+        fine.polygons_of(edge, on_polygon, on_polygon);
       });
     });
   }
@@ -124,14 +127,21 @@ class RegionPolygons {
 
  private:
   struct Polygon {
-    std::uint64_t name;
+    std::uint64_t name;  ///< tells its edge, see name_of()
     int corners;
     std::array<std::uint32_t, 4> names;
+    int sample() const { return static_cast<int>(name & 511); }
+    CellBlocks::Edge edge() const {
+      return {static_cast<std::int32_t>(name >> 11), sample(), static_cast<int>((name >> 9) & 3)};
+    }
+    std::span<const std::uint32_t> corner_names() const {
+      return std::span(names).first(static_cast<std::size_t>(corners));
+    }
   };
   /// Of a block.
   struct Made {
     std::vector<Polygon> polygons;
-    std::vector<std::pair<CellBlocks::Edge, std::uint32_t>> loose;  ///< with places among the polygons
+    std::vector<std::uint32_t> loose;  ///< among the polygons
   };
 
   template <class F>
@@ -161,36 +171,95 @@ class RegionPolygons {
     return name < first_fan() ? regions_.place(name - first_cube_)
                               : points_[name - first_fan() + first_cube_];
   }
-  NamedPolygon named(const Polygon& polygon) const {
+  bool is_cube(std::uint32_t name) const { return name >= first_cube_ && name < first_fan(); }
+  /// @param stars of cubes' points; none if null
+  NamedPolygon named(const Polygon& polygon, const PolygonStars* stars) const {
     NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}};
-    for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i)
-      result.points[i] = place(polygon.names[i]);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i) {
+      const std::uint32_t name = polygon.names[i];
+      result.points[i] = place(name);
+      if (stars && is_cube(name) && stars->is_plain(name - first_cube_)) result.settled |= 1u << i;
+    }
     return result;
   }
 
-  /// @param test called with the loose polygons of some blocks
-  template <class F>
-  std::vector<CellBlocks::Edge> that_meet(const std::vector<std::uint8_t>& blocks, F&& test) const {
-    std::vector<NamedPolygon> polygons;
-    std::vector<CellBlocks::Edge> edges;
-    for (std::size_t b = 0; b < made_.size(); ++b) {
-      if (!blocks[b]) continue;
-      for (const auto& [edge, polygon] : made_[b].loose) {
-        polygons.push_back(named(made_[b].polygons[polygon]));
-        edges.push_back(edge);
+  /// Of the cubes that new loose polygons have. A cube's polygons are in blocks next to its own, or there.
+  /// @param near two_on(changed)
+  PolygonStars stars_of_loose(const std::vector<BlockMask>& changed, const std::vector<std::uint8_t>& near,
+                              RunContext& context) const {
+    PolygonStars stars(regions_.cube_count());
+    parallel_blocks(made_.size(), context, [&](std::size_t b) {
+      for (const std::uint32_t polygon : made_[b].loose)
+        if (test(changed[b], made_[b].polygons[polygon].sample()))
+          for (const std::uint32_t name : made_[b].polygons[polygon].corner_names())
+            if (is_cube(name)) stars.ask(name - first_cube_);
+    });
+    parallel_blocks(made_.size(), context, [&](std::size_t b) {
+      if (!near[b]) return;
+      for (const Polygon& polygon : made_[b].polygons) {
+        const auto names = polygon.corner_names();
+        for (std::size_t i = 0; i < names.size(); ++i) {
+          const std::uint32_t cube = names[i] - first_cube_;
+          if (!is_cube(names[i]) || !stars.is_asked(cube)) continue;
+          const Vector3d &point = place(names[i]), up = regions_.normal(cube).cast<double>();
+          const auto add = [&](std::size_t first, std::size_t second) {
+            stars.add(cube, up, place(names[first]) - point, place(names[second]) - point);
+          };
+          const std::size_t n = names.size(), next = (i + 1) % n, last = (i + n - 1) % n;
+          if (n == 4 && i % 2 == 0) {  // the diagonal ends here
+            add(next, i ^ 2);
+            add(i ^ 2, last);
+          } else {
+            add(next, last);
+          }
+        }
       }
-    }
+    });
+    return stars;
+  }
+
+  /// Edges of loose polygons that meet others. A loose polygon is within a block of its edge's, so two
+  /// polygons can only meet if these are at most two apart.
+  /// @param changed samples whose edges have new polygons, by block
+  /// @param near two_on(changed)
+  /// @param stars as named() wants them
+  /// @param others called with a block and a function, which it calls with samples of edges, and functions
+  /// for their polygons
+  template <class F>
+  std::vector<CellBlocks::Edge> that_meet(const std::vector<BlockMask>& changed,
+                                          const std::vector<std::uint8_t>& near, const PolygonStars* stars,
+                                          RunContext& context, F&& others) const {
     std::vector<CellBlocks::Edge> result;
-    if (polygons.empty()) return result;
-    LoosePolygons loose(std::move(polygons));
-    test(loose);
-    for (const std::size_t i : loose.that_meet()) result.push_back(edges[i]);
+    // New loose ones beside all others, and then the others beside new ones.
+    for (const bool is_new : {true, false}) {
+      std::vector<const Polygon*> asked;
+      for (std::size_t b = 0; b < made_.size(); ++b)
+        if (near[b])
+          for (const std::uint32_t number : made_[b].loose)
+            if (const Polygon& polygon = made_[b].polygons[number];
+                test(changed[b], polygon.sample()) == is_new)
+              asked.push_back(&polygon);
+      if (asked.empty()) continue;
+      std::vector<NamedPolygon> polygons(asked.size());
+      parallel_blocks(asked.size(), context, [&](std::size_t i) { polygons[i] = named(*asked[i], stars); });
+      LoosePolygons loose(std::move(polygons));
+      parallel_blocks(made_.size(), context, [&](std::size_t b) {
+        if (!near[b]) return;
+        thread_local std::vector<NamedPolygon> beside;
+        beside.clear();
+        others(b, [&](int sample, auto&& polygon) {
+          if (is_new || test(changed[b], sample)) beside.push_back(polygon());
+        });
+        loose.test_against(beside);
+      });
+      for (const std::size_t i : loose.that_meet()) result.push_back(asked[i]->edge());
+    }
     return result;
   }
 
   void make(const CellBlocks::Edge& edge, Made& made) const {
-    const RegionPolygon polygon = *polygon_of(regions_, edge, ring_of(regions_, edge));
-    if (polygon.loose) made.loose.emplace_back(edge, static_cast<std::uint32_t>(made.polygons.size()));
+    const RegionPolygon polygon = polygon_of(regions_, edge, ring_of(regions_, edge));
+    if (polygon.loose) made.loose.push_back(static_cast<std::uint32_t>(made.polygons.size()));
     Polygon result{name_of(edge, 0), polygon.corners, {}};
     for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i)
       result.names[i] = name_of(polygon.regions[(static_cast<std::size_t>(polygon.diagonal) + i) %
@@ -234,12 +303,15 @@ class RegionPolygons {
     });
   }
 
-  /// Blocks at most two from those.
-  std::vector<std::uint8_t> two_on(const std::vector<std::uint8_t>& blocks) const {
-    std::vector<std::uint8_t> result = blocks;
+  /// Blocks at most two from those that have any.
+  std::vector<std::uint8_t> two_on(const std::vector<BlockMask>& cells) const {
+    std::vector<std::uint8_t> result(cells.size());
     std::vector<std::size_t> last, next;
-    for (std::size_t b = 0; b < blocks.size(); ++b)
-      if (blocks[b]) last.push_back(b);
+    for (std::size_t b = 0; b < cells.size(); ++b)
+      if (any(cells[b])) {
+        result[b] = 1;
+        last.push_back(b);
+      }
     for (int step = 0; step < 2; ++step) {
       for (const std::size_t b : last)
         for (const std::int32_t there : cells_.source(static_cast<std::int32_t>(b)).neighbours)
@@ -256,6 +328,7 @@ class RegionPolygons {
   const std::uint32_t first_cube_;  ///< name
   EdgeMasks lone_edges_;            ///< by block and axis: those whose polygons are of the uniform mesh
   std::vector<Made> made_;          ///< by block
+  std::vector<BlockMask> untested_;  ///< by block: as update() has it, against the uniform mesh
 };
 
 std::vector<BlockMask> all_active(const CellBlocks& cells) {
@@ -296,7 +369,7 @@ RegionMesh merge(const Regions& regions, const std::vector<Vector3d>& points, Re
   };
   for (std::size_t splits = 0;;) {
     splits += proof.run();
-    const std::vector<std::uint8_t> changed = proof.take_changed();
+    const std::vector<BlockMask> changed = proof.take_changed();
     merged.update(changed, context);
     if (call_bold(merged.loose_that_meet(changed, context))) continue;
     const auto& fine = connect(merged.lone_edges());
@@ -314,10 +387,14 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
   const CellBlocks& cells = uniform.cells();
   const std::vector<Vector3d>& points = uniform.mesh().points;
   if (options.tolerance.least() > RegionSlabs::kLeast) {
-    if (!in_hulls) uniform.place(all_active(cells), context);
+    const bool needs_slabs =
+        options.tolerance.least() <= RegionProof::kDiagonal * float(options.largest_cube);
+    if (needs_slabs && !in_hulls) uniform.place(all_active(cells), context);
     Regions regions(cells, points, options, file, context);
-    RegionSlabs slabs(regions, in_hulls ? nullptr : &points, context);
-    RegionProof proof(regions, slabs, uniform, context);
+    std::optional<RegionSlabs> slabs;
+    if (needs_slabs) slabs.emplace(regions, in_hulls ? nullptr : &points, context);
+    RegionProof proof =
+        slabs ? RegionProof(regions, *slabs, uniform, context) : RegionProof(regions, uniform, context);
     std::optional<EdgePolygons> fine;
     return merge(
         regions, points, proof,

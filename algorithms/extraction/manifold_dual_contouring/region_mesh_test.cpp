@@ -69,6 +69,23 @@ TEST(RegionMesh, FlatnessKeepsCubesSmall) {
   EXPECT_LT(farthest_from_sphere(flat, 20.0), farthest_from_sphere(coarse, 20.0) / 2);
 }
 
+/// A tolerance beyond their diagonal, so that nothing is to be shown of distances.
+TEST(RegionMesh, CubesAreAtMostAsLargeAsAsked) {
+  const FloatHermite hermite = sphere(20.0);
+  RunContext context;
+  std::vector<std::size_t> points;
+  for (const int largest : {2, 4, 8}) {
+    ManifoldDualContouringOptions options{
+        .tolerance = 1.74 * largest, .largest_cube = largest, .uniform = {}};
+    options.merging = ManifoldDualContouringOptions::Merging::regions;
+    const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+    EXPECT_LT(farthest_from_sphere(mesh, 20.0), options.tolerance);
+    points.push_back(mesh.points.size());
+  }
+  EXPECT_GT(points[0], 2 * points[1]);
+  EXPECT_GT(points[1], 2 * points[2]);
+}
+
 /// V − E + F of triangles that are closed.
 std::int64_t euler_characteristic(const PolygonMesh& mesh) {
   return std::int64_t(mesh.points.size()) - std::int64_t(mesh.triangle_count()) / 2;

@@ -51,24 +51,6 @@ Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, in
   return place;
 }
 
-int crossings_around_face(const Regions& regions, const RegionPolygon& polygon, int i) {
-  const Region &a = polygon.regions[i], &b = polygon.regions[polygon.next(i)],
-               &smaller = a.level < b.level ? a : b;
-  const CellBlocks& cells = regions.cells();
-  const int f = polygon.across[i], p = (f + 1) % 3, q = (f + 2) % 3;
-  int at[3] = {smaller.cell >> 6, (smaller.cell >> 3) & 7, smaller.cell & 7};
-  if (polygon.start[f] > cells.corner(smaller.block, smaller.cell)[f]) at[f] += smaller.side();
-  int found = 0;
-  for (const auto& [along, other] : {std::pair{p, q}, std::pair{q, p}})
-    for (const int step : {0, smaller.side()}) {
-      int first[3] = {at[0], at[1], at[2]};
-      first[other] += step;
-      const CellBlocks::Cell cell = cells.locate(smaller.block, first[0], first[1], first[2]);
-      found += cells.crossings_on({cell.block, cell.cell, along}, smaller.side());
-    }
-  return found;
-}
-
 const Region& RegionRing::largest() const {
   return *std::max_element(regions.begin(), regions.begin() + corners,
                            [](const Region& a, const Region& b) { return a.level < b.level; });
@@ -84,7 +66,6 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   RegionRing ring;
   int last_across = u;
   for (std::size_t i = 0; i < 4; ++i) {
-    ring.any_merged = ring.any_merged || around[i].merged();
     const std::size_t before =
         (i + 3) % 4;  // the step from it to i crosses a plane of constant u if it is even
     if (around[i] == around[before]) continue;
@@ -97,9 +78,7 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   return ring;
 }
 
-std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge,
-                                        const RegionRing& ring) {
-  if (!ring.has_polygon()) return std::nullopt;
+RegionPolygon polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring) {
   const CellBlocks& cells = regions.cells();
   const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
   RegionPolygon polygon;
@@ -107,11 +86,7 @@ std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks
   polygon.corners = ring.corners;
   polygon.regions = ring.regions;
   polygon.across = ring.across;
-  for (int i = 0; i < polygon.corners; ++i) {
-    const Region& region = polygon.regions[i];
-    if (!region.merged() && cells.sheets(region.block, region.cell).sheets != 1) return std::nullopt;
-    polygon.points[i] = regions.point(region);
-  }
+  for (int i = 0; i < polygon.corners; ++i) polygon.points[i] = regions.point(polygon.regions[i]);
   const int along = edge.axis == 0   ? edge.sample >> 6
                     : edge.axis == 1 ? (edge.sample >> 3) & 7
                                      : edge.sample & 7;

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <optional>
 
 #include "algorithms/extraction/manifold_dual_contouring/regions.h"
 
@@ -40,12 +39,8 @@ struct RegionPolygon {
   }
 };
 
-/// How many crossing edges are on the border of the common part of the faces of two regions, that after side
-/// i and the next.
-int crossings_around_face(const Regions& regions, const RegionPolygon& polygon, int side);
-
-/// Of the common part of the same two faces: where the segment between their points passes it, or a
-/// place beside that, off its border.
+/// Of the common part of the faces of two regions, that after side i and the next: where the segment between
+/// their points passes it, or a place beside that, off its border.
 Eigen::Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, int side);
 
 /// The regions around an edge, from corner to corner: fewer than three if there is no polygon.
@@ -54,14 +49,11 @@ struct RegionRing {
   std::array<Region, 4> regions{};
   std::array<int, 4> across{};  ///< axis of the step from each to the next
   int least_level = Regions::kLevels;
-  bool any_merged = false;
-  bool has_polygon() const { return corners >= 3; }
   const Region& largest() const;
 };
 RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge);
 
-/// None where fewer than three regions are around the edge, or where one of them is a cell of several sheets.
-std::optional<RegionPolygon> polygon_of(const Regions& regions, const CellBlocks::Edge& edge,
-                                        const RegionRing& ring);
+/// @param ring of three regions at least, one of them a cube, so that none is a cell of several sheets
+RegionPolygon polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring);
 
 }  // namespace hermesh

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include "algorithms/core/parallel.h"
@@ -27,6 +26,9 @@ bool overlap(const BlockMask& mask, const Region& region) {
 
 }  // namespace
 
+RegionProof::RegionProof(Regions& regions, UniformCells& uniform, RunContext& context)
+    : RegionProof(regions, nullptr, nullptr, &uniform, context) {}
+
 RegionProof::RegionProof(Regions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context)
     : RegionProof(regions, &slabs, nullptr, &uniform, context) {}
 
@@ -43,12 +45,12 @@ RegionProof::RegionProof(Regions& regions, RegionSlabs* slabs, const RegionShell
       context_(context),
       bold_(cells_.size()),
       any_bold_(cells_.size()),
-      changed_(cells_.size(), 1),
+      changed_(cells_.size()),
       fresh_(cells_.size()),
       stirred_(cells_.size()),
       open_(shell ? cells_.size() : 0),
       loose_(slabs ? cells_.size() : 0) {
-  for (auto* masks : {&fresh_, &stirred_})
+  for (auto* masks : {&changed_, &fresh_, &stirred_})
     for (BlockMask& mask : *masks) mask.fill(~std::uint64_t{0});
   for (std::size_t b = 0; b < cells_.size(); ++b) {
     const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
@@ -62,10 +64,9 @@ std::size_t RegionProof::run() {
   Stage stage(context_, "prove regions");
   std::size_t splits = std::exchange(is_fresh_, false) ? 0 : split();  // what was called bold meanwhile
   for (;;) {
-    if (slabs_) {
-      place_lone_points();
-      begin_slabs();
-    }
+    if (uniform_) place_lone_points();
+    if (!slabs_ && !shell_) return splits;
+    if (slabs_) begin_slabs();
     look_at_polygons();
     if (slabs_) look_at_slabs();
     const std::size_t now = split();
@@ -74,14 +75,15 @@ std::size_t RegionProof::run() {
   }
 }
 
-std::vector<std::uint8_t> RegionProof::take_changed() {
-  return std::exchange(changed_, std::vector<std::uint8_t>(cells_.size()));
+std::vector<BlockMask> RegionProof::take_changed() {
+  return std::exchange(changed_, std::vector<BlockMask>(cells_.size()));
 }
 
 void RegionProof::place_lone_points() {
   std::vector<BlockMask> alone(cells_.size());
-  parallel_blocks(cells_.size(), context_,
-                  [&](std::size_t b) { alone[b] = regions_.alone(static_cast<std::int32_t>(b)); });
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    if (any(fresh_[b])) alone[b] = regions_.alone(static_cast<std::int32_t>(b));
+  });
   uniform_->place(alone, context_);
 }
 
@@ -133,7 +135,7 @@ void RegionProof::look_at_polygons(std::size_t b) {
     if (slabs_)
       for_each_bit(loose_[b][a], [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
-        slabs_->add(*polygon_of(regions_, edge, ring_of(regions_, edge)));
+        slabs_->add(polygon_of(regions_, edge, ring_of(regions_, edge)));
       });
     if (shell_) open_[b][a] = {};
     for_each_bit(looked_at, [&](int sample) {
@@ -146,17 +148,12 @@ void RegionProof::look_at_polygons(std::size_t b) {
       if (shell_ && std::any_of(ring.regions.begin(), ring.regions.begin() + ring.corners,
                                 [&](const Region& region) { return region.merged() && is_bold(region); }))
         return set(open_[b][a]);
-      const std::optional<RegionPolygon> polygon = polygon_of(regions_, edge, ring);
-      bool holds = polygon && is_manifold(*polygon);
-      if (holds && shell_) holds = shell_->holds(*polygon);
-      if (holds && slabs_) {
-        slabs_->add(*polygon);
-        if (polygon->loose) {
-          set(loose_[b][a]);
-          holds = slabs_->holds(*polygon);
-        }
+      const RegionPolygon polygon = polygon_of(regions_, edge, ring);
+      if (slabs_) {
+        slabs_->add(polygon);
+        if (polygon.loose) set(loose_[b][a]);
       }
-      if (holds) return;
+      if (shell_ ? shell_->holds(polygon) : !polygon.loose || slabs_->holds(polygon)) return;
       call_bold(ring.largest());
       if (shell_) set(open_[b][a]);
     });
@@ -183,26 +180,6 @@ bool RegionProof::is_bold(const Region& cube) {
   const auto bits = std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
                         .load(std::memory_order_relaxed);
   return (bits >> cube_of(cube.cell, cube.level)) & 1;
-}
-
-/// Whether the edge that its envelope is made of is crossed once: else several polygons would share that.
-bool RegionProof::is_crossed_once(const RegionPolygon& polygon) const {
-  constexpr int kShift[3] = {6, 3, 0};
-  const int length = static_cast<int>(polygon.length), shift = kShift[polygon.axis()];
-  CellBlocks::Edge first = polygon.crossing;
-  first.sample &= ~((length - 1) << shift);
-  return cells_.crossings_on(first, length) == 1;
-}
-
-/// Whether each two of its regions have one polygon more in common, and no other. A face of a single cell
-/// is not ambiguous.
-bool RegionProof::is_manifold(const RegionPolygon& polygon) const {
-  if (!is_crossed_once(polygon)) return false;
-  for (int i = 0; i < polygon.corners; ++i)
-    if (polygon.regions[i].merged() && polygon.regions[polygon.next(i)].merged() &&
-        crossings_around_face(regions_, polygon, i) != 2)
-      return false;
-  return true;
 }
 
 /// How many cubes were split.
@@ -238,7 +215,7 @@ std::size_t RegionProof::split() {
       const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(x, y, z))];
       return there < 0 ? nullptr : &fresh_[static_cast<std::size_t>(there)];
     });
-    changed_[b] = changed_[b] || any(stirred_[b]);
+    for (std::size_t word = 0; word < 8; ++word) changed_[b][word] |= stirred_[b][word];
   });
   return all;
 }

@@ -19,9 +19,11 @@ namespace hermesh {
 
 /// Of a merged mesh T beside the uniform mesh S, whose cells' points lie within their cells.
 ///
-/// **Topology.** The cells of a cube are a disc of S (region_proposals.h), which T shrinks to a point. That
-/// keeps the surface as it is if any two regions beside one another have one piece of border in common: if
-/// the border of the common part of their faces is crossed twice (and never not at all, see there). Then each
+/// **Topology.** Needs no proof here. The cells of a cube are a disc of S, which T shrinks to a point. That
+/// keeps the surface as it is if any two regions beside one another have one piece of border in common, and
+/// each edge between regions, crossed, one polygon. So it is, for the common part of two regions' faces is
+/// all of the smaller one's, the common part of several regions' edges all of the smallest one's, and a
+/// cube's border is simple (region_proposals.h), and so is that of a cell without ambiguous faces. Then each
 /// edge of T has two polygons, and as the border of a disc is one circle, so are the polygons around its
 /// point.
 ///
@@ -35,21 +37,30 @@ namespace hermesh {
 /// are tested against all others (loose_polygons.h).
 ///
 /// **Distance.** Of tolerances that are small, see region_shell.h, for which all of S must be there; of large
-/// ones region_slabs.h.
+/// ones region_slabs.h. Beyond the largest cubes' diagonal nothing is left to be shown: S passes through each
+/// edge that has a polygon of T, whose corners are in regions at that edge; and each point of S is in a
+/// region whose point T has.
 class RegionProof {
  public:
-  /// With slabs. @param uniform makes the points of cells that are alone
+  /// Times the side of the largest cubes: their diagonal, rounded up.
+  static constexpr float kDiagonal = 1.7321f;
+
+  /// For tolerances beyond the largest cubes' diagonal. @param uniform makes the points of cells that are
+  /// alone
+  RegionProof(Regions& regions, UniformCells& uniform, RunContext& context);
+  /// With slabs, and such points.
   RegionProof(Regions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context);
   /// With a shell. All points that the uniform mesh has in cells have been made.
   RegionProof(Regions& regions, const RegionShell& shell, RunContext& context);
 
-  /// Splits until all polygons keep the promises, but for whether loose ones meet others.
+  /// Splits until all polygons keep the promises, but for whether loose ones meet others. Then all points are
+  /// there.
   /// @returns how many cubes were split
   /// @throws Cancelled
   std::size_t run();
 
-  /// By block, whether polygons there are others than when this was asked last.
-  std::vector<std::uint8_t> take_changed();
+  /// By block the samples whose edges may have other polygons than when this was asked last.
+  std::vector<BlockMask> take_changed();
 
   /// The largest cube around the edge is to be split when run() is called again.
   void call_bold(const CellBlocks::Edge& edge);
@@ -62,27 +73,24 @@ class RegionProof {
   void begin_slabs();
   void look_at_polygons();
   void look_at_polygons(std::size_t block);
-  bool is_shown(const CellBlocks::Edge& edge, const RegionRing& ring) const;
   void look_at_slabs();
   std::size_t split();
 
   void call_bold(const Region& region);
   bool is_bold(const Region& region);
-  bool is_manifold(const RegionPolygon& polygon) const;
-  bool is_crossed_once(const RegionPolygon& polygon) const;
   template <class F>
   void for_each_touched(std::size_t block, F&& f) const;
 
   Regions& regions_;
   const CellBlocks& cells_;
   RegionSlabs* const slabs_;        ///< either these
-  const RegionShell* const shell_;  ///< or this; the other one is null,
-  UniformCells* const uniform_;     ///< and this goes with the first
+  const RegionShell* const shell_;  ///< or this, or neither;
+  UniformCells* const uniform_;     ///< null with the second, which wants all points beforehand
   RunContext& context_;
   std::vector<std::array<std::uint64_t, Regions::kLevels>>
       bold_;                            ///< by block and level, less 1: cubes to be split
   std::vector<std::uint8_t> any_bold_;  ///< by block
-  std::vector<std::uint8_t> changed_;   ///< by block: stirred since take_changed()
+  std::vector<BlockMask> changed_;      ///< by block: stirred since take_changed()
   // Cells by block:
   std::vector<BlockMask> fresh_;    ///< of cubes that were split (all at the beginning),
   std::vector<BlockMask> stirred_;  ///< or next to one

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "algorithms/extraction/manifold_dual_contouring/region_cubes.h"
 #include "algorithms/extraction/manifold_dual_contouring/widened_mask.h"
@@ -33,6 +34,16 @@ constexpr int kStep[3] = {64, 8, 1};  ///< from a cell to the next
 
 int coordinate(int cell, int axis) { return (cell / kStep[axis]) & 7; }
 
+/// Of samples about the block's middle, with a 1 behind.
+const std::array<Array4f, 512> kPlaces = [] {
+  std::array<Array4f, 512> places;
+  for (int sample = 0; sample < 512; ++sample)
+    places[static_cast<std::size_t>(sample)] =
+        Array4f(static_cast<float>(coordinate(sample, 0) - 4), static_cast<float>(coordinate(sample, 1) - 4),
+                static_cast<float>(coordinate(sample, 2) - 4), 1.0f);
+  return places;
+}();
+
 }  // namespace
 
 float CellTolerances::least(const CellBlocks& cells, std::int32_t block, int first, int side) const {
@@ -45,64 +56,45 @@ float CellTolerances::least(const CellBlocks& cells, std::int32_t block, int fir
   return least;
 }
 
+void RegionProposals::Sum::clear() {
+  for (Array4f* all : {&products[0], &products[1], &products[2], &normals, &places}) all->setZero();
+}
+
 void RegionProposals::Sum::add(const EdgeCrossing& crossing, const Array4f& place) {
-  const auto& n = crossing.normal;
-  const float away = -(n[0] * place[0] + n[1] * place[1] + n[2] * place[2]);
-  const Array4f plane(n[0], n[1], n[2], away);
-  for (int row = 0; row < 4; ++row) products[static_cast<std::size_t>(row)] += plane[row] * plane;
-  normals += plane;
+  const float x = crossing.normal[0], y = crossing.normal[1], z = crossing.normal[2];
+  const float away = -(x * place[0] + y * place[1] + z * place[2]);
+  const Array4f plane(x, y, z, away);
+  products[0] += x * plane;
+  products[1] += y * plane;
+  products[2] += z * plane;
+  normals += Array4f(x, y, z, away * away);
   places += place;
 }
 
-void RegionProposals::Sum::add(const Sum& other) {
-  for (std::size_t row = 0; row < 4; ++row) products[row] += other.products[row];
-  normals += other.normals;
-  places += other.places;
-}
-
-bool RegionProposals::propose_whole(std::int32_t block, ProposedCube& cube) {
-  read(block);
-  for (std::size_t word = 0; word < 8; ++word)
-    if (cells_[block].active[word] & ~free_[word]) return false;
-  if (!is_disc(0, 8)) return false;
-  Sum sum;
-  for_each_crossing(
-      [&](int, const EdgeCrossing& crossing, const Array4f& place) { sum.add(crossing, place); });
-  return propose(kCubeLevels, 0, sum, cube);
-}
-
-void RegionProposals::propose_parts(std::int32_t block, std::array<std::uint64_t, 2>& proposed,
-                                    std::vector<ProposedCube>& cubes) {
+std::uint64_t RegionProposals::propose(std::int32_t block, int level, std::uint64_t asked,
+                                       std::vector<ProposedCube>& found) {
   read(block);
   std::uint64_t used = 0;
   for_each_crossing([&](int sample, const EdgeCrossing& crossing, const Array4f& place) {
-    const int part = cube_of(sample, 1);
-    if (!((used >> part) & 1)) sums_[static_cast<std::size_t>(part)] = Sum();
-    used |= std::uint64_t{1} << part;
-    sums_[static_cast<std::size_t>(part)].add(crossing, place);
+    const int cube = cube_of(sample, level);
+    if (!((asked >> cube) & 1)) return;
+    if (!((used >> cube) & 1)) sums_[static_cast<std::size_t>(cube)].clear();
+    used |= std::uint64_t{1} << cube;
+    sums_[static_cast<std::size_t>(cube)].add(crossing, place);
   });
-  std::array<Sum, 8> wider;
-  std::uint64_t used_wider = 0;
-  for (std::uint64_t parts = used; parts != 0; parts &= parts - 1) {
-    const int part = std::countr_zero(parts), cube = cube_of(first_cell(part, 1), 2);
-    used_wider |= std::uint64_t{1} << cube;
-    wider[static_cast<std::size_t>(cube)].add(sums_[static_cast<std::size_t>(part)]);
-  }
+  std::uint64_t proposed = 0;
   ProposedCube cube;
-  const auto look = [&](int level, std::uint64_t all, const Sum* sums) {
-    for (; all != 0; all &= all - 1) {
-      const int i = std::countr_zero(all);
-      if (!is_disc(first_cell(i, level), 1 << level) || !propose(level, i, sums[i], cube)) continue;
-      proposed[static_cast<std::size_t>(level - 1)] |= std::uint64_t{1} << i;
-      cubes.push_back(cube);
-    }
-  };
-  look(1, used, sums_.data());
-  look(2, used_wider, wider.data());
+  for (; used != 0; used &= used - 1) {
+    const int i = std::countr_zero(used);
+    if (!try_cube(level, i, sums_[static_cast<std::size_t>(i)], cube)) continue;
+    proposed |= std::uint64_t{1} << i;
+    found.push_back(cube);
+  }
+  return proposed;
 }
 
 void RegionProposals::read(std::int32_t block) {
-  block_ = block;
+  if (std::exchange(block_, block) == block) return;
   const auto& neighbours = cells_.source(block).neighbours;
   free_.fill(~std::uint64_t{0});
   if (std::ranges::any_of(neighbours,
@@ -128,22 +120,24 @@ void RegionProposals::read(std::int32_t block) {
 template <class F>
 void RegionProposals::for_each_crossing(F&& f) {
   const EdgeCrossing* next = crossings_.data();
-  for (int axis = 0; axis < 3; ++axis)
+  for (int axis = 0; axis < 3; ++axis) {
+    Array4f along = Array4f::Zero();
+    along[axis] = 1;
     for_each_bit(cells_.source(block_).crossing[static_cast<std::size_t>(axis)], [&](int sample) {
-      Array4f place(static_cast<float>((sample >> 6) - 4), static_cast<float>(((sample >> 3) & 7) - 4),
-                    static_cast<float>((sample & 7) - 4), 1.0f);
-      place[axis] += next->offset;
+      const Array4f place = kPlaces[static_cast<std::size_t>(sample)] + next->offset * along;
       f(sample, *next++, place);
     });
+  }
 }
 
-bool RegionProposals::propose(int level, int cube, const Sum& sum, ProposedCube& result) const {
+bool RegionProposals::try_cube(int level, int cube, const Sum& sum, ProposedCube& result) const {
   const int first = first_cell(cube, level), side = 1 << level;
+  if (!is_disc(first, side)) return false;
   const double tolerance = double(options_.tolerance.least(cells_, block_, first, side));
   const Eigen::Vector3f normal = sum.normals.head<3>();
   if (!(tolerance > 0 && double(normal.norm()) >= least_agreement_for(tolerance) * double(sum.count())))
     return false;
-  if (!crosses_an_edge(first, side) || !find_place(sum, first, side, tolerance, result.place)) return false;
+  if (!has_simple_border(first, side) || !find_place(sum, first, side, tolerance, result.place)) return false;
   result.normal = normal.normalized();
   return true;
 }
@@ -195,18 +189,26 @@ bool RegionProposals::is_disc(int first, int side) const {
   return true;
 }
 
-/// Else the border lies within one face, and beyond it is perhaps one other cube: with no third region around
-/// any edge there would be no polygon at all.
-bool RegionProposals::crosses_an_edge(int first, int side) const {
+/// Whether no edge of a cube is crossed more than once, no face's border more than twice, and some edge is.
+bool RegionProposals::has_simple_border(int first, int side) const {
+  std::array<std::array<int, 4>, 3> crossings;  // by axis of the edges, and where they are along the next two
+  int all = 0;
   for (int axis = 0; axis < 3; ++axis)
     for (int corner = 0; corner < 4; ++corner) {
       int at[3] = {coordinate(first, 0), coordinate(first, 1), coordinate(first, 2)};
       at[(axis + 1) % 3] += corner & 1 ? side : 0;
       at[(axis + 2) % 3] += corner & 2 ? side : 0;
       const CellBlocks::Cell sample = cells_.locate(block_, at[0], at[1], at[2]);
-      if (cells_.crossings_on({sample.block, sample.cell, axis}, side) > 0) return true;
+      const int here = cells_.crossings_on({sample.block, sample.cell, axis}, side);
+      if (here > 1) return false;
+      all += crossings[static_cast<std::size_t>(axis)][static_cast<std::size_t>(corner)] = here;
     }
-  return false;
+  for (std::size_t across = 0; across < 3; ++across)
+    for (std::size_t upper = 0; upper < 2; ++upper) {
+      const auto &p = crossings[(across + 1) % 3], &q = crossings[(across + 2) % 3];
+      if (p[2 * upper] + p[2 * upper + 1] + q[upper] + q[upper + 2] > 2) return false;
+    }
+  return all > 0;
 }
 
 bool RegionProposals::find_place(const Sum& sum, int first, int side, double tolerance,
@@ -220,7 +222,7 @@ bool RegionProposals::find_place(const Sum& sum, int first, int side, double tol
   }
   const Vector3d mean = sum.places.head<3>().matrix().cast<double>() / count;
   // The sum of squared distances to the planes, about the mean.
-  const double at_mean = mean.dot(a * mean) + 2 * b.dot(mean) + double(sum.products[3][3]);
+  const double at_mean = mean.dot(a * mean) + 2 * b.dot(mean) + double(sum.normals[3]);
   b += a * mean;
   const double weight = kPullToMean * a.trace() + 1e-12;
   Vector3d x = mean + (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b) + Vector3d::Constant(4);

@@ -32,6 +32,7 @@ struct RegionOptions {
   CellTolerances tolerance;  ///< where it is 0 or less a cell stays alone
   double flatness = 0;  ///< how far a cube's point may be from the planes of its crossings, voxels, root mean
                         ///< square; 0: what the tolerance lets hope for
+  int largest_cube = 8;  ///< cells a side: 2, 4 or 8
 };
 
 struct ProposedCube {
@@ -39,57 +40,49 @@ struct ProposedCube {
   Eigen::Vector3f normal;  ///< mean of those of its crossings
 };
 
-/// A cube is proposed where the surface within it is one disc whose border crosses the cube's edges, none of
-/// its cells is near a special one, and one place within it is near the planes of all its crossings for the
-/// tolerance. One of these for each thread.
+/// A cube is proposed where the surface within it is one disc with a simple border, none of its cells is near
+/// a special one, and one place within it is near the planes of all its crossings for the tolerance. The
+/// border is simple if each of the cube's edges is crossed once at most, and each of its faces passed at most
+/// once: by a piece of border from edge to edge. One of these for each thread.
 class RegionProposals {
  public:
   RegionProposals(const CellBlocks& cells, const RegionOptions& options, const FilePoints& file)
       : cells_(cells), options_(options), file_(file) {}
 
-  /// All cells of a block. @returns whether it is proposed
-  bool propose_whole(std::int32_t block, ProposedCube& cube);
-  /// Of 2³ and 4³ cells: a bit each in `proposed`, and their cubes by level and bit.
-  void propose_parts(std::int32_t block, std::array<std::uint64_t, 2>& proposed,
-                     std::vector<ProposedCube>& cubes);
+  /// Of a block and a level, among the cubes that are asked for. @returns a bit each; the cubes go behind
+  /// those in `found`, ascending
+  std::uint64_t propose(std::int32_t block, int level, std::uint64_t asked, std::vector<ProposedCube>& found);
 
  private:
   /// Of planes through crossings, about the middle of the block.
   struct Sum {
-    /// Of products of a plane's normal and distance, by row; and of normals, and places with how many they
-    /// are.
-    std::array<Eigen::Array4f, 4> products = filled<4>();
-    Eigen::Array4f normals = Eigen::Array4f::Zero(), places = Eigen::Array4f::Zero();
+    /// Of products of a plane's normal and its four numbers, by row: those are the normal and how far the
+    /// middle is below the plane.
+    std::array<Eigen::Array4f, 3> products;
+    Eigen::Array4f normals;  ///< and the distances' squares
+    Eigen::Array4f places;   ///< and how many they are
 
+    void clear();
     void add(const EdgeCrossing& crossing, const Eigen::Array4f& place);
-    void add(const Sum& other);
     float count() const { return places[3]; }
-
-   private:
-    template <std::size_t N>
-    static std::array<Eigen::Array4f, N> filled() {
-      std::array<Eigen::Array4f, N> zeros;
-      zeros.fill(Eigen::Array4f::Zero());
-      return zeros;
-    }
   };
 
   void read(std::int32_t block);
   template <class F>
   void for_each_crossing(F&& f);
-  bool propose(int level, int cube, const Sum& sum, ProposedCube& result) const;
+  bool try_cube(int level, int cube, const Sum& sum, ProposedCube& result) const;
   bool is_disc(int first, int side) const;
-  bool crosses_an_edge(int first, int side) const;
+  bool has_simple_border(int first, int side) const;
   bool find_place(const Sum& sum, int first, int side, double tolerance, Eigen::Vector3d& place) const;
 
   const CellBlocks& cells_;
   const RegionOptions& options_;
   const FilePoints& file_;
-  std::int32_t block_ = 0;
+  std::int32_t block_ = -1;                 ///< what follows is of this one
   BlockMask free_{};                        ///< cells that may be part of a cube, active or not
   std::array<BlockMask, 3> lower_faces_{};  ///< by axis: cells whose lower face the surface passes through
   std::array<EdgeCrossing, 3 * 512> crossings_;
-  std::array<Sum, 64> sums_;
+  std::array<Sum, 64> sums_;  ///< of a level's cubes
 };
 
 }  // namespace hermesh

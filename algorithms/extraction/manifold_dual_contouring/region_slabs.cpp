@@ -96,11 +96,7 @@ struct RegionSlabs::Corners {
 };
 
 RegionSlabs::RegionSlabs(const Regions& regions, const std::vector<Vector3d>* points, RunContext& context)
-    : regions_(regions),
-      cells_(regions.cells()),
-      bins_(cells_.size()),
-      first_(cells_.size()),
-      all_hold_(double(regions.options().tolerance.least()) > std::sqrt(3.0) * 8) {
+    : regions_(regions), cells_(regions.cells()), bins_(cells_.size()), first_(cells_.size()) {
   Stage stage(context, "list crossings");
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b) {
@@ -197,7 +193,6 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
 }
 
 void RegionSlabs::begin(const Region& cube) {
-  if (all_hold_) return;
   const std::array<int, 3> at = coordinates(cube.cell);
   Box box;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -256,7 +251,6 @@ RegionSlabs::Fan RegionSlabs::fan_of(const RegionPolygon& loose) const {
 }
 
 void RegionSlabs::add(const RegionPolygon& polygon) {
-  if (all_hold_) return;
   if (polygon.loose) {
     const Fan fan = fan_of(polygon);
     for_each_cube(polygon.crossing.block, fan.box, [&](const Region& cube) { widen(cube, fan.all()); });
@@ -365,7 +359,6 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
 }
 
 bool RegionSlabs::holds(const Region& cube) const {
-  if (all_hold_) return true;
   const Vector3d up = regions_.normal(cube), point = regions_.point(cube) - cells_.corner(cube.block, 0);
   const std::array<int, 3> at = coordinates(cube.cell);
   const double tolerance = double(regions_.tolerance(cube));

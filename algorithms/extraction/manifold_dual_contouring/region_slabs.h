@@ -94,7 +94,6 @@ class RegionSlabs {
   using Place = std::array<std::uint16_t, 3>;
   LargeArray<Place> places_;                 ///< of crossings and points, in their block
   std::vector<Slab> slabs_;                  ///< by cube, over its point
-  const bool all_hold_;                      ///< the tolerance is larger than the largest cubes are
 };
 
 }  // namespace hermesh

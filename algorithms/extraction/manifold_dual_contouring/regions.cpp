@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
 #include <bit>
 #include <utility>
 
@@ -28,23 +29,11 @@ Regions::Regions(const CellBlocks& cells, const std::vector<Vector3d>& points, c
                  const FilePoints& file, RunContext& context)
     : cells_(cells), points_(points), options_(options), file_(file), blocks_(cells.size()) {
   Stage stage(context, "propose regions");
-  tbb::enumerable_thread_specific<RegionProposals> proposals(
-      [&] { return RegionProposals(cells, options, file); });
-  std::vector<ProposedCube> whole(cells.size());
-  parallel_blocks(cells.size(), context, [&](std::size_t b) {
-    const auto block = static_cast<std::int32_t>(b);
-    if (!any(cells[block].active)) return;
-    if (proposals.local().propose_whole(block, whole[b]))
-      blocks_[b].proposed[kLevels - 1] = blocks_[b].alive[kLevels - 1] = 1;
-    else
-      blocks_[b].wants_parts = true;
-    find_merged(blocks_[b]);
-  });
-  for (std::size_t b = 0; b < cells.size(); ++b) {
-    if (blocks_[b].alive[kLevels - 1] == 0) continue;
-    blocks_[b].first_cube[kLevels - 1] = static_cast<std::uint32_t>(cubes_.size());
-    cubes_.push_back(whole[b]);
-  }
+  const int level = std::countr_zero(static_cast<unsigned>(options.largest_cube));
+  const std::uint64_t all = ~std::uint64_t{0} >> (64 - (512 >> (3 * level)));
+  for (std::size_t b = 0; b < cells.size(); ++b)
+    if (any(cells[static_cast<std::int32_t>(b)].active))
+      blocks_[b].asked[static_cast<std::size_t>(level - 1)] = all;
   propose_parts(context);
 }
 
@@ -53,23 +42,51 @@ void Regions::propose_parts(RunContext& context) {
       [&] { return RegionProposals(cells_, options_, file_); });
   std::vector<std::size_t> asked;
   for (std::size_t b = 0; b < blocks_.size(); ++b)
-    if (std::exchange(blocks_[b].wants_parts, false)) asked.push_back(b);
-  std::vector<std::vector<ProposedCube>> cubes(asked.size());
+    if (std::ranges::any_of(blocks_[b].asked, [](std::uint64_t cubes) { return cubes != 0; }))
+      asked.push_back(b);
+  std::vector<std::vector<ProposedCube>> found(asked.size());
+  std::vector<std::array<std::uint64_t, kLevels>> before(asked.size());  // proposed
   parallel_blocks(asked.size(), context, [&](std::size_t i) {
-    BlockRegions& block = blocks_[asked[i]];
-    std::array<std::uint64_t, 2> parts{};
-    proposals.local().propose_parts(static_cast<std::int32_t>(asked[i]), parts, cubes[i]);
-    for (std::size_t level = 0; level < parts.size(); ++level)
-      block.proposed[level] = block.alive[level] = parts[level];
-    find_merged(block);
+    before[i] = blocks_[asked[i]].proposed;
+    propose(proposals.local(), static_cast<std::int32_t>(asked[i]), blocks_[asked[i]], found[i]);
   });
   for (std::size_t i = 0; i < asked.size(); ++i) {
     BlockRegions& block = blocks_[asked[i]];
-    block.first_cube[0] = static_cast<std::uint32_t>(cubes_.size());
-    block.first_cube[1] = block.first_cube[0] + static_cast<std::uint32_t>(bits_in(block.proposed[0]));
-    cubes_.insert(cubes_.end(), cubes[i].begin(), cubes[i].end());
+    std::array<std::uint64_t, kLevels> added;
+    for (std::size_t at = 0; at < added.size(); ++at) added[at] = block.proposed[at] & ~before[i][at];
+    auto next = static_cast<std::uint32_t>(cubes_.size());
+    const auto number_from = [&](std::uint32_t& first, std::uint64_t cubes) {
+      if (cubes == 0) return;
+      first = next;
+      next += static_cast<std::uint32_t>(bits_in(cubes));
+    };
+    for (std::size_t at = 1; at < added.size(); ++at) number_from(block.first_cube[at - 1], added[at]);
+    for (int larger = 0; larger < 8; ++larger)
+      number_from(block.first_part[static_cast<std::size_t>(larger)], added[0] & parts_of(larger, 2));
+    cubes_.resize(next);
+    const ProposedCube* cube = found[i].data();
+    for (int level = kLevels; level > 0; --level)
+      for (std::uint64_t left = added[static_cast<std::size_t>(level - 1)]; left != 0; left &= left - 1)
+        cubes_[number(region_of(static_cast<std::int32_t>(asked[i]), std::countr_zero(left), level))] =
+            *cube++;
   }
   check_indices(cubes_.size(), "regions");
+}
+
+void Regions::propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
+                      std::vector<ProposedCube>& found) {
+  for (int level = kLevels; level > 0; --level) {
+    const auto at = static_cast<std::size_t>(level - 1);
+    std::uint64_t asked = std::exchange(block.asked[at], 0);
+    if (asked == 0) continue;
+    const std::uint64_t proposed = proposals.propose(number, level, asked, found);
+    block.proposed[at] |= proposed;
+    block.alive[at] |= proposed;
+    asked &= ~proposed;
+    if (level > 1)
+      for (; asked != 0; asked &= asked - 1) block.asked[at - 1] |= parts_of(std::countr_zero(asked), level);
+  }
+  find_merged(block);
 }
 
 void Regions::find_merged(BlockRegions& block) {
@@ -82,8 +99,9 @@ void Regions::find_merged(BlockRegions& block) {
 
 void Regions::split(const Region& region) {
   BlockRegions& block = blocks_[static_cast<std::size_t>(region.block)];
-  block.alive[region.level - 1u] &= ~(std::uint64_t{1} << cube_of(region.cell, region.level));
-  if (region.level == kLevels) block.wants_parts = true;
+  const int cube = cube_of(region.cell, region.level);
+  block.alive[region.level - 1u] &= ~(std::uint64_t{1} << cube);
+  if (region.level > 1) block.asked[region.level - 2u] |= parts_of(cube, region.level);
   find_merged(block);
 }
 
@@ -103,7 +121,8 @@ std::array<BlockMask, 3> Regions::inner_faces(std::int32_t block) const {
   return result;
 }
 
-std::array<BlockMask, 3> Regions::merged_edges(std::int32_t block) const {
+std::array<BlockMask, 3> Regions::merged_edges(std::int32_t block,
+                                               const std::array<BlockMask, 3>& lone) const {
   const auto& neighbours = cells_.source(block).neighbours;
   const std::array<BlockMask, 3> inner = inner_faces(block);
   std::array<std::array<BlockMask, 3>, 3> before;  // by axis of the step, of inner faces
@@ -115,14 +134,14 @@ std::array<BlockMask, 3> Regions::merged_edges(std::int32_t block) const {
     for (std::size_t a = 0; a < 3; ++a)
       before[static_cast<std::size_t>(axis)][a] = moved_up(inner[a], beyond[a], axis);
   }
-  std::array<BlockMask, 3> result = lone_edges(block);
+  std::array<BlockMask, 3> result;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (std::size_t word = 0; word < 8; ++word) {
       const std::uint64_t one_across_u = inner[u][word] & before[v][u][word],
                           one_across_v = inner[v][word] & before[u][v][word];
       result[axis][word] =
-          cells_.source(block).crossing[axis][word] & ~result[axis][word] & ~one_across_u & ~one_across_v;
+          cells_.source(block).crossing[axis][word] & ~lone[axis][word] & ~one_across_u & ~one_across_v;
     }
   }
   return result;

@@ -60,17 +60,20 @@ class Regions {
   std::size_t cube_count() const { return cubes_.size(); }
   /// Of a cube, by its number.
   const Eigen::Vector3d& place(std::uint32_t cube) const { return cubes_[cube].place; }
+  const Eigen::Vector3f& normal(std::uint32_t cube) const { return cubes_[cube].normal; }
   /// Of a cube, from 0; it is the same for good.
   std::uint32_t number(const Region& cube) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
-    const std::uint64_t before = (std::uint64_t{1} << cube_of(cube.cell, cube.level)) - 1;
-    return own.first_cube[cube.level - 1u] +
-           static_cast<std::uint32_t>(bits_in(own.proposed[cube.level - 1u] & before));
+    const int number = cube_of(cube.cell, cube.level);
+    std::uint64_t before = own.proposed[cube.level - 1u] & ((std::uint64_t{1} << number) - 1);
+    if (cube.level > 1) return own.first_cube[cube.level - 2u] + static_cast<std::uint32_t>(bits_in(before));
+    const int larger = cube_of(cube.cell, 2);
+    before &= parts_of(larger, 2);
+    return own.first_part[static_cast<std::size_t>(larger)] + static_cast<std::uint32_t>(bits_in(before));
   }
-  /// Gives way to the cubes that are proposed within it, or to single cells; but only as propose_parts() is
-  /// called. Safe to call for several blocks at once.
+  /// Leaves single cells until propose_parts() is called. Safe to call for several blocks at once.
   void split(const Region& region);
-  /// Within cubes of whole blocks that were split. There are more cubes then. @throws Cancelled
+  /// Within the cubes that were split. There are more cubes then. @throws Cancelled
   void propose_parts(RunContext& context);
 
   /// Cells of a block that belong to cubes, whether the surface passes through them or not.
@@ -78,7 +81,11 @@ class Regions {
     return blocks_[static_cast<std::size_t>(block)].merged;
   }
   /// By axis the crossing edges of a block that have three regions or more around them, one of them a cube.
-  std::array<BlockMask, 3> merged_edges(std::int32_t block) const;
+  std::array<BlockMask, 3> merged_edges(std::int32_t block) const {
+    return merged_edges(block, lone_edges(block));
+  }
+  /// @param lone lone_edges()
+  std::array<BlockMask, 3> merged_edges(std::int32_t block, const std::array<BlockMask, 3>& lone) const;
   /// By axis the crossing edges of a block that have no cube around them.
   std::array<BlockMask, 3> lone_edges(std::int32_t block) const;
 
@@ -87,10 +94,8 @@ class Regions {
   void for_each_cube(std::int32_t block, F&& f) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(block)];
     for (int level = kLevels; level > 0; --level)
-      for (std::uint64_t alive = own.alive[level - 1u]; alive != 0; alive &= alive - 1) {
-        const Region region = region_of(block, std::countr_zero(alive), level);
-        if (level == kLevels || at(block, region.cell) == region) f(region);
-      }
+      for (std::uint64_t alive = own.alive[level - 1u]; alive != 0; alive &= alive - 1)
+        f(region_of(block, std::countr_zero(alive), level));
   }
   /// The active cells of a block that are alone.
   BlockMask alone(std::int32_t block) const {
@@ -105,10 +110,14 @@ class Regions {
  private:
   struct BlockRegions {
     std::array<std::uint64_t, kLevels> proposed{}, alive{};  ///< by level, less 1: a bit a cube
-    std::array<std::uint32_t, kLevels> first_cube{};
+    std::array<std::uint32_t, kLevels - 1> first_cube{};     ///< number, of 4³ and 8³ cells
+    std::array<std::uint32_t, 8> first_part{};               ///< of 2³ cells, within each 4³
     BlockMask merged{};
-    bool wants_parts = false;
+    std::array<std::uint64_t, kLevels> asked{};  ///< as `alive`: where cubes are to be proposed
   };
+  /// Those of a block that are asked for, and where there are none, finer ones.
+  static void propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
+                      std::vector<ProposedCube>& found);
   static void find_merged(BlockRegions& block);
   std::array<BlockMask, 3> inner_faces(std::int32_t block) const;
   static Region region_of(std::int32_t block, int cube, int level) {

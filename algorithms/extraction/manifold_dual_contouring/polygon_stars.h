@@ -1,0 +1,34 @@
+// Whether the polygons around a point hide one another.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace hermesh {
+
+/// Of points whose polygons lie around them in a closed ring, as in a manifold. A point's *star* are the
+/// triangles that have it. It is *plain* if, seen along some direction, all its triangles are turned the same
+/// way, and follow one another around the point once: then no two of them meet but in the sides that they
+/// share. Looked at in turns: ask() for the points that matter, add() their triangles, then is_plain().
+class PolygonStars {
+ public:
+  explicit PolygonStars(std::size_t points) : marks_(points) {}
+
+  /// Safe to call for several at once, as is add().
+  void ask(std::uint32_t point);
+  bool is_asked(std::uint32_t point) const { return marks_[point] != 0; }
+  /// A triangle of the point and two others, from the first to the second counter-clockwise seen from where
+  /// `up` points to. @param up the same for all triangles of a point
+  void add(std::uint32_t point, const Eigen::Vector3d& up, const Eigen::Vector3d& to_first,
+           const Eigen::Vector3d& to_second);
+  /// False where nothing was asked.
+  bool is_plain(std::uint32_t point) const { return marks_[point] == kAsked + 1; }
+
+ private:
+  static constexpr std::uint32_t kAsked = 1u << 31, kTurned = 1u << 30;
+  /// By point: these, and how many triangles lie across one ray from it.
+  std::vector<std::uint32_t> marks_;
+};
+
+}  // namespace hermesh
