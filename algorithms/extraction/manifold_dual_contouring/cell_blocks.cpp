@@ -122,9 +122,8 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
         cut_the_other_way(lower, upper, face);
     }
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
-    std::size_t number = blocks_[b].first_code;
-    for_each_bit(blocks_[b].active, [&](int cell) {
-      const std::size_t at = number++;
+    for_each_bit(blocks_[b].special, [&](int cell) {
+      const std::size_t at = code_at(static_cast<std::int32_t>(b), cell);
       if (joined[at] == 0) return;
       blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
       blocks_[b].joined_sheets.emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));

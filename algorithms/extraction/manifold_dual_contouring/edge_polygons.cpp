@@ -55,10 +55,11 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::v
   number_all(context);
 }
 
-std::uint64_t EdgePolygons::held_cells() const {
-  std::uint64_t sum = 0;
-  for (const BlockEdges& block : edges_) sum += static_cast<std::uint64_t>(count(block.held));
-  return sum;
+std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const {
+  std::vector<CellBlocks::Cell> cells;
+  for (std::size_t b = 0; b < edges_.size(); ++b)
+    for_each_bit(edges_[b].held, [&](int cell) { cells.push_back({static_cast<std::int32_t>(b), cell}); });
+  return cells;
 }
 
 void EdgePolygons::number_all(RunContext& context) {

@@ -40,7 +40,7 @@ class EdgePolygons {
   bool is_held(const CellBlocks::Cell& cell) const { return test(edges_[cell.block].held, cell.cell); }
   /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
   void hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
-  std::uint64_t held_cells() const;
+  std::vector<CellBlocks::Cell> held_cells() const;
 
   std::uint64_t point_count() const { return points_; }  ///< those on fanned edges included
   std::uint64_t fanned_edges() const { return fanned_edges_; }

@@ -42,9 +42,11 @@ class RegionPolygons {
       for (std::size_t word = 0; word < 8; ++word) untested_[b][word] |= changed[b][word];
       const auto block = static_cast<std::int32_t>(b);
       lone_edges_[b] = regions_.lone_edges(block);
+      const std::array<BlockMask, 3> edges = regions_.merged_edges(block, lone_edges_[b]);
       made_[b] = {};
-      for_each_edge(b, regions_.merged_edges(block, lone_edges_[b]),
-                    [&](const CellBlocks::Edge& edge) { make(edge, made_[b]); });
+      made_[b].polygons.reserve(
+          static_cast<std::size_t>(count(edges[0]) + count(edges[1]) + count(edges[2])));
+      for_each_edge(b, edges, [&](const CellBlocks::Edge& edge) { make(edge, made_[b]); });
     });
   }
 

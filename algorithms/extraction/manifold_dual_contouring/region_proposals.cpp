@@ -34,13 +34,13 @@ constexpr int kStep[3] = {64, 8, 1};  ///< from a cell to the next
 
 int coordinate(int cell, int axis) { return (cell / kStep[axis]) & 7; }
 
-/// Of samples about the block's middle, with a 1 behind.
+/// Of samples about the block's middle, behind a 1.
 const std::array<Array4f, 512> kPlaces = [] {
   std::array<Array4f, 512> places;
   for (int sample = 0; sample < 512; ++sample)
     places[static_cast<std::size_t>(sample)] =
-        Array4f(static_cast<float>(coordinate(sample, 0) - 4), static_cast<float>(coordinate(sample, 1) - 4),
-                static_cast<float>(coordinate(sample, 2) - 4), 1.0f);
+        Array4f(1.0f, static_cast<float>(coordinate(sample, 0) - 4),
+                static_cast<float>(coordinate(sample, 1) - 4), static_cast<float>(coordinate(sample, 2) - 4));
   return places;
 }();
 
@@ -60,14 +60,14 @@ void RegionProposals::Sum::clear() {
   for (Array4f* all : {&products[0], &products[1], &products[2], &normals, &places}) all->setZero();
 }
 
+/// By whole vectors: built from single numbers they would take longer than all the rest.
 void RegionProposals::Sum::add(const EdgeCrossing& crossing, const Array4f& place) {
-  const float x = crossing.normal[0], y = crossing.normal[1], z = crossing.normal[2];
-  const float away = -(x * place[0] + y * place[1] + z * place[2]);
-  const Array4f plane(x, y, z, away);
-  products[0] += x * plane;
-  products[1] += y * plane;
-  products[2] += z * plane;
-  normals += Array4f(x, y, z, away * away);
+  const Array4f first(1, 0, 0, 0), others(0, 1, 1, 1);
+  const Array4f normal = others * Eigen::Map<const Array4f>(&crossing.offset);
+  const float above = (normal * place).sum();
+  const Array4f plane = normal - above * first;
+  for (std::size_t row = 0; row < 3; ++row) products[row] += crossing.normal[row] * plane;
+  normals += normal + (above * above) * first;
   places += place;
 }
 
@@ -116,13 +116,13 @@ void RegionProposals::read(std::int32_t block) {
   cells_.grid().crossings(block, crossings_.data());
 }
 
-/// Calls f(sample, crossing, its place about the block's middle, with a 1 behind).
+/// Calls f(sample, crossing, its place about the block's middle, behind a 1).
 template <class F>
 void RegionProposals::for_each_crossing(F&& f) {
   const EdgeCrossing* next = crossings_.data();
   for (int axis = 0; axis < 3; ++axis) {
     Array4f along = Array4f::Zero();
-    along[axis] = 1;
+    along[axis + 1] = 1;
     for_each_bit(cells_.source(block_).crossing[static_cast<std::size_t>(axis)], [&](int sample) {
       const Array4f place = kPlaces[static_cast<std::size_t>(sample)] + next->offset * along;
       f(sample, *next++, place);
@@ -134,7 +134,7 @@ bool RegionProposals::try_cube(int level, int cube, const Sum& sum, ProposedCube
   const int first = first_cell(cube, level), side = 1 << level;
   if (!is_disc(first, side)) return false;
   const double tolerance = double(options_.tolerance.least(cells_, block_, first, side));
-  const Eigen::Vector3f normal = sum.normals.head<3>();
+  const Eigen::Vector3f normal = sum.normals.tail<3>();
   if (!(tolerance > 0 && double(normal.norm()) >= least_agreement_for(tolerance) * double(sum.count())))
     return false;
   if (!has_simple_border(first, side) || !find_place(sum, first, side, tolerance, result.place)) return false;
@@ -217,12 +217,12 @@ bool RegionProposals::find_place(const Sum& sum, int first, int side, double tol
   Eigen::Matrix3d a;
   Vector3d b;
   for (int row = 0; row < 3; ++row) {
-    a.row(row) = sum.products[static_cast<std::size_t>(row)].head<3>().matrix().transpose().cast<double>();
-    b[row] = double(sum.products[static_cast<std::size_t>(row)][3]);
+    a.row(row) = sum.products[static_cast<std::size_t>(row)].tail<3>().matrix().transpose().cast<double>();
+    b[row] = double(sum.products[static_cast<std::size_t>(row)][0]);
   }
-  const Vector3d mean = sum.places.head<3>().matrix().cast<double>() / count;
+  const Vector3d mean = sum.places.tail<3>().matrix().cast<double>() / count;
   // The sum of squared distances to the planes, about the mean.
-  const double at_mean = mean.dot(a * mean) + 2 * b.dot(mean) + double(sum.normals[3]);
+  const double at_mean = mean.dot(a * mean) + 2 * b.dot(mean) + double(sum.normals[0]);
   b += a * mean;
   const double weight = kPullToMean * a.trace() + 1e-12;
   Vector3d x = mean + (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b) + Vector3d::Constant(4);

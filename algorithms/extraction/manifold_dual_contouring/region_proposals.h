@@ -56,15 +56,15 @@ class RegionProposals {
  private:
   /// Of planes through crossings, about the middle of the block.
   struct Sum {
-    /// Of products of a plane's normal and its four numbers, by row: those are the normal and how far the
-    /// middle is below the plane.
+    /// Of products of a plane's normal and its four numbers, by row: those are how far the middle is below
+    /// the plane, and the normal.
     std::array<Eigen::Array4f, 3> products;
-    Eigen::Array4f normals;  ///< and the distances' squares
-    Eigen::Array4f places;   ///< and how many they are
+    Eigen::Array4f normals;  ///< behind the distances' squares
+    Eigen::Array4f places;   ///< behind how many they are
 
     void clear();
     void add(const EdgeCrossing& crossing, const Eigen::Array4f& place);
-    float count() const { return places[3]; }
+    float count() const { return places[0]; }
   };
 
   void read(std::int32_t block);

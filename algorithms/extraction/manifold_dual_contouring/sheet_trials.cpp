@@ -62,27 +62,19 @@ class Trials {
   /// Tried cells near polygons that meet. Those polygons are to be tested again next time, the others are not.
   Cells that_meet(RunContext& context) {
     std::vector<Cells> found(cells_.size());
-    std::vector<std::array<BlockMask, 3>> meeting(cells_.size());
+    std::vector<std::vector<CellBlocks::Edge>> meeting(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       for (int axis = 0; axis < 3; ++axis)
         for_each_bit(untested_[b][axis], [&](int sample) {
-          if (meets({static_cast<std::int32_t>(b), sample, axis}, found[b]))
-            meeting[b][axis][sample >> 6] |= std::uint64_t{1} << (sample & 63);
-        });
-    });
-    untested_ = std::move(meeting);
-    return joined(found);
-  }
-
-  void place_crossings(const FilePoints& file, RunContext& context) {
-    points_.resize(polygons_.point_count());
-    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      for (int axis = 0; axis < 3; ++axis)
-        for_each_bit(polygons_.fanned(static_cast<std::int32_t>(b), axis), [&](int sample) {
           const CellBlocks::Edge edge{static_cast<std::int32_t>(b), sample, axis};
-          points_[polygons_.crossing_point(edge)] = file.rounded(cells_.crossing_point(edge));
+          if (meets(edge, found[b])) meeting[b].push_back(edge);
         });
     });
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      untested_[b] = {};
+      for (const CellBlocks::Edge& edge : meeting[b]) mark(edge);
+    });
+    return joined(found);
   }
 
  private:
@@ -91,10 +83,13 @@ class Trials {
     for (const Cells& list : lists) all.insert(all.end(), list.begin(), list.end());
     return all;
   }
+  void mark(const CellBlocks::Edge& edge) {
+    untested_[edge.block][edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
+  }
   void mark_edges(const CellBlocks::Cell& cell) {
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
-        untested_[at.block][at.axis][at.sample >> 6] |= std::uint64_t{1} << (at.sample & 63);
+        mark(at);
   }
 
   bool is_joint_of_several(const CellBlocks::Cell& cell) const {
@@ -157,6 +152,18 @@ Cells without_repeats(Cells cells) {
 
 }  // namespace
 
+void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
+                     std::vector<Vector3d>& points, RunContext& context) {
+  points.resize(polygons.point_count());
+  parallel_blocks(cells.size(), context, [&](std::size_t b) {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(polygons.fanned(static_cast<std::int32_t>(b), axis), [&](int sample) {
+        const CellBlocks::Edge edge{static_cast<std::int32_t>(b), sample, axis};
+        points[polygons.crossing_point(edge)] = file.rounded(cells.crossing_point(edge));
+      });
+  });
+}
+
 Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
                            std::vector<Vector3d>& points, double farthest, RunContext& context) {
   Stage stage(context, "try sheets");
@@ -164,7 +171,7 @@ Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, cons
   Cells held = trials.pinched();
   for (;;) {
     if (!held.empty()) trials.hold(held, context);
-    trials.place_crossings(file, context);
+    place_crossings(cells, polygons, file, points, context);
     const Cells meeting = without_repeats(trials.that_meet(context));
     held.clear();
     std::ranges::copy_if(meeting, std::back_inserter(held),

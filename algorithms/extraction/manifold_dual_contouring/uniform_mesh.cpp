@@ -142,17 +142,23 @@ class Contourer {
 
   /// The points of fanned edges come behind those of cells.
   /// @param edges those that are wanted, all crossing ones if null
-  EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) const {
+  EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, mesh.points, edges, context);
     }();
-    double farthest = 0;
-    for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
-    for (const CellBlocks::Cell& cell :
-         hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
-      mesh.meeting_joints.emplace_back(cell.block, cell.cell);
-    mesh.held = polygons.held_cells();
+    if (held_) {
+      if (!held_->empty()) polygons.hold(*held_, mesh.points, context);
+      place_crossings(cells_, polygons, file_, mesh.points, context);
+    } else {
+      double farthest = 0;
+      for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
+      for (const CellBlocks::Cell& cell :
+           hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
+        mesh.meeting_joints.emplace_back(cell.block, cell.cell);
+      held_ = polygons.held_cells();
+    }
+    mesh.held = held_->size();
     mesh.fanned_edges = polygons.fanned_edges();
     return polygons;
   }
@@ -375,6 +381,8 @@ class Contourer {
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
   std::vector<std::vector<PointWish>> wishes_;  ///< by block
+  /// Found where polygons are made first: all that these depend on are wanted then, and ever after.
+  std::optional<std::vector<CellBlocks::Cell>> held_;
 };
 
 /// Hermite data have no cuts.
