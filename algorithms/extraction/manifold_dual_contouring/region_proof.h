@@ -34,7 +34,8 @@ namespace hermesh {
 /// that is not loose stays within its own (region_polygon.h, after Ju & Udeshi 2006). Polygons of cells of
 /// several sheets, or with ambiguous faces, are those of S, and too far from every cube to meet one of these
 /// (kAway in region_proposals.cpp). Loose polygons may reach farther, and have one diagonal in common; they
-/// are tested against all others (loose_polygons.h).
+/// are tested against all others (loose_polygons.h), but for those around a cube's point of which one look
+/// tells (polygon_stars.h).
 ///
 /// **Distance.** Of tolerances that are small, see region_shell.h, for which all of S must be there; of large
 /// ones region_slabs.h. Beyond the largest cubes' diagonal nothing is left to be shown: S passes through each
