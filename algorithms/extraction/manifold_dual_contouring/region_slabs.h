@@ -14,19 +14,17 @@
 
 namespace hermesh {
 
-/// For tolerances beyond kLeast: of the merged mesh T beside the uniform mesh S, of which nothing need be
-/// made for it but the points that T has in common with it.
+/// For tolerances beyond kLeast, as long as there are larger cubes: of the merged mesh T beside the uniform
+/// mesh S, of which nothing need be made for it but the points that T has in common with it.
 ///
 /// A cube X has a *slab*: its places between two planes at right angles to the mean of its crossings'
 /// normals. They are as far apart as it takes for the slab to contain
-///   - S ∩ X: a polygon of S is in the hull of its cells' points and its crossing, and in mean placement
-///   these are in the hull
-///     of the crossings. So all crossings of X and of the cells around it count, and in other placements
-///     their points as well;
-///   - T ∩ X: a polygon that keeps to its envelope passes from region to region through their faces, so what
-///   it has in X is in
-///     the hull of X's point and of where its sides and its diagonal pass the faces. A loose polygon counts
-///     as a whole, in every cube that its box touches.
+/// - S ∩ X: a polygon of S is in the hull of its cells' points and its crossing, and in mean placement these
+/// are in the hull of the crossings. So all crossings of X and of the cells around it count, and in other
+/// placements their points as well;
+/// - T ∩ X: a polygon that keeps to its envelope passes from region to region through their faces, so what it
+/// has in X is in the hull of X's point and of where its sides and its diagonal pass the faces. A loose
+/// polygon counts as a whole, in every cube that its box touches.
 ///
 /// Let A be the corner of X that is farthest up, and B the one farthest down. If A is above the slab and
 /// outside, and B below it and inside, then so is all of X above it, and all below: these parts are convex
