@@ -14,7 +14,7 @@ constexpr double kTurnedUp = 1e-9;
 }  // namespace
 
 void PolygonStars::ask(std::uint32_t point) {
-  std::atomic_ref(marks_[point]).store(kAsked, std::memory_order_relaxed);
+  std::atomic_ref(asked_[point]).store(1, std::memory_order_relaxed);
 }
 
 void PolygonStars::add(std::uint32_t point, const Eigen::Vector3d& up, const Eigen::Vector3d& to_first,

@@ -13,22 +13,22 @@ namespace hermesh {
 /// share. Looked at in turns: ask() for the points that matter, add() their triangles, then is_plain().
 class PolygonStars {
  public:
-  explicit PolygonStars(std::size_t points) : marks_(points) {}
+  explicit PolygonStars(std::size_t points) : asked_(points), marks_(points) {}
 
-  /// Safe to call for several at once, as is add().
+  /// Safe to call for several at once, as is add(); but not one while the other is called.
   void ask(std::uint32_t point);
-  bool is_asked(std::uint32_t point) const { return marks_[point] != 0; }
+  bool is_asked(std::uint32_t point) const { return asked_[point] != 0; }
   /// A triangle of the point and two others, from the first to the second counter-clockwise seen from where
   /// `up` points to. @param up the same for all triangles of a point
   void add(std::uint32_t point, const Eigen::Vector3d& up, const Eigen::Vector3d& to_first,
            const Eigen::Vector3d& to_second);
   /// False where nothing was asked.
-  bool is_plain(std::uint32_t point) const { return marks_[point] == kAsked + 1; }
+  bool is_plain(std::uint32_t point) const { return asked_[point] && marks_[point] == 1; }
 
  private:
-  static constexpr std::uint32_t kAsked = 1u << 31, kTurned = 1u << 30;
-  /// By point: these, and how many triangles lie across one ray from it.
-  std::vector<std::uint32_t> marks_;
+  static constexpr std::uint32_t kTurned = 1u << 31;
+  std::vector<std::uint8_t> asked_;   ///< by point
+  std::vector<std::uint32_t> marks_;  ///< by point: that, and how many triangles lie across one ray from it
 };
 
 }  // namespace hermesh

@@ -189,7 +189,9 @@ bool RegionProposals::is_disc(int first, int side) const {
   return true;
 }
 
-/// Whether no edge of a cube is crossed more than once, no face's border more than twice, and some edge is.
+/// Whether no edge of a cube is crossed more than once, no face's border more than twice, and some edge is:
+/// else all would lie within one face, and if one other cube is beyond that, there would be no polygon at
+/// all.
 bool RegionProposals::has_simple_border(int first, int side) const {
   std::array<std::array<int, 4>, 3> crossings;  // by axis of the edges, and where they are along the next two
   int all = 0;
