@@ -13,12 +13,11 @@ bool wants_polygons(const ExtractionInput& input) {
 }
 
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
-  const bool exact = wants_polygons(input);
-  if (exact && !input.source)
+  if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
+  if (!input.source)
     throw Error(variant +
                 " was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
                 "-o hermite=level-set");
-  if (!exact) return sample_level_set(input.level_set, input.isovalue, input.context);
   PolygonSampling sampling;
   FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, *input.source, input.context, &sampling);
   const std::size_t missed = sampling.nearest + sampling.fallback;
@@ -36,6 +35,20 @@ std::vector<std::string> normal_code_names() {
 }
 
 }  // namespace
+
+std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant) {
+  if (parse_representation(input.options.text("representation")) != Representation::sparse)
+    return std::nullopt;
+  const NormalCodeId code = parse_normal_code(input.options.text("normals"));
+  PackedHermite hermite = wants_polygons(input)
+                              ? pack(sample(input, variant), code, input.context)
+                              : sample_level_set_packed(input.level_set, input.isovalue, code, input.context);
+  Represented figures;
+  figures.crossings = hermite.crossings.size();
+  figures.bytes = hermite.memory_bytes();
+  report_figures(figures, input.level_set, input.context);
+  return hermite;
+}
 
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals) {
   const Representation representation = parse_representation(input.options.text("representation"));

@@ -1,6 +1,7 @@
 // What the extractors share that work on Hermite data: where it comes from and how it is kept, as options.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,11 @@ namespace hermesh {
 
 /// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
 std::vector<OptionSpec> hermite_options();
+
+/// With the representation 'sparse': sampled as those options say, and never there as floats if from a level
+/// set. Its figures go to the run's context. None with another representation.
+/// @throws Error for exact data where there are no polygons.
+std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
 
 /// Samples as those options say and passes the data through the representation; its figures go to the run's context,
 /// and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the sentences.

@@ -14,8 +14,8 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 
 }  // namespace
 
-EdgePolygons::EdgePolygons(const CellBlocks& cells, const std::vector<Vector3d>& points,
-                           const EdgeMasks* only, RunContext& context)
+EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
+                           RunContext& context)
     : cells_(cells), only_(only), edges_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
@@ -45,9 +45,9 @@ bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
   return sum > 4;
 }
 
-void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Vector3d>& points,
+void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                         RunContext& context) {
-  for (const CellBlocks::Cell& cell : cells) set(edges_[cell.block].held, cell.cell);
+  for (const CellBlocks::Cell& cell : cells) set(of(cell.block).held, cell.cell);
   for (const CellBlocks::Cell& cell : cells)
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
@@ -84,9 +84,11 @@ void EdgePolygons::number_all(RunContext& context) {
   quads_ = exclusive_scan(quads, "quads");
   triangles_ = exclusive_scan(triangles, "triangles");
   for (std::size_t b = 0; b < blocks; ++b) {
-    edges_[b].first_crossing_point = static_cast<std::uint32_t>(cells_.point_count() + crossing_points[b]);
-    edges_[b].first_quad = static_cast<std::uint32_t>(quads[b]);
-    edges_[b].first_triangle = static_cast<std::uint32_t>(triangles[b]);
+    if (!edges_.has(b)) continue;
+    BlockEdges& edges = edges_.at(b);
+    edges.first_crossing_point = static_cast<std::uint32_t>(cells_.point_count() + crossing_points[b]);
+    edges.first_quad = static_cast<std::uint32_t>(quads[b]);
+    edges.first_triangle = static_cast<std::uint32_t>(triangles[b]);
   }
 }
 
@@ -102,9 +104,9 @@ int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Aroun
   return made;
 }
 
-void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const std::vector<Vector3d>& points,
+void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const UniformPoints& points,
                           const PlainPoints* near) {
-  BlockEdges& edges = edges_[edge.block];
+  BlockEdges& edges = of(edge.block);
   std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
   if (!(near ? near->around(edge, corners) : cells_.plain_points(edge, corners))) {
@@ -122,7 +124,7 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const std::v
 /// 0 or 1 for the diagonal to cut along; −1 if neither keeps the triangles in the envelope.
 int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
                                 const std::array<std::uint32_t, 4>& corners,
-                                const std::vector<Vector3d>& points) const {
+                                const UniformPoints& points) const {
   const Vector3d start = cells_.corner(edge.block, edge.sample);
   std::array<EnvelopeCorner, 4> r;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -134,7 +136,7 @@ int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
 }
 
 std::uint32_t EdgePolygons::crossing_point(const CellBlocks::Edge& edge) const {
-  const BlockEdges& edges = edges_[edge.block];
+  const BlockEdges& edges = of(edge.block);
   std::uint32_t number = edges.first_crossing_point;
   for (int axis = 0; axis < edge.axis; ++axis) number += static_cast<std::uint32_t>(count(edges.fanned[axis]));
   return number + rank_in(edges.fanned[edge.axis], edge.sample);

@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
+#include "algorithms/extraction/manifold_dual_contouring/by_block.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 #include "algorithms/extraction/manifold_dual_contouring/plain_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
 /// By block and axis.
-using EdgeMasks = std::vector<std::array<BlockMask, 3>>;
+using EdgeMasks = ByBlock<std::array<BlockMask, 3>>;
 
 class EdgePolygons {
  public:
@@ -24,7 +26,7 @@ class EdgePolygons {
   /// yet.
   /// @param only the crossing edges that have polygons here, all if null; outlives this
   /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
-  EdgePolygons(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, const EdgeMasks* only,
+  EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                RunContext& context);
 
   const BlockMask& edges(std::int32_t block, int axis) const {
@@ -37,9 +39,9 @@ class EdgePolygons {
   /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, a point finds no
   /// room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
-  bool is_held(const CellBlocks::Cell& cell) const { return test(edges_[cell.block].held, cell.cell); }
+  bool is_held(const CellBlocks::Cell& cell) const { return test(of(cell.block).held, cell.cell); }
   /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
-  void hold(const std::vector<CellBlocks::Cell>& cells, const std::vector<Eigen::Vector3d>& points, RunContext& context);
+  void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
 
   std::uint64_t point_count() const { return points_; }  ///< those on fanned edges included
@@ -47,11 +49,13 @@ class EdgePolygons {
   std::uint64_t quad_count() const { return quads_; }
   std::uint64_t triangle_count() const { return triangles_; }
   /// Polygons of the blocks before.
-  std::uint32_t first_quad(std::int32_t block) const { return edges_[block].first_quad; }
-  std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
+  std::uint32_t first_quad(std::int32_t block) const { return of(block).first_quad; }
+  std::uint32_t first_triangle(std::int32_t block) const { return of(block).first_triangle; }
 
-  bool is_fanned(const CellBlocks::Edge& edge) const { return test(edges_[edge.block].fanned[edge.axis], edge.sample); }
-  const BlockMask& fanned(std::int32_t block, int axis) const { return edges_[block].fanned[axis]; }
+  bool is_fanned(const CellBlocks::Edge& edge) const {
+    return test(of(edge.block).fanned[edge.axis], edge.sample);
+  }
+  const BlockMask& fanned(std::int32_t block, int axis) const { return of(block).fanned[axis]; }
   /// Of a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
@@ -64,7 +68,7 @@ class EdgePolygons {
     if (!is_fanned(edge)) {
       std::array<std::uint32_t, 4> p;
       if (!(near ? near->around(edge, p) : cells_.plain_points(edge, p))) p = cells_.around(edge).points;
-      const std::size_t d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
+      const std::size_t d = test(of(edge.block).second_diagonal[edge.axis], edge.sample);
       Quad q = {p[d], p[d + 1], p[d + 2], p[(d + 3) % 4]};
       if (!outwards) std::swap(q[1], q[3]);
       quad(q);
@@ -99,17 +103,19 @@ class EdgePolygons {
   bool is_explicit(const CellBlocks::Around& around, int i) const {
     return cells_.is_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
   }
+  const BlockEdges& of(std::int32_t block) const { return edges_[static_cast<std::size_t>(block)]; }
+  BlockEdges& of(std::int32_t block) { return edges_.at(static_cast<std::size_t>(block)); }
   void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
   /// @param hit offset of the crossing
-  void decide(const CellBlocks::Edge& edge, double hit, const std::vector<Eigen::Vector3d>& points,
+  void decide(const CellBlocks::Edge& edge, double hit, const UniformPoints& points,
               const PlainPoints* near = nullptr);
   int safe_diagonal(const CellBlocks::Edge& edge, double hit, const std::array<std::uint32_t, 4>& corners,
-                    const std::vector<Eigen::Vector3d>& points) const;
+                    const UniformPoints& points) const;
 
   const CellBlocks& cells_;
   const EdgeMasks* const only_;
-  std::vector<BlockEdges> edges_;
+  ByBlock<BlockEdges> edges_;
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
 };
 

@@ -27,7 +27,7 @@ constexpr int kSweeps = 2;
 /// The point of one cell with the triangles around it and those nearby.
 class Star {
  public:
-  Star(const CellBlocks& cells, const PolygonNeighbourhood& mesh, std::vector<Vector3d>& points)
+  Star(const CellBlocks& cells, const PolygonNeighbourhood& mesh, UniformPoints& points)
       : cells_(cells), mesh_(mesh), points_(points) {}
 
   /// With the box of all places that it might move to.
@@ -90,7 +90,7 @@ class Star {
 
   const CellBlocks& cells_;
   const PolygonNeighbourhood& mesh_;
-  std::vector<Vector3d>& points_;
+  UniformPoints& points_;
   std::int32_t block_ = 0;
   std::uint32_t point_ = 0;
   Box3 box_;
@@ -102,7 +102,7 @@ class Star {
 
 void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
-                 std::vector<Vector3d>& points, RunContext& context) {
+                 UniformPoints& points, RunContext& context) {
   Stage stage(context, "move points");
   const PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
   // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most six samples away,

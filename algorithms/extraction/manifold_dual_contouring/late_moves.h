@@ -8,6 +8,7 @@
 
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
@@ -24,6 +25,6 @@ struct PointWish {
 /// those of crowded cells, are passed over. The same result at any number of threads. @throws Cancelled
 void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
-                 std::vector<Eigen::Vector3d>& points, RunContext& context);
+                 UniformPoints& points, RunContext& context);
 
 }  // namespace hermesh

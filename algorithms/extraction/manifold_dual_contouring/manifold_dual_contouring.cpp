@@ -193,6 +193,11 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
                          : input.options.is("largest_cube", "4") ? 4
                                                                  : 2;
   if (input.options.is("merging", "regions")) options.merging = ManifoldDualContouringOptions::Merging::regions;
+  if (const std::optional<PackedHermite> packed = packed_hermite_input(input, "manifold-dual-contouring"))
+    return with_normal_code(packed->normal_code, [&](auto code) {
+      return manifold_dual_contouring(view_of(*packed, code, input.context), options, input.field,
+                                      input.context);
+    });
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
   return manifold_dual_contouring(view_of(hermite, input.context), options, input.field, input.context);

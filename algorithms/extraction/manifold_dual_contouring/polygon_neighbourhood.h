@@ -14,6 +14,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
@@ -25,9 +26,13 @@ class PolygonNeighbourhood {
  public:
   /// @param points by number, those on fanned edges included; they may move
   /// @param farthest from its cell along an axis that any of them is or may be then
-  PolygonNeighbourhood(const CellBlocks& cells, const EdgePolygons& polygons, const std::vector<Eigen::Vector3d>& points,
+  PolygonNeighbourhood(const CellBlocks& cells, const EdgePolygons& polygons, const UniformPoints& points,
                        double farthest)
-      : cells_(cells), polygons_(polygons), points_(points), reach_(1.0 + farthest + kRounding), lists_(cells.size()) {}
+      : cells_(cells),
+        polygons_(polygons),
+        points_(points),
+        reach_(1.0 + farthest + kRounding),
+        lists_(cells.size()) {}
   ~PolygonNeighbourhood() { forget(); }
   PolygonNeighbourhood(const PolygonNeighbourhood&) = delete;
   PolygonNeighbourhood& operator=(const PolygonNeighbourhood&) = delete;
@@ -130,7 +135,7 @@ class PolygonNeighbourhood {
 
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
-  const std::vector<Eigen::Vector3d>& points_;
+  const UniformPoints& points_;
   const double reach_;  ///< of an edge's triangles along an axis, from its first sample
   mutable std::vector<std::atomic<const List*>> lists_;  ///< by block
 };

@@ -24,7 +24,7 @@ using Eigen::Vector3d;
 /// when others are proposed, and then points on fanned edges, which do not.
 class RegionPolygons {
  public:
-  RegionPolygons(const Regions& regions, const std::vector<Vector3d>& points)
+  RegionPolygons(const Regions& regions, const UniformPoints& points)
       : regions_(regions),
         cells_(regions.cells()),
         points_(points),
@@ -41,8 +41,12 @@ class RegionPolygons {
       if (!any(changed[b])) return;
       for (std::size_t word = 0; word < 8; ++word) untested_[b][word] |= changed[b][word];
       const auto block = static_cast<std::int32_t>(b);
-      lone_edges_[b] = regions_.lone_edges(block);
-      const std::array<BlockMask, 3> edges = regions_.merged_edges(block, lone_edges_[b]);
+      const std::array<BlockMask, 3> lone = regions_.lone_edges(block);
+      if (any(lone[0]) || any(lone[1]) || any(lone[2]))
+        lone_edges_.at(b) = lone;
+      else
+        lone_edges_.clear(b);
+      const std::array<BlockMask, 3> edges = regions_.merged_edges(block, lone);
       made_[b] = {};
       made_[b].polygons.reserve(
           static_cast<std::size_t>(count(edges[0]) + count(edges[1]) + count(edges[2])));
@@ -91,11 +95,13 @@ class RegionPolygons {
   /// @param fine has the polygons of lone edges
   RegionMesh mesh(const EdgePolygons& fine, RunContext& context) const {
     Stage stage(context, "connect regions");
-    const std::size_t n = cells_.size(),
-                      names = cells_.point_count() + regions_.cube_count() + fine.fanned_edges();
-    check_indices(names, "points and cubes");
-    const std::unique_ptr<std::uint32_t[]> number(
-        new std::uint32_t[names]);  // by name; most are never written
+    const std::size_t n = cells_.size();
+    check_indices(cells_.point_count() + regions_.cube_count() + fine.fanned_edges(), "points and cubes");
+    std::vector<std::uint32_t> number_of_point(points_.slots()), number_of_cube(regions_.cube_count());
+    const auto number = [&](std::uint32_t name) -> std::uint32_t& {
+      return is_cube(name) ? number_of_cube[name - first_cube_]
+                           : number_of_point[points_.slot(point_of(name))];
+    };
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
     parallel_blocks(n, context, [&](std::size_t b) {
       for_each_point(b, fine, [&](std::uint32_t) { ++points[b]; });
@@ -109,7 +115,7 @@ class RegionPolygons {
     parallel_blocks(n, context, [&](std::size_t b) {
       auto at = static_cast<std::uint32_t>(points[b]);
       for_each_point(b, fine, [&](std::uint32_t name) {
-        number[name] = at;
+        number(name) = at;
         mesh.points[at++] = place(name);
       });
     });
@@ -117,7 +123,7 @@ class RegionPolygons {
       Quad* quad = mesh.quads.data() + quads[b];
       Triangle* triangle = mesh.triangles.data() + triangles[b];
       const auto numbered = [&](auto corners) {
-        for (std::uint32_t& corner : corners) corner = number[corner];
+        for (std::uint32_t& corner : corners) corner = number(corner);
         return corners;
       };
       for_each_polygon(
@@ -169,9 +175,11 @@ class RegionPolygons {
                            static_cast<std::uint64_t>(edge.axis << 9 | edge.sample));
   }
   const Vector3d& place(std::uint32_t name) const {
-    if (name < first_cube_) return points_[name];
-    return name < first_fan() ? regions_.place(name - first_cube_)
-                              : points_[name - first_fan() + first_cube_];
+    return is_cube(name) ? regions_.place(name - first_cube_) : points_[point_of(name)];
+  }
+  /// Of the uniform mesh, from the name of one that is no cube's.
+  std::uint32_t point_of(std::uint32_t name) const {
+    return name < first_cube_ ? name : name - first_fan() + first_cube_;
   }
   bool is_cube(std::uint32_t name) const { return name >= first_cube_ && name < first_fan(); }
   /// @param stars of cubes' points; none if null
@@ -326,18 +334,12 @@ class RegionPolygons {
 
   const Regions& regions_;
   const CellBlocks& cells_;
-  const std::vector<Vector3d>& points_;
+  const UniformPoints& points_;
   const std::uint32_t first_cube_;  ///< name
   EdgeMasks lone_edges_;            ///< by block and axis: those whose polygons are of the uniform mesh
   std::vector<Made> made_;          ///< by block
   std::vector<BlockMask> untested_;  ///< by block: as update() has it, against the uniform mesh
 };
-
-std::vector<BlockMask> all_active(const CellBlocks& cells) {
-  std::vector<BlockMask> result(cells.size());
-  for (std::size_t b = 0; b < cells.size(); ++b) result[b] = cells[static_cast<std::int32_t>(b)].active;
-  return result;
-}
 
 /// By point of the uniform mesh, those on fanned edges included.
 std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolygons& polygons,
@@ -362,8 +364,8 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
 
 /// @param connect() the polygons of the uniform mesh, of lone edges at least
 template <class Connect>
-RegionMesh merge(const Regions& regions, const std::vector<Vector3d>& points, RegionProof& proof,
-                 Connect&& connect, RunContext& context) {
+RegionMesh merge(const Regions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
+                 RunContext& context) {
   RegionPolygons merged(regions, points);
   const auto call_bold = [&](const std::vector<CellBlocks::Edge>& meeting) {
     for (const CellBlocks::Edge& edge : meeting) proof.call_bold(edge);
@@ -387,11 +389,11 @@ RegionMesh merge(const Regions& regions, const std::vector<Vector3d>& points, Re
 RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptions& options,
                          const FilePoints& file, RunContext& context) {
   const CellBlocks& cells = uniform.cells();
-  const std::vector<Vector3d>& points = uniform.mesh().points;
+  const UniformPoints& points = uniform.points();
   if (options.tolerance.least() > RegionSlabs::kLeast) {
     const bool needs_slabs =
         options.tolerance.least() <= RegionProof::kDiagonal * float(options.largest_cube);
-    if (needs_slabs && !in_hulls) uniform.place(all_active(cells), context);
+    if (needs_slabs && !in_hulls) uniform.place_all(context);
     Regions regions(cells, points, options, file, context);
     std::optional<RegionSlabs> slabs;
     if (needs_slabs) slabs.emplace(regions, in_hulls ? nullptr : &points, context);
@@ -405,7 +407,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
         },
         context);
   }
-  uniform.place(all_active(cells), context);
+  uniform.place_all(context);
   const EdgePolygons fine = uniform.connect(nullptr, context);
   Regions regions(cells, points, options, file, context);
   const std::vector<float> tolerance = tolerances_of_points(cells, fine, options.tolerance, context);

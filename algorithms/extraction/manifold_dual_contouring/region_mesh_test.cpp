@@ -187,23 +187,21 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
       regions.for_each_cube(static_cast<std::int32_t>(b), [&](const Region&) { ++sum; });
     return sum;
   };
-  std::vector<BlockMask> all(cells.size());
-  for (std::size_t b = 0; b < cells.size(); ++b) all[b] = cells[static_cast<std::int32_t>(b)].active;
-  uniform.place(all, context);
+  uniform.place_all(context);
   const EdgePolygons polygons = uniform.connect(nullptr, context);
   {
     RegionOptions options{CellTolerances(1.0f)};
-    Regions regions(cells, uniform.mesh().points, options, file, context);
+    Regions regions(cells, uniform.points(), options, file, context);
     EXPECT_GT(cubes(regions), 20u);
     options.tolerance = CellTolerances(1e-4f);
     const std::vector<float> narrow(polygons.point_count(), 1e-4f);
-    const RegionShell shell(regions, polygons, uniform.mesh().points, narrow, context);
+    const RegionShell shell(regions, polygons, uniform.points(), narrow, context);
     RegionProof(regions, shell, context).run();
     EXPECT_EQ(cubes(regions), 0u);
   }
   {
     RegionOptions options{CellTolerances(4.0f)};
-    Regions regions(cells, uniform.mesh().points, options, file, context);
+    Regions regions(cells, uniform.points(), options, file, context);
     EXPECT_GT(cubes(regions), 20u);
     options.tolerance = CellTolerances(1e-4f);
     RegionSlabs slabs(regions, nullptr, context);

@@ -96,8 +96,9 @@ class RegionProof {
   std::vector<BlockMask> fresh_;    ///< of cubes that were split (all at the beginning),
   std::vector<BlockMask> stirred_;  ///< or next to one
   bool is_fresh_ = true;            ///< nothing was looked at yet
-  EdgeMasks open_;                  ///< by block and axis: edges whose polygons are not shown; with a shell
-  EdgeMasks loose_;                 ///< by block and axis: edges of loose polygons; with slabs
+  std::vector<std::array<BlockMask, 3>>
+      open_;  ///< by block and axis: edges whose polygons are not shown; with a shell
+  std::vector<std::array<BlockMask, 3>> loose_;  ///< by block and axis: edges of loose polygons; with slabs
   std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };

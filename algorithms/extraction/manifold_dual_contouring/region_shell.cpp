@@ -123,9 +123,8 @@ class RegionShell::Search {
   std::array<Planes, kMostTriangles> planes_;
 };
 
-RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons,
-                         const std::vector<Vector3d>& points, std::span<const float> tolerance,
-                         RunContext& context)
+RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, const UniformPoints& points,
+                         std::span<const float> tolerance, RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),
       polygons_(polygons),
@@ -134,9 +133,9 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons,
       least_tolerance_(tolerance.empty() ? 0.0f : *std::ranges::min_element(tolerance)),
       blocks_(cells_.size()),
       up_(cells_.size()),
-      buffers_([&points] {
+      buffers_([&polygons] {
         auto buffers = std::make_unique<Buffers>();
-        buffers->certain.resize(points.size() + shell_kernels::kLargestVector);
+        buffers->certain.resize(polygons.point_count() + shell_kernels::kLargestVector);
         return buffers;
       }) {
   std::vector<std::uint64_t> first(cells_.size());

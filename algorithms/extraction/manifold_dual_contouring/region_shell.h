@@ -19,6 +19,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/regions.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
@@ -46,9 +47,8 @@ class RegionShell {
   static constexpr double kFarthest = 2.0;
 
   /// @param tolerance by point, those on fanned edges included; voxels
-  RegionShell(const Regions& regions, const EdgePolygons& polygons,
-              const std::vector<Eigen::Vector3d>& points, std::span<const float> tolerance,
-              RunContext& context);
+  RegionShell(const Regions& regions, const EdgePolygons& polygons, const UniformPoints& points,
+              std::span<const float> tolerance, RunContext& context);
   ~RegionShell();
 
   /// Safe to call for several polygons at once.
@@ -66,7 +66,7 @@ class RegionShell {
   const Regions& regions_;
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
-  const std::vector<Eigen::Vector3d>& points_;
+  const UniformPoints& points_;
   const std::span<const float> tolerance_;
   float least_tolerance_;
   std::vector<shell_kernels::Block> blocks_;

@@ -47,7 +47,7 @@ class RegionSlabs {
   static constexpr float kLeast = 2.0f;
 
   /// @param points of S, if they may be out of the hull of their cells' crossings; else null
-  RegionSlabs(const Regions& regions, const std::vector<Eigen::Vector3d>* points, RunContext& context);
+  RegionSlabs(const Regions& regions, const UniformPoints* points, RunContext& context);
 
   /// For cubes that were proposed meanwhile. Before the next begin().
   void make_room();

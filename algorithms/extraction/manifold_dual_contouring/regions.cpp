@@ -25,7 +25,7 @@ BlockMask moved_up(const BlockMask& mask, const BlockMask& below, int axis) {
 
 }  // namespace
 
-Regions::Regions(const CellBlocks& cells, const std::vector<Vector3d>& points, const RegionOptions& options,
+Regions::Regions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
                  const FilePoints& file, RunContext& context)
     : cells_(cells), points_(points), options_(options), file_(file), blocks_(cells.size()) {
   Stage stage(context, "propose regions");

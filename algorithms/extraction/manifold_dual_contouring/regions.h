@@ -13,6 +13,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_cubes.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_proposals.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
@@ -34,7 +35,7 @@ class Regions {
 
   /// @param points of the uniform mesh; only those of cells that are alone are ever looked at
   /// @param options outlive this
-  Regions(const CellBlocks& cells, const std::vector<Eigen::Vector3d>& points, const RegionOptions& options,
+  Regions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
           const FilePoints& file, RunContext& context);
 
   /// Of an active cell.
@@ -124,7 +125,7 @@ class Regions {
     return {block, static_cast<std::uint16_t>(first_cell(cube, level)), static_cast<std::uint16_t>(level)};
   }
   const CellBlocks& cells_;
-  const std::vector<Eigen::Vector3d>& points_;
+  const UniformPoints& points_;
   const RegionOptions& options_;
   const FilePoints& file_;
   std::vector<BlockRegions> blocks_;

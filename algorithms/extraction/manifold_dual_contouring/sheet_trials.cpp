@@ -22,7 +22,7 @@ bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
 
 class Trials {
  public:
-  Trials(const CellBlocks& cells, EdgePolygons& polygons, std::vector<Vector3d>& points, double farthest,
+  Trials(const CellBlocks& cells, EdgePolygons& polygons, UniformPoints& points, double farthest,
          RunContext& context)
       : cells_(cells),
         polygons_(polygons),
@@ -137,7 +137,7 @@ class Trials {
   const CellBlocks& cells_;
   EdgePolygons& polygons_;
   PolygonNeighbourhood mesh_;
-  std::vector<Vector3d>& points_;
+  UniformPoints& points_;
   Cells tried_;                                     ///< all that were when this began
   std::vector<std::array<BlockMask, 3>> untested_;  ///< by block and axis: edges whose polygons may meet others
 };
@@ -153,8 +153,8 @@ Cells without_repeats(Cells cells) {
 }  // namespace
 
 void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
-                     std::vector<Vector3d>& points, RunContext& context) {
-  points.resize(polygons.point_count());
+                     UniformPoints& points, RunContext& context) {
+  points.extend(cells.point_count(), polygons.point_count());
   parallel_blocks(cells.size(), context, [&](std::size_t b) {
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(polygons.fanned(static_cast<std::int32_t>(b), axis), [&](int sample) {
@@ -165,7 +165,7 @@ void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, cons
 }
 
 Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
-                           std::vector<Vector3d>& points, double farthest, RunContext& context) {
+                           UniformPoints& points, double farthest, RunContext& context) {
   Stage stage(context, "try sheets");
   Trials trials(cells, polygons, points, farthest, context);
   Cells held = trials.pinched();

@@ -6,12 +6,13 @@
 
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
+#include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
 namespace hermesh {
 
 /// Puts the points of fanned edges behind those of the cells.
 void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
-                     std::vector<Eigen::Vector3d>& points, RunContext& context);
+                     UniformPoints& points, RunContext& context);
 
 /// Does that, and holds to their segments those cells of several sheets and
 /// beside ambiguous faces whose polygons, as they would be without, meet others (triangle_contact.h) or leave
@@ -28,8 +29,7 @@ void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, cons
 /// @param farthest from its cell along an axis that any point is, voxels
 /// @throws Cancelled
 std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons,
-                                                   const FilePoints& file,
-                                                   std::vector<Eigen::Vector3d>& points, double farthest,
-                                                   RunContext& context);
+                                                   const FilePoints& file, UniformPoints& points,
+                                                   double farthest, RunContext& context);
 
 }  // namespace hermesh

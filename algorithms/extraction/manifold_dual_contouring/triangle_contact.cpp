@@ -116,11 +116,4 @@ bool certainly_apart(NamedTriangle a, NamedTriangle b) {
   return shared < 3 && certainly_apart(a.corners, b.corners, static_cast<int>(shared));
 }
 
-bool certainly_apart(Triangle a, Triangle b, const std::vector<Vector3d>& points) {
-  const auto named = [&](const Triangle& t) {
-    return NamedTriangle{t, {points[t[0]], points[t[1]], points[t[2]]}};
-  };
-  return certainly_apart(named(a), named(b));
-}
-
 }  // namespace hermesh

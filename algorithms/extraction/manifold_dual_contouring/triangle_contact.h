@@ -25,6 +25,13 @@ struct NamedTriangle {
 bool certainly_apart(NamedTriangle a, NamedTriangle b);
 
 /// The same of two triangles of a mesh, by numbers of its points; false if they have all corners in common.
-bool certainly_apart(Triangle a, Triangle b, const std::vector<Eigen::Vector3d>& points);
+/// @param points[i] the place of point i
+template <class Points>
+bool certainly_apart(Triangle a, Triangle b, const Points& points) {
+  const auto named = [&](const Triangle& t) {
+    return NamedTriangle{t, {points[t[0]], points[t[1]], points[t[2]]}};
+  };
+  return certainly_apart(named(a), named(b));
+}
 
 }  // namespace hermesh

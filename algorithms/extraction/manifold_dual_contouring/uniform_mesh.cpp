@@ -82,32 +82,36 @@ class CellRecords {
 
 class Contourer {
  public:
-  Contourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file, RunContext& context,
-            PolygonEdges* numbers)
-      : numbers_(numbers), cells_(grid, context), options_(options),
-        reach_(std::min(options.reach, kFarthestFromCell)), file_(file), wishes_(cells_.size()) {}
+  Contourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
+            RunContext& context, PolygonEdges* numbers)
+      : numbers_(numbers),
+        cells_(grid, context),
+        options_(options),
+        reach_(std::min(options.reach, kFarthestFromCell)),
+        file_(file),
+        wishes_(cells_.size()),
+        points_(UniformPoints::of_few(cells_.point_count())) {}
 
   const CellBlocks& cells() const { return cells_; }
 
+  const UniformPoints& points() const { return points_; }
+
   UniformMesh run(RunContext& context) {
     UniformMesh mesh = without_points();
-    place_points(
-        mesh, [&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
-    let_points_leave(mesh, context);
+    place_all_points(mesh, context);
+    let_points_leave(context);
     const EdgePolygons polygons = connect(mesh, nullptr, context);
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
-    move_points(cells_, polygons, wishes_, file_, mesh.points, context);
-    for_each_wisher(mesh, [&](double outside) { mesh.escaped += outside > 0; });
+    move_points(cells_, polygons, wishes_, file_, points_, context);
+    for_each_wisher([&](double outside) { mesh.escaped += outside > 0; });
+    mesh.points = points_.take();
     return mesh;
   }
 
-  /// What takes no memory before it is written, but for the counts of cells.
+  /// The counts of cells.
   UniformMesh without_points() const {
     UniformMesh mesh;
-    // With room for the few points that come to lie on edges, without which all would move then.
-    mesh.points.reserve(cells_.point_count() + cells_.point_count() / 32);
-    mesh.points.resize(cells_.point_count());
     for (std::size_t b = 0; b < cells_.size(); ++b) {
       mesh.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
       mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
@@ -115,46 +119,38 @@ class Contourer {
     return mesh;
   }
 
-  /// @param wanted(b) active cells of a block
-  template <class Wanted>
-  void place_points(UniformMesh& mesh, Wanted&& wanted, RunContext& context) {
-    Stage stage(context, "place points");
-    std::vector<std::uint32_t> several(cells_.size());
-    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      const auto block = static_cast<std::int32_t>(b);
-      const BlockMask asked = wanted(b);
-      if (!any(asked)) return;
-      const BlockMask placed = place_plain_cells(block, asked, mesh.points);
-      for_each_bit(asked, [&](int cell) {
-        if (test(placed, cell)) return;
-        if (cells_.is_plain(block, cell)) {
-          mesh.points[cells_.point(block, cell, 0)] = file_.rounded(place_plain(block, cell));
-          return;
-        }
-        const int sheets = cells_.point_count(block, cell);
-        several[b] += sheets > 1;
-        for (int sheet = 0; sheet < sheets; ++sheet)
-          mesh.points[cells_.point(block, cell, sheet)] = file_.rounded(place(block, cell, sheet, sheets));
-      });
-    });
-    for (const std::uint32_t found : several) mesh.several_sheets += found;
+  void place_all_points(UniformMesh& mesh, RunContext& context) {
+    points_ = UniformPoints::of_all(cells_.point_count());
+    place_points_of(
+        mesh, [&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
   }
 
+  /// @param wanted active cells, by block, whose points are not there yet
+  void place_points(UniformMesh& mesh, const std::vector<BlockMask>& wanted, RunContext& context) {
+    for (std::size_t b = 0; b < wanted.size(); ++b)
+      for_each_bit(wanted[b], [&](int cell) {
+        const auto block = static_cast<std::int32_t>(b);
+        for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet)
+          points_.make_room(cells_.point(block, cell, sheet));
+      });
+    place_points_of(
+        mesh, [&](std::size_t b) { return wanted[b]; }, context);
+  }
   /// The points of fanned edges come behind those of cells.
   /// @param edges those that are wanted, all crossing ones if null
   EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
-      return EdgePolygons(cells_, mesh.points, edges, context);
+      return EdgePolygons(cells_, points_, edges, context);
     }();
     if (held_) {
-      if (!held_->empty()) polygons.hold(*held_, mesh.points, context);
-      place_crossings(cells_, polygons, file_, mesh.points, context);
+      if (!held_->empty()) polygons.hold(*held_, points_, context);
+      place_crossings(cells_, polygons, file_, points_, context);
     } else {
       double farthest = 0;
-      for_each_wisher(mesh, [&](double outside) { farthest = std::max(farthest, outside); });
+      for_each_wisher([&](double outside) { farthest = std::max(farthest, outside); });
       for (const CellBlocks::Cell& cell :
-           hold_cells_that_meet(cells_, polygons, file_, mesh.points, farthest, context))
+           hold_cells_that_meet(cells_, polygons, file_, points_, farthest, context))
         mesh.meeting_joints.emplace_back(cell.block, cell.cell);
       held_ = polygons.held_cells();
     }
@@ -164,10 +160,34 @@ class Contourer {
   }
 
  private:
+  /// @param wanted(b) active cells of a block. There is room for their points.
+  template <class Wanted>
+  void place_points_of(UniformMesh& mesh, Wanted&& wanted, RunContext& context) {
+    Stage stage(context, "place points");
+    std::vector<std::uint32_t> several(cells_.size());
+    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
+      const auto block = static_cast<std::int32_t>(b);
+      const BlockMask asked = wanted(b);
+      if (!any(asked)) return;
+      const BlockMask placed = place_plain_cells(block, asked);
+      for_each_bit(asked, [&](int cell) {
+        if (test(placed, cell)) return;
+        if (cells_.is_plain(block, cell)) {
+          points_[cells_.point(block, cell, 0)] = file_.rounded(place_plain(block, cell));
+          return;
+        }
+        const int sheets = cells_.point_count(block, cell);
+        several[b] += sheets > 1;
+        for (int sheet = 0; sheet < sheets; ++sheet)
+          points_[cells_.point(block, cell, sheet)] = file_.rounded(place(block, cell, sheet, sheets));
+      });
+    });
+    for (const std::uint32_t found : several) mesh.several_sheets += found;
+  }
+
   /// Most of these cells by vector code: plain ones, if they are placed optimally only those whose planes are
   /// nearly parallel. Returns which.
-  BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted,
-                              std::vector<Vector3d>& points) const {
+  BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted) {
     BlockMask placed{};
     const bool average = options_.placement == DualContouringOptions::Placement::average;
     if (!average && options_.truncation < leaf_kernels::kLeastTruncation) return placed;
@@ -201,7 +221,7 @@ class Contourer {
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
       placed[static_cast<std::size_t>(cell[i] >> 6)] |= std::uint64_t{1} << (cell[i] & 63);
-      points[point[i]] =
+      points_[point[i]] =
           file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
     }
     return placed;
@@ -262,37 +282,36 @@ class Contourer {
 
   /// Cells of one parity share no face, so their points move independently of one another: eight rounds, the same result
   /// whatever the order within each.
-  void let_points_leave(UniformMesh& mesh, RunContext& context) {
+  void let_points_leave(RunContext& context) {
     Stage stage(context, "let points leave");
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells_.size(), context, [&](std::size_t b) {
         for (const PointWish& wish : wishes_[b]) {
           const int x = wish.cell >> 6, y = (wish.cell >> 3) & 7, z = wish.cell & 7;
-          if (((x & 1) | (y & 1) << 1 | (z & 1) << 2) == parity)
-            leave(static_cast<std::int32_t>(b), wish, mesh.points);
+          if (((x & 1) | (y & 1) << 1 | (z & 1) << 2) == parity) leave(static_cast<std::int32_t>(b), wish);
         }
       });
   }
 
   /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather be outside.
   template <class F>
-  void for_each_wisher(const UniformMesh& mesh, F&& f) const {
+  void for_each_wisher(F&& f) const {
     for (std::size_t b = 0; b < cells_.size(); ++b)
       for (const PointWish& wish : wishes_[b]) {
         const auto block = static_cast<std::int32_t>(b);
-        const Vector3d from_middle =
-            mesh.points[cells_.point(block, wish.cell, 0)] - cells_.corner(block, wish.cell) - Vector3d::Constant(0.5);
+        const Vector3d from_middle = points_[cells_.point(block, wish.cell, 0)] -
+                                     cells_.corner(block, wish.cell) - Vector3d::Constant(0.5);
         f(from_middle.cwiseAbs().maxCoeff() - 0.5);
       }
   }
 
-  void leave(std::int32_t block, const PointWish& wish, std::vector<Vector3d>& points) const {
+  void leave(std::int32_t block, const PointWish& wish) {
     if (cells_.has_explicit_face(block, wish.cell)) return;
-    Vector3d& point = points[cells_.point(block, wish.cell, 0)];
+    Vector3d& point = points_[cells_.point(block, wish.cell, 0)];
     const Vector3d corner = cells_.corner(block, wish.cell);
     std::array<Vector3d, 6> beside;
     for (int face = 0; face < 6; ++face) {
-      const std::optional<Vector3d> there = point_beside(block, wish.cell, face, points);
+      const std::optional<Vector3d> there = point_beside(block, wish.cell, face);
       if (!there) return;
       beside[face] = *there;
     }
@@ -305,7 +324,7 @@ class Contourer {
   }
 
   /// The middle of a cell that the surface does not pass through: no polygon uses it, but the tetrahedra do.
-  std::optional<Vector3d> point_beside(std::int32_t block, int cell, int face, const std::vector<Vector3d>& points) const {
+  std::optional<Vector3d> point_beside(std::int32_t block, int cell, int face) const {
     int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
     const int step = face & 1 ? 1 : -1;
     at[face >> 1] += step;
@@ -316,7 +335,7 @@ class Contourer {
       return middle;
     }
     if (cells_.has_explicit_face(there.block, there.cell)) return std::nullopt;
-    return points[cells_.point(there.block, there.cell, 0)];
+    return points_[cells_.point(there.block, there.cell, 0)];
   }
 
   static bool tetrahedra_are_positive(const Vector3d& corner, const Vector3d& point,
@@ -381,6 +400,7 @@ class Contourer {
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
   std::vector<std::vector<PointWish>> wishes_;  ///< by block
+  UniformPoints points_;
   /// Found where polygons are made first: all that these depend on are wanted then, and ever after.
   std::optional<std::vector<CellBlocks::Cell>> held_;
 };
@@ -427,20 +447,23 @@ UniformCells::UniformCells(const HermiteView& grid, const DualContouringOptions&
 UniformCells::~UniformCells() = default;
 
 const CellBlocks& UniformCells::cells() const { return made_->contourer.cells(); }
+const UniformPoints& UniformCells::points() const { return made_->contourer.points(); }
 const UniformMesh& UniformCells::mesh() const { return made_->mesh; }
 
 void UniformCells::place(const std::vector<BlockMask>& wanted, RunContext& context) {
-  made_->contourer.place_points(
-      made_->mesh,
-      [&](std::size_t b) {
-        BlockMask missing;
-        for (std::size_t word = 0; word < missing.size(); ++word) {
-          missing[word] = wanted[b][word] & ~made_->placed[b][word];
-          made_->placed[b][word] |= wanted[b][word];
-        }
-        return missing;
-      },
-      context);
+  std::vector<BlockMask> missing(wanted.size());
+  for (std::size_t b = 0; b < missing.size(); ++b)
+    for (std::size_t word = 0; word < missing[b].size(); ++word) {
+      missing[b][word] = wanted[b][word] & ~made_->placed[b][word];
+      made_->placed[b][word] |= wanted[b][word];
+    }
+  made_->contourer.place_points(made_->mesh, missing, context);
+}
+
+void UniformCells::place_all(RunContext& context) {
+  for (std::size_t b = 0; b < made_->placed.size(); ++b)
+    made_->placed[b] = cells()[static_cast<std::int32_t>(b)].active;
+  made_->contourer.place_all_points(made_->mesh, context);
 }
 
 EdgePolygons UniformCells::connect(const EdgeMasks* edges, RunContext& context) {
