@@ -262,6 +262,7 @@ class SubjectMeasurement {
     if (input_.parameters.is("placement", "average")) subject.label += ", means";
     if (!input_.parameters.is("largest_cube", "8"))
       subject.label += ", cubes of " + input_.parameters.text("largest_cube");
+    if (input_.parameters.is("representation", "sparse")) subject.label += ", packed";
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
@@ -269,7 +270,8 @@ class SubjectMeasurement {
                               {{"tolerance", readable_exactly(tolerance)},
                                {"merging", input_.parameters.text("merging")},
                                {"placement", input_.parameters.text("placement")},
-                               {"largest_cube", input_.parameters.text("largest_cube")}}};
+                               {"largest_cube", input_.parameters.text("largest_cube")},
+                               {"representation", input_.parameters.text("representation")}}};
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
@@ -520,6 +522,7 @@ Measurement guarantee_measurement() {
            {"merging", "collapses", "option of the extractor", {"collapses", "regions"}},
            {"placement", "optimal", "option of the extractor", {"optimal", "average"}},
            {"largest_cube", "8", "option of the extractor", {"8", "4", "2"}},
+           {"representation", "sparse-float", "option of the extractor", {"sparse-float", "sparse"}},
            {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
            {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
            {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},

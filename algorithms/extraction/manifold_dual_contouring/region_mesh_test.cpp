@@ -158,6 +158,22 @@ TEST(RegionMesh, SameBytesAtAnyThreadCount) {
   }
 }
 
+/// Packed crossings are read where they are; what they are turned into beforehand must make no difference.
+TEST(RegionMesh, SameFromPackedDataAsFromWhatTheyUnpackTo) {
+  RunContext context;
+  const PackedHermite packed = pack(waves(), NormalCodeId::octahedral, context);
+  const FloatHermite unpacked = unpack(packed, context);
+  for (const double tolerance : {0.0, 0.3, 4.0, 16.0}) {
+    const ManifoldDualContouringOptions options{
+        .tolerance = tolerance, .merging = ManifoldDualContouringOptions::Merging::regions, .uniform = {}};
+    const PolygonMesh direct = with_normal_code(packed.normal_code, [&](auto code) {
+      return manifold_dual_contouring(view_of(packed, code, context), options, nullptr, context);
+    });
+    EXPECT_FALSE(direct.points.empty());
+    EXPECT_TRUE(direct == contour(unpacked, tolerance)) << tolerance;
+  }
+}
+
 TEST(RegionMesh, SameBytesAtEverySimdLevel) {
   const FloatHermite hermite = waves();
   for (const double tolerance : {0.0, 0.3, 4.0, 16.0}) {
