@@ -93,7 +93,6 @@ class Contourer {
         points_(UniformPoints::of_few(cells_.point_count())) {}
 
   const CellBlocks& cells() const { return cells_; }
-
   const UniformPoints& points() const { return points_; }
 
   UniformMesh run(RunContext& context) {
@@ -119,6 +118,7 @@ class Contourer {
     return mesh;
   }
 
+  /// Of all active cells, in place of whatever points there are.
   void place_all_points(UniformMesh& mesh, RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
     place_points_of(
@@ -136,6 +136,7 @@ class Contourer {
     place_points_of(
         mesh, [&](std::size_t b) { return wanted[b]; }, context);
   }
+
   /// The points of fanned edges come behind those of cells.
   /// @param edges those that are wanted, all crossing ones if null
   EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) {
