@@ -7,8 +7,8 @@
 
 namespace hermesh {
 
-/// Memory only for the blocks that have one; reading another's gives an empty one. Blocks may be written side
-/// by side.
+/// Memory only for the blocks that have one; reading another's gives an empty one. Blocks may be written side by
+/// side, but none may be read meanwhile that another thread may write.
 template <class T>
 class ByBlock {
  public:

@@ -1,7 +1,5 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 
-#include <algorithm>
-
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/envelope.h"
 
@@ -16,10 +14,10 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                            RunContext& context)
-    : cells_(cells), only_(only), edges_(cells.size()) {
+    : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
-    if (only_ && std::ranges::none_of((*only_)[b], [](const BlockMask& mask) { return any(mask); })) return;
+    if (only_ && !only_->has(b)) return;
     PlainPoints near;
     near.read(cells_, block);
     std::array<EdgeCrossing, 3 * 512> crossings;
@@ -47,7 +45,7 @@ bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
 
 void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                         RunContext& context) {
-  for (const CellBlocks::Cell& cell : cells) set(of(cell.block).held, cell.cell);
+  for (const CellBlocks::Cell& cell : cells) set(held_.at(static_cast<std::size_t>(cell.block)), cell.cell);
   for (const CellBlocks::Cell& cell : cells)
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
@@ -57,8 +55,8 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const Unifor
 
 std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const {
   std::vector<CellBlocks::Cell> cells;
-  for (std::size_t b = 0; b < edges_.size(); ++b)
-    for_each_bit(edges_[b].held, [&](int cell) { cells.push_back({static_cast<std::int32_t>(b), cell}); });
+  for (std::size_t b = 0; b < held_.size(); ++b)
+    for_each_bit(held_[b], [&](int cell) { cells.push_back({static_cast<std::int32_t>(b), cell}); });
   return cells;
 }
 

@@ -2,7 +2,6 @@
 // why no two of them meet).
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <utility>
@@ -39,7 +38,7 @@ class EdgePolygons {
   /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, a point finds no
   /// room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
-  bool is_held(const CellBlocks::Cell& cell) const { return test(of(cell.block).held, cell.cell); }
+  bool is_held(const CellBlocks::Cell& cell) const { return test(held_[static_cast<std::size_t>(cell.block)], cell.cell); }
   /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
   void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
@@ -96,7 +95,6 @@ class EdgePolygons {
  private:
   struct BlockEdges {
     std::array<BlockMask, 3> fanned{}, second_diagonal{};
-    BlockMask held{};
     std::uint32_t first_crossing_point = 0, first_quad = 0, first_triangle = 0;
   };
 
@@ -116,6 +114,7 @@ class EdgePolygons {
   const CellBlocks& cells_;
   const EdgeMasks* const only_;
   ByBlock<BlockEdges> edges_;
+  ByBlock<BlockMask> held_;  ///< cells; apart from edges, for it is read across blocks while these are made
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
 };
 
