@@ -28,7 +28,8 @@ class PolygonStars {
  private:
   static constexpr std::uint32_t kTurned = 1u << 31;
   std::vector<std::uint8_t> asked_;   ///< by point
-  std::vector<std::uint32_t> marks_;  ///< by point: that, and how many triangles lie across one ray from it
+  std::vector<std::uint32_t>
+      marks_;  ///< by point: kTurned, and how many triangles lie across one ray from it
 };
 
 }  // namespace hermesh

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -97,7 +96,7 @@ class RegionPolygons {
     Stage stage(context, "connect regions");
     const std::size_t n = cells_.size();
     check_indices(cells_.point_count() + regions_.cube_count() + fine.fanned_edges(), "points and cubes");
-    std::vector<std::uint32_t> number_of_point(points_.slots()), number_of_cube(regions_.cube_count());
+    LargeArray<std::uint32_t> number_of_point(points_.slots()), number_of_cube(regions_.cube_count());
     const auto number = [&](std::uint32_t name) -> std::uint32_t& {
       return is_cube(name) ? number_of_cube[name - first_cube_]
                            : number_of_point[points_.slot(point_of(name))];

@@ -1,7 +1,6 @@
 // Cells of several sheets, and ambiguous faces, tried without the last resort of uniform_mesh.h.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
 
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"

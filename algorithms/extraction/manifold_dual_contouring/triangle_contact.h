@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
 
