@@ -14,11 +14,12 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
   JointMesh mesh;
   mesh.placement = grid.placement();
   mesh.points = std::move(uniform.points);
-  mesh.joints = uniform.joints;
-  mesh.several_sheets = uniform.several_sheets;
-  mesh.fanned_edges = uniform.fanned_edges;
-  mesh.escaped = uniform.escaped;
-  for (const auto& [block, cell] : uniform.meeting_joints) mesh.meeting_joints.push_back({block, cell});
+  mesh.joints = uniform.counts.joints;
+  mesh.several_sheets = uniform.counts.several_sheets;
+  mesh.fanned_edges = uniform.counts.fanned_edges;
+  mesh.escaped = uniform.counts.escaped;
+  for (const auto& [block, cell] : uniform.counts.meeting_joints)
+    mesh.meeting_joints.push_back({block, cell});
   const std::size_t fanned = uniform.triangles.size(), quads = uniform.quads.size();
   mesh.triangles = std::move(uniform.triangles);
   mesh.triangles.resize(fanned + 2 * quads);

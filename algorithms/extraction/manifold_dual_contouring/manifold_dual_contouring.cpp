@@ -13,12 +13,12 @@
 namespace hermesh {
 namespace {
 
-void report(const UniformMesh& mesh, RunContext& context) {
-  context.figure("cells", double(mesh.cells));
-  context.figure("several_sheets", double(mesh.several_sheets));
-  context.figure("held_cells", double(mesh.held));
-  context.figure("fanned_edges", double(mesh.fanned_edges));
-  context.figure("escaped", double(mesh.escaped));
+void report(const UniformCounts& counts, RunContext& context) {
+  context.figure("cells", double(counts.cells));
+  context.figure("several_sheets", double(counts.several_sheets));
+  context.figure("held_cells", double(counts.held));
+  context.figure("fanned_edges", double(counts.fanned_edges));
+  context.figure("escaped", double(counts.escaped));
 }
 
 PolygonMesh in_world(const std::vector<Eigen::Vector3d>& points, std::vector<Triangle> triangles,
@@ -128,7 +128,7 @@ Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions
                             options.flatness, options.largest_cube};
   const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average;
   RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
-  report(uniform.mesh(), context);
+  report(uniform.counts(), context);
   return {std::move(merged.points), std::move(merged.triangles), std::move(merged.quads)};
 }
 
@@ -147,7 +147,7 @@ Polygons polygons_of(const HermiteView& grid, ManifoldDualContouringOptions opti
   if (regions) options.uniform.reach = 0;
   if (regions && options.tolerance > 0) return by_regions(grid, options, field, file, context);
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
-  report(uniform, context);
+  report(uniform.counts, context);
   if (uniform.points.empty() || options.tolerance <= 0) return as_they_are(std::move(uniform));
   return by_collapses(std::move(uniform), field, options.tolerance, file, context);
 }

@@ -90,56 +90,51 @@ class Contourer {
         reach_(std::min(options.reach, kFarthestFromCell)),
         file_(file),
         wishes_(cells_.size()),
-        points_(UniformPoints::of_few(cells_.point_count())) {}
+        points_(UniformPoints::of_few(cells_.point_count())) {
+    for (std::size_t b = 0; b < cells_.size(); ++b) {
+      counts_.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
+      counts_.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
+    }
+  }
 
   const CellBlocks& cells() const { return cells_; }
   const UniformPoints& points() const { return points_; }
+  const UniformCounts& counts() const { return counts_; }
 
   UniformMesh run(RunContext& context) {
-    UniformMesh mesh = without_points();
-    place_all_points(mesh, context);
+    place_all_points(context);
     let_points_leave(context);
-    const EdgePolygons polygons = connect(mesh, nullptr, context);
+    const EdgePolygons polygons = connect(nullptr, context);
+    UniformMesh mesh;
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     move_points(cells_, polygons, wishes_, file_, points_, context);
-    for_each_wisher([&](double outside) { mesh.escaped += outside > 0; });
+    for_each_wisher([&](double outside) { counts_.escaped += outside > 0; });
     mesh.points = points_.take();
-    return mesh;
-  }
-
-  /// The counts of cells.
-  UniformMesh without_points() const {
-    UniformMesh mesh;
-    for (std::size_t b = 0; b < cells_.size(); ++b) {
-      mesh.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
-      mesh.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
-    }
+    mesh.counts = std::move(counts_);
     return mesh;
   }
 
   /// Of all active cells, in place of whatever points there are.
-  void place_all_points(UniformMesh& mesh, RunContext& context) {
+  void place_all_points(RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
-    place_points_of(
-        mesh, [&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
+    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
   }
 
   /// @param wanted active cells, by block, whose points are not there yet
-  void place_points(UniformMesh& mesh, const std::vector<BlockMask>& wanted, RunContext& context) {
+  void place_points(const std::vector<BlockMask>& wanted, RunContext& context) {
     for (std::size_t b = 0; b < wanted.size(); ++b)
       for_each_bit(wanted[b], [&](int cell) {
         const auto block = static_cast<std::int32_t>(b);
         for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet)
           points_.make_room(cells_.point(block, cell, sheet));
       });
-    place_points_of(
-        mesh, [&](std::size_t b) { return wanted[b]; }, context);
+    place_points_of([&](std::size_t b) { return wanted[b]; }, context);
   }
 
   /// The points of fanned edges come behind those of cells.
   /// @param edges those that are wanted, all crossing ones if null
-  EdgePolygons connect(UniformMesh& mesh, const EdgeMasks* edges, RunContext& context) {
+  EdgePolygons connect(const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, points_, edges, context);
@@ -152,18 +147,18 @@ class Contourer {
       for_each_wisher([&](double outside) { farthest = std::max(farthest, outside); });
       for (const CellBlocks::Cell& cell :
            hold_cells_that_meet(cells_, polygons, file_, points_, farthest, context))
-        mesh.meeting_joints.emplace_back(cell.block, cell.cell);
+        counts_.meeting_joints.emplace_back(cell.block, cell.cell);
       held_ = polygons.held_cells();
     }
-    mesh.held = held_->size();
-    mesh.fanned_edges = polygons.fanned_edges();
+    counts_.held = held_->size();
+    counts_.fanned_edges = polygons.fanned_edges();
     return polygons;
   }
 
  private:
   /// @param wanted(b) active cells of a block. There is room for their points.
   template <class Wanted>
-  void place_points_of(UniformMesh& mesh, Wanted&& wanted, RunContext& context) {
+  void place_points_of(Wanted&& wanted, RunContext& context) {
     Stage stage(context, "place points");
     std::vector<std::uint32_t> several(cells_.size());
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -183,7 +178,7 @@ class Contourer {
           points_[cells_.point(block, cell, sheet)] = file_.rounded(place(block, cell, sheet, sheets));
       });
     });
-    for (const std::uint32_t found : several) mesh.several_sheets += found;
+    for (const std::uint32_t found : several) counts_.several_sheets += found;
   }
 
   /// Most of these cells by vector code: plain ones, if they are placed optimally only those whose planes are
@@ -402,6 +397,7 @@ class Contourer {
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
   std::vector<std::vector<PointWish>> wishes_;  ///< by block
   UniformPoints points_;
+  UniformCounts counts_;
   /// Found where polygons are made first: all that these depend on are wanted then, and ever after.
   std::optional<std::vector<CellBlocks::Cell>> held_;
 };
@@ -431,14 +427,10 @@ UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& o
 struct UniformCells::Made {
   Made(const HermiteView& view, const DualContouringOptions& options, const FilePoints& file,
        RunContext& context)
-      : grid(view),
-        contourer(grid, options, file, context, nullptr),
-        mesh(contourer.without_points()),
-        placed(contourer.cells().size()) {}
+      : grid(view), contourer(grid, options, file, context, nullptr), placed(contourer.cells().size()) {}
 
   const HermiteCells grid;
   Contourer contourer;
-  UniformMesh mesh;
   std::vector<BlockMask> placed;
 };
 
@@ -449,7 +441,7 @@ UniformCells::~UniformCells() = default;
 
 const CellBlocks& UniformCells::cells() const { return made_->contourer.cells(); }
 const UniformPoints& UniformCells::points() const { return made_->contourer.points(); }
-const UniformMesh& UniformCells::mesh() const { return made_->mesh; }
+const UniformCounts& UniformCells::counts() const { return made_->contourer.counts(); }
 
 void UniformCells::place(const std::vector<BlockMask>& wanted, RunContext& context) {
   std::vector<BlockMask> missing(wanted.size());
@@ -458,17 +450,17 @@ void UniformCells::place(const std::vector<BlockMask>& wanted, RunContext& conte
       missing[b][word] = wanted[b][word] & ~made_->placed[b][word];
       made_->placed[b][word] |= wanted[b][word];
     }
-  made_->contourer.place_points(made_->mesh, missing, context);
+  made_->contourer.place_points(missing, context);
 }
 
 void UniformCells::place_all(RunContext& context) {
   for (std::size_t b = 0; b < made_->placed.size(); ++b)
     made_->placed[b] = cells()[static_cast<std::int32_t>(b)].active;
-  made_->contourer.place_all_points(made_->mesh, context);
+  made_->contourer.place_all_points(context);
 }
 
 EdgePolygons UniformCells::connect(const EdgeMasks* edges, RunContext& context) {
-  return made_->contourer.connect(made_->mesh, edges, context);
+  return made_->contourer.connect(edges, context);
 }
 
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,

@@ -48,11 +48,8 @@
 
 namespace hermesh {
 
-struct UniformMesh {
-  std::vector<Eigen::Vector3d> points;  ///< index space relative to the placement's base; FilePoints::rounded()
-  LargeArray<Quad> quads;              ///< abc and acd, counter-clockwise seen from outside, in index space
-  std::vector<Triangle> triangles;
-
+/// What was met on the way to it.
+struct UniformCounts {
   std::uint64_t cells = 0;           ///< that the surface passes through
   std::uint64_t joints = 0;          ///< of these: with a cut (cell_blocks.h)
   std::uint64_t several_sheets = 0;  ///< of these
@@ -62,6 +59,14 @@ struct UniformMesh {
   /// Joints of several sheets, by block and cell, whose polygons may meet others: no promise of the above holds
   /// unless there are none.
   std::vector<std::pair<std::int32_t, int>> meeting_joints;
+};
+
+struct UniformMesh {
+  std::vector<Eigen::Vector3d>
+      points;              ///< index space relative to the placement's base; FilePoints::rounded()
+  LargeArray<Quad> quads;  ///< abc and acd, counter-clockwise seen from outside, in index space
+  std::vector<Triangle> triangles;
+  UniformCounts counts;
 };
 
 /// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its
@@ -78,10 +83,10 @@ class UniformCells {
   ~UniformCells();
 
   const CellBlocks& cells() const;
-  /// Those that were asked for. They stay where they are in this.
+  /// Those that were asked for; references to single ones last until more are.
   const UniformPoints& points() const;
-  /// Counts only.
-  const UniformMesh& mesh() const;
+  /// Of what was made so far.
+  const UniformCounts& counts() const;
   /// The points of active cells, by block. @throws Cancelled
   void place(const std::vector<BlockMask>& wanted, RunContext& context);
   /// Those of all cells, which takes less time than if they were asked for one by one. Nothing has been
