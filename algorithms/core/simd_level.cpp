@@ -14,7 +14,9 @@ bool is_available(SimdLevel level) {
     case SimdLevel::avx2:
       return __builtin_cpu_supports("avx2") != 0;
     case SimdLevel::avx512:
-      return __builtin_cpu_supports("avx512f") != 0;
+      return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+             __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
+             __builtin_cpu_supports("avx512vbmi2") != 0;
     case SimdLevel::sse2:
       break;
   }

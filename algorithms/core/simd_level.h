@@ -7,6 +7,7 @@
 
 namespace hermesh {
 
+/// `avx512` is what Ice Lake and Zen 4 were the first to have: F, BW, DQ, VL and VBMI2.
 enum class SimdLevel { sse2, avx2, avx512 };
 
 std::string_view name(SimdLevel level);
