@@ -249,6 +249,19 @@ TEST_F(LevelSetContouringTest, ScatteredActiveSamplesOfAVolumeThatIsNoLevelSet) 
     }
 }
 
+/// Every edge is crossed: as many as a leaf can have, and as its lists have room for.
+FloatGrid::Ptr checkerboard() {
+  std::mt19937 random(14);
+  std::uniform_real_distribution<float> size(0.2f, 1.0f);
+  return cube(
+      1.0f, true, [&](int x, int y, int z) { return (x + y + z) % 2 == 0 ? size(random) : -size(random); },
+      kAlways);
+}
+
+TEST_F(LevelSetContouringTest, LeavesAllOfWhoseEdgesAreCrossed) {
+  expect_same_polygons(make_level_set(checkerboard()), 0.0, 3 * 23 * 23 * 22, 0.03);
+}
+
 TEST_F(LevelSetContouringTest, SamplesExactlyAtTheIsovalue) {
   std::mt19937 random(5);
   const auto value = [&](int, int, int) { return float(int(random() % 3) - 1); };
@@ -297,7 +310,8 @@ TEST_F(LevelSetContouringTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount)
   std::mt19937 random(13);
   std::uniform_real_distribution<float> noise(-1.0f, 1.0f);
   const auto value = [&](int, int, int) { return noise(random); };
-  for (const LevelSet& volume : {make_level_set(sphere(50.0f, {0.1f, 0.2f, 0.3f})), make_level_set(turned_cube()),
+  for (const LevelSet& volume : {make_level_set(sphere(50.0f, {0.1f, 0.2f, 0.3f})),
+                                 make_level_set(turned_cube()), make_level_set(checkerboard()),
                                  make_level_set(cube(1.0f, false, value, [&] { return random() % 3 != 0; }))})
     for (const Placement placement : {Placement::average, Placement::optimal}) {
       const DualContouringOptions options{.placement = placement};

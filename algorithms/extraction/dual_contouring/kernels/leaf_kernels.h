@@ -16,7 +16,7 @@ namespace hermesh::leaf_kernels {
 using edge_kernels::UpperSigns;
 
 /// Floats in the longest vectors.
-inline constexpr int kLargestVector = 16;
+inline constexpr int kLargestVector = 8;
 
 /// Which cells of a leaf have a point, and which point. 96 bytes.
 struct LeafCells {

@@ -8,7 +8,7 @@
 namespace hermesh::shell_kernels {
 
 /// At once, see Surface::certain.
-constexpr int kMostPrisms = 2, kLargestVector = 16;
+constexpr int kMostPrisms = 2, kLargestVector = 8;
 
 /// How far a place is beyond each of a prism's three walls, above its lid and below its bottom; negative
 /// inside. Walls are not flat: between lid and bottom they are within `spread` of a plane.
