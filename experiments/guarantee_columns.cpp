@@ -26,7 +26,8 @@ std::vector<MeasuredColumn> guarantee_mesh_columns() {
       {"several_sheets", "sheets", "of these, with several sheets"},
       {"held_cells", "held", "cells in which the last resort was taken"},
       {"fanned_edges", "fanned", "crossing edges that became four triangles or more"},
-      {"escaped", "escaped", "points outside their cells"}};
+      {"escaped", "escaped", "points outside their cells"},
+      {"digest", "digest", "of the mesh's arrays: the first 16 digits of their SHA-256"}};
 }
 
 std::vector<MeasuredColumn> guarantee_overview_columns() {
@@ -45,6 +46,10 @@ std::vector<MeasuredColumn> guarantee_overview_columns() {
       {"held_percent", "held [%]",
        "cells in which the last resort was taken, of those that the surface passes through"},
       {"seconds", "time [s]", "of all, one run each, Hermite data included"},
+      {"digest", "digest",
+       "of the digests of these meshes: where two commits have the same, the meshes are the same, byte by "
+       "byte, "
+       "and what was judged of one holds for the other"},
       {"adaptive-dual-contouring", "adaptive d. c.", "adaptive-dual-contouring with threshold 0.1" + defects},
       {"dual-contouring", "dual contouring", "the same of dual-contouring"},
       {"marching-cubes", "marching cubes", "the same of marching-cubes"},
@@ -54,7 +59,7 @@ std::vector<MeasuredColumn> guarantee_overview_columns() {
 std::vector<MeasuredColumn> guarantee_summary_columns() {
   return {
       {"tolerance", "tol. [vx]", "0 gives the uniform mesh"},
-      {"meshes", "meshes", "judged"},
+      {"meshes", "meshes", "made"},
       {"triangles", "triangles", "of all"},
       {"seconds", "time [s]", "of all"},
       {"self_intersections", "crossing", "self-intersecting pairs of all"},

@@ -50,6 +50,31 @@ TEST(GuaranteeMeasurement, FindsNoViolation) {
   EXPECT_EQ(rows.back()["values"]["violations"], 0);
 }
 
+/// What makes a verdict of one commit hold for another: the digests of their meshes, made without the judges.
+TEST(GuaranteeMeasurement, DigestsAreThoseOfTheMeshesThatAreJudged) {
+  const std::vector<Json> judged = rows_of(kSmall, "noise");
+  std::map<std::string, std::string> parameters = kSmall;
+  parameters["judge"] = "no";
+  const std::vector<Json> made = rows_of(parameters, "noise");
+  parameters["tolerances"] = "0.1";
+  const std::vector<Json> others = rows_of(parameters, "noise");
+  const auto overviews = [](const std::vector<Json>& rows) {
+    std::map<std::string, Json> result;
+    for (const Json& row : rows)
+      if (text_at(row, "/case/name") == "noise") result[text_at(row, "/variant/name")] = row["values"];
+    return result;
+  };
+  ASSERT_EQ(overviews(judged).size(), 4u);
+  for (const auto& [name, values] : overviews(judged)) {
+    EXPECT_EQ(values["digest"].get<std::string>().size(), 16u);
+    EXPECT_EQ(values["digest"], overviews(made)[name]["digest"]) << name;
+    EXPECT_NE(values["digest"], overviews(others)[name]["digest"]) << "the mesh with tolerance 1 is missing";
+    EXPECT_EQ(values["violations"], 0);
+    EXPECT_FALSE(overviews(made)[name].contains("violations")) << "nobody looked";
+  }
+  EXPECT_FALSE(made.back()["values"].contains("violations"));
+}
+
 /// A run of hours that is cut short has kept what it had.
 TEST(GuaranteeMeasurement, KeepsRowsThatWereReadyBeforeItWasCancelled) {
   const std::vector<Json> all = rows_of(kSmall, "noise");

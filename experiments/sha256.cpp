@@ -57,6 +57,12 @@ std::string sha256_of_file(const std::filesystem::path& path) {
   return hash.hex();
 }
 
+std::string sha256_of_text(std::string_view text) {
+  Sha256 hash;
+  hash.add_array(text);
+  return hash.hex();
+}
+
 std::string sha256_of_mesh(const PolygonMesh& mesh) {
   Sha256 hash;
   const std::vector<std::uint64_t> counts = {mesh.points.size(), mesh.triangles.size(), mesh.quads.size()};

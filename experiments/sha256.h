@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "algorithms/core/polygon_mesh.h"
 
@@ -10,6 +11,8 @@ namespace hermesh {
 
 /// Of the file's bytes, in 64 hexadecimal digits. @throws Error if it cannot be read.
 std::string sha256_of_file(const std::filesystem::path& path);
+
+std::string sha256_of_text(std::string_view text);
 
 /// Of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points, the
 /// triangles, the quads, all little-endian.
