@@ -48,7 +48,7 @@ std::vector<MeasuredColumn> guarantee_overview_columns() {
       {"seconds", "time [s]", "of all, one run each, Hermite data included"},
       {"digest", "digest",
        "of the digests of these meshes: where two commits have the same, so are the bytes of the meshes, and "
-       "what was judged of one holds for the other"},
+       "what was judged of one holds for the other, as long as files are written alike"},
       {"adaptive-dual-contouring", "adaptive d. c.", "adaptive-dual-contouring with threshold 0.1" + defects},
       {"dual-contouring", "dual contouring", "the same of dual-contouring"},
       {"marching-cubes", "marching cubes", "the same of marching-cubes"},

@@ -133,6 +133,11 @@ std::vector<std::string> violations_of(const Json& values, double tolerance) {
   return result;
 }
 
+/// Of meshes that nobody judged no number is stated, unless some could not be made.
+void set_violations(Json& values, std::int64_t violations, bool judged) {
+  if (judged || violations > 0) values["violations"] = violations;
+}
+
 /// A level set and what its meshes are called.
 struct Subject {
   std::string kind, label;
@@ -195,7 +200,7 @@ struct Overview {
   }
   MeasuredRow row(bool judged) const {
     MeasuredRow result{subject.kind, subject.label, {{"resolution", subject.resolution}, {"meshes", meshes}}};
-    if (judged || !broken.empty()) result.values["violations"] = broken.size();
+    set_violations(result.values, std::int64_t(broken.size()), judged);
     result.values.update(values);
     if (excess) result.values["excess"] = *excess;
     result.values["held_percent"] = held;
@@ -483,7 +488,6 @@ class Guarantee {
 
   void emit(std::size_t i) { input_.emit(std::exchange(results_[i].rows, {})); }
 
-  /// Of meshes that nobody judged it says nothing but what could not be made.
   static void summarise(const Sums& sums, bool judged, std::vector<MeasuredRow>& rows) {
     std::int64_t violations = 0, meshes = 0;
     for (const auto& [key, sum] : sums) {
@@ -491,7 +495,7 @@ class Guarantee {
       MeasuredRow row{"summary", kind + ", " + extractor};
       row.values = {{"meshes", sum.meshes}, {"triangles", sum.triangles}, {"seconds", sum.seconds}};
       if (judged) row.values["self_intersections"] = sum.self_intersections;
-      if (judged || sum.violations > 0) row.values["violations"] = sum.violations;
+      set_violations(row.values, sum.violations, judged);
       if (tolerance >= 0) row.values["tolerance"] = tolerance;
       if (sum.largest_share > 0) row.values["largest_share"] = sum.largest_share;
       if (sum.largest_share > 0) row.values["beyond"] = sum.beyond;
@@ -500,7 +504,7 @@ class Guarantee {
       rows.push_back(std::move(row));
     }
     rows.push_back({"summary", std::string("all of ") + kGuaranteed, {{"meshes", meshes}}});
-    if (judged || violations > 0) rows.back().values["violations"] = violations;
+    set_violations(rows.back().values, violations, judged);
   }
 
   const MeasurementInput& input_;

@@ -12,6 +12,7 @@ namespace hermesh {
 /// Of the file's bytes, in 64 hexadecimal digits. @throws Error if it cannot be read.
 std::string sha256_of_file(const std::filesystem::path& path);
 
+/// Of the characters.
 std::string sha256_of_text(std::string_view text);
 
 /// Of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points, the
