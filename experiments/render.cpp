@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <sstream>
 
 #include "algorithms/core/atomic_file.h"
 #include "experiments/ray_scene.h"
@@ -38,15 +39,27 @@ class Canvas {
   /// Shortens the text with an ellipsis where it is wider than `room` pixels.
   void text(double x, double y, std::string words, double size, Tone colour, double room, bool bold = false) {
     tone(colour);
-    cairo_select_font_face(cairo_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo_.get(), size);
+    font(size, bold);
     if (width_of(words) > room) {
       while (!words.empty() && width_of(words + "…") > room) drop_last_letter(words);
       words += "…";
     }
     cairo_move_to(cairo_.get(), x, y);
     cairo_show_text(cairo_.get(), words.c_str());
+  }
+
+  /// Lines no wider than `room` pixels, broken between words; a word that is wider has one to itself.
+  std::vector<std::string> lines(const std::string& text, double size, double room) {
+    font(size, false);
+    std::vector<std::string> lines;
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+      if (!lines.empty() && width_of(lines.back() + " " + word) <= room)
+        lines.back() += " " + word;
+      else
+        lines.push_back(word);
+    }
+    return lines;
   }
 
   void image(double x, double y, const Image& picture) {
@@ -79,6 +92,11 @@ class Canvas {
   }
 
  private:
+  void font(double size, bool bold) {
+    cairo_select_font_face(cairo_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cairo_.get(), size);
+  }
   void tone(Tone t) { cairo_set_source_rgb(cairo_.get(), t.red, t.green, t.blue); }
   double width_of(const std::string& words) const {
     cairo_text_extents_t extents;
@@ -183,10 +201,21 @@ void draw_picture(Canvas& canvas, const Picture& picture, const Layout& layout, 
   canvas.frame(x + 0.75, middle + 0.75, pixels - 1.5, layout.close.height - 1.5, kMark, 1.5);
 }
 
+void break_captions(std::vector<Picture>& pictures, double room) {
+  Canvas canvas(1, 1);
+  for (Picture& picture : pictures) {
+    std::vector<std::string> broken;
+    for (const std::string& caption : picture.captions)
+      for (std::string& line : canvas.lines(caption, kCaptionSize, room)) broken.push_back(std::move(line));
+    picture.captions = std::move(broken);
+  }
+}
+
 }  // namespace
 
-void render_sheet(const std::filesystem::path& png, const Sheet& sheet, RunContext& context) {
+void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context) {
   const Stage stage(context, "picture");
+  break_captions(sheet.pictures, sheet.cell_pixels);
   const Camera camera = make_camera(sheet.viewpoint.azimuth, sheet.viewpoint.elevation);
   const Layout layout = plan(sheet, camera);
   Canvas canvas(layout.width, layout.height);

@@ -27,7 +27,7 @@ struct CloseUp {
 
 struct Picture {
   std::string label;                  ///< bold, the variant's name
-  std::vector<std::string> captions;  ///< a few figures below it, a line each
+  std::vector<std::string> captions;  ///< a few figures below it, a line each, or more where one is too wide
   std::function<PolygonMesh()> load;  ///< called once, so that only one mesh at a time is in memory
 };
 
@@ -45,6 +45,6 @@ struct Sheet {
 /// polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red, an empty mesh says
 /// "empty". The same sheet gives the same pixels at any thread count. Written aside and renamed.
 /// @throws Error if the path cannot be written; Cancelled.
-void render_sheet(const std::filesystem::path& png, const Sheet& sheet, RunContext& context);
+void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context);
 
 }  // namespace hermesh

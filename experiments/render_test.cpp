@@ -150,6 +150,16 @@ TEST_F(Sheets, ManyPicturesWrap) {
   EXPECT_GT(number_in(bytes("seven.png"), 20), number_in(bytes("two.png"), 20) * 3 / 2);
 }
 
+TEST_F(Sheets, NoEndOfACaptionIsLost) {
+  render_sheet(folder_ / "short.png", sheet_, context_);
+  sheet_.pictures[0].captions = {"promises closed, manifold: kept"};
+  render_sheet(folder_ / "kept.png", sheet_, context_);
+  sheet_.pictures[0].captions = {"promises closed, manifold: lost"};
+  render_sheet(folder_ / "lost.png", sheet_, context_);
+  EXPECT_GT(number_in(bytes("kept.png"), 20), number_in(bytes("short.png"), 20));
+  EXPECT_NE(bytes("kept.png"), bytes("lost.png"));
+}
+
 TEST_F(Sheets, UnwritablePathIsAnErrorAndLeavesNothing) {
   EXPECT_THROW(render_sheet(folder_ / "missing" / "a.png", sheet_, context_), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder_));

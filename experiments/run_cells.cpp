@@ -260,7 +260,7 @@ class Group {
              return file.empty() ? PolygonMesh{} : read_mesh(file, child);
            }});
     }
-    render_sheet(in_.out / (name_ + ".png"), sheet, context_);
+    render_sheet(in_.out / (name_ + ".png"), std::move(sheet), context_);
   }
 
   const GroupInput& in_;
