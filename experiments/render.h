@@ -38,7 +38,7 @@ struct Sheet {
   Viewpoint viewpoint;
   std::vector<Picture> pictures;
   int cell_pixels = 400;  ///< width of one picture
-  int columns = 4;        ///< pictures side by side before the next row begins
+  int columns = 5;        ///< pictures side by side before the next row begins
 };
 
 /// All meshes from one camera on one sheet: for each, the whole object shaded and a close-up with the

@@ -246,19 +246,20 @@ class Group {
     sheet.viewpoint = in_.entry.viewpoint;
     sheet.cell_pixels = in_.tier.pixels;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      std::string figures = readable(rows[i].value("triangle_count", 0.0)) + " triangles";
+      std::string size = readable(rows[i].value("triangle_count", 0.0)) + " triangles";
       if (rows[i].contains("seconds"))
-        figures += " · " + readable(rows[i]["seconds"]["median"].get<double>()) + " s";
+        size += " · " + readable(rows[i]["seconds"]["median"].get<double>()) + " s";
+      std::vector<std::string> captions = {size};
       if (rows[i].contains("report") && rows[i]["report"].contains("from_reference"))
-        figures += " · rms " +
-                   readable(rows[i]["report"]["from_reference"]["rms"].get<double>() / voxel_size_) +
-                   " voxel";
-      sheet.pictures.push_back(
-          {rows[i]["variant"]["label"], {figures, rows[i]["promise_verdict"]}, [this, i] {
-             RunContext child = child_context(context_, false);
-             const auto& file = cells_[i].mesh_file;
-             return file.empty() ? PolygonMesh{} : read_mesh(file, child);
-           }});
+        captions.push_back("rms from input " +
+                           readable(rows[i]["report"]["from_reference"]["rms"].get<double>() / voxel_size_) +
+                           " voxel");
+      captions.push_back(rows[i]["promise_verdict"]);
+      sheet.pictures.push_back({rows[i]["variant"]["label"], captions, [this, i] {
+                                  RunContext child = child_context(context_, false);
+                                  const auto& file = cells_[i].mesh_file;
+                                  return file.empty() ? PolygonMesh{} : read_mesh(file, child);
+                                }});
     }
     render_sheet(in_.out / (name_ + ".png"), std::move(sheet), context_);
   }
