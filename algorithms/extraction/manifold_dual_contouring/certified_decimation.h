@@ -24,9 +24,14 @@ struct CertifiedMesh {
   std::vector<std::uint32_t> fine_triangle;  ///< by triangle: one of the fine mesh, all of whose corners went into its corners
 };
 
-/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into another;
+/// A triangle's tolerance is the least of its corners. Each place of the fine mesh is then within its
+/// triangle's tolerance of the coarse one, and each place of that within the tolerance of some fine triangle
+/// from this, which where tolerances differ need not be the nearest.
+/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into
+/// another;
 ///   others may go into them.
-/// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge its ends must be
+/// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge
+/// its ends must be
 ///   such; so a complex of patches keeps their rims.
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);

@@ -85,7 +85,9 @@ class EdgeCollapses {
   void try_edge(std::uint32_t u, std::uint32_t v) {
     if (!mesh_.vertices[u].free) std::swap(u, v);  // u goes, v stays
     if (!keeps_topology(u, v)) return;
-    if (try_at(u, v, collapses_.rounded(target(u, v).x)) || !mesh_.vertices[v].free) return;
+    // To round once more what may not move could move it.
+    const bool free = mesh_.vertices[v].free;
+    if (try_at(u, v, free ? collapses_.rounded(target(u, v).x) : mesh_.vertices[v].point) || !free) return;
     // Where the best place will not do, one end may.
     const Vector3d &at_u = mesh_.vertices[u].point, &at_v = mesh_.vertices[v].point;
     const WideQuadric q = collapses_.quadric_about(u, v, at_v);

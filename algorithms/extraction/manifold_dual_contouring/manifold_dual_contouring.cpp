@@ -1,5 +1,6 @@
 #include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -51,7 +52,9 @@ class FieldAtPoints {
   FieldAtPoints(const AdaptivityField* field, const IndexToWorld& placement)
       : evaluator_(field, placement), base_(placement.base) {}
 
-  bool is_constant() const { return !evaluator_.simplifies_outside() && !evaluator_.has_scale(); }
+  bool is_constant() const {
+    return !evaluator_.simplifies_outside() && !evaluator_.leaves_out_outside() && !evaluator_.has_scale();
+  }
   bool leaves_out(const Eigen::Vector3d& p) const {
     return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
   }
@@ -59,6 +62,8 @@ class FieldAtPoints {
     const Cell cell = cell_at(p);
     if (evaluator_.simplifies_outside() && !in_mask(cell))
       return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
+    // What is left out in the end must not have become part of what is not.
+    if (evaluator_.leaves_out_outside() && !in_mask(cell)) return 0;
     if (!evaluator_.has_scale()) return static_cast<float>(tolerance);
     std::array<float, 512> scales;
     evaluator_.scales(cell.lower, cell.mask, scales);
@@ -171,6 +176,9 @@ Polygons within(const FieldAtPoints& field, Polygons all) {
   return result;
 }
 
+/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes.
+double longest_step(const IndexToWorld& placement) { return placement.linear.operatorNorm(); }
+
 }  // namespace
 
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
@@ -186,21 +194,22 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   ManifoldDualContouringOptions options;
   options.uniform = read_dual_contouring_options(input.options);
   options.tolerance = input.options.number("tolerance");
-  if (const double world = input.options.number("tolerance_world"); world > 0)
-    options.tolerance = world / input.level_set.voxel_size();
   options.flatness = input.options.number("flatness");
   options.largest_cube = input.options.is("largest_cube", "8")   ? 8
                          : input.options.is("largest_cube", "4") ? 4
                                                                  : 2;
   if (input.options.is("merging", "regions")) options.merging = ManifoldDualContouringOptions::Merging::regions;
+  const double world = input.options.number("tolerance_world");
+  const auto contoured = [&](const HermiteView& grid) {
+    if (world > 0) options.tolerance = world / longest_step(grid.placement());
+    return manifold_dual_contouring(grid, options, input.field, input.context);
+  };
   if (const std::optional<PackedHermite> packed = packed_hermite_input(input, "manifold-dual-contouring"))
-    return with_normal_code(packed->normal_code, [&](auto code) {
-      return manifold_dual_contouring(view_of(*packed, code, input.context), options, input.field,
-                                      input.context);
-    });
+    return with_normal_code(packed->normal_code,
+                            [&](auto code) { return contoured(view_of(*packed, code, input.context)); });
   const bool needs_normals = options.uniform.placement == DualContouringOptions::Placement::optimal;
   const FloatHermite hermite = hermite_input(input, "manifold-dual-contouring", needs_normals);
-  return manifold_dual_contouring(view_of(hermite, input.context), options, input.field, input.context);
+  return contoured(view_of(hermite, input.context));
 }
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {

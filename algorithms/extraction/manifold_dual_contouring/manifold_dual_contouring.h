@@ -27,10 +27,12 @@ struct ManifoldDualContouringOptions {
 /// hold there, too.
 inline constexpr double kSimplifiedTolerance = 8.0;
 
-/// Uniform mesh (uniform_mesh.h), then merges of its points, of which those stay that are proved to keep the topology, the
-/// freedom from self-intersection and the bound (certified_decimation.h). The same bytes for every number of threads.
-/// @param field scales the tolerance by the place of the uniform mesh's points, may be null. Where it asks for no mesh
-/// outside of its mask, triangles whose middle lies outside are left out, and the mesh is open there.
+/// Uniform mesh (uniform_mesh.h), then merges of its points, of which those stay that are proved to keep the
+/// topology, the freedom from self-intersection and the bound (certified_decimation.h). The same bytes for
+/// every number of threads.
+/// @param field scales the tolerance by the place of the uniform mesh's points, may be null. Where it asks
+/// for no mesh outside of its mask, triangles whose middle lies outside are left out, and the mesh is open
+/// there; points outside are not merged, so that nothing that reaches far in is lost with them.
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
@@ -242,6 +243,62 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
       EXPECT_LT((middle - Vector3d(0, 0, kRadius)).norm(), 12.0 + std::sqrt(3.0));  // its cell's middle is inside
     }
   }
+}
+
+/// A flat face becomes two triangles, and the middles of both may be far from a mask that shows some of it.
+TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
+  initialize_openvdb();
+  RunContext context;
+  const AnalyticSurface box = {.value = [](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - 20.4; },
+                               .gradient =
+                                   [](const Vector3d& p) {
+                                     int axis;
+                                     p.cwiseAbs().maxCoeff(&axis);
+                                     return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
+                                   }};
+  const FloatHermite hermite =
+      sample_function(box, IndexToWorld(), {-24, -24, -24}, {24, 24, 24}, 1e-9, context);
+  constexpr float kMask = 8.0f;
+  AdaptivityField field;
+  field.outside = AdaptivityField::Outside::nothing;
+  field.mask = make_level_set(
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(kMask, openvdb::Vec3f(20.4f, 10, 10), 0.5f));
+  using Merging = ManifoldDualContouringOptions::Merging;
+  for (const Merging merging : {Merging::collapses, Merging::regions})
+    for (const double tolerance : {0.5, 4.0}) {
+      ManifoldDualContouringOptions options{.tolerance = tolerance, .uniform = {}};
+      options.merging = merging;
+      const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), options, &field, context);
+      double area = 0;
+      for (const Triangle& t : triangulated(mesh))
+        area += 0.5 * (mesh.world(t[1]) - mesh.world(t[0])).cross(mesh.world(t[2]) - mesh.world(t[0])).norm();
+      // The disc, but for a cell along its rim.
+      EXPECT_GT(area, std::numbers::pi * (kMask - 1) * (kMask - 1)) << int(merging) << ' ' << tolerance;
+      EXPECT_LT(area, std::numbers::pi * (kMask + 1) * (kMask + 1)) << int(merging) << ' ' << tolerance;
+      EXPECT_LT(mesh.triangle_count(), 220u);  // of some 400
+    }
+}
+
+/// Of a sphere in voxels of 1 × 1 × 2: half a voxel is one unit of the world along z, and less elsewhere.
+TEST(ManifoldDualContouring, ToleranceInTheWorldHoldsAlongTheLongestSideOfAVoxel) {
+  initialize_openvdb();
+  const auto grid = openvdb::FloatGrid::create(3.0f);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
+  grid->transform().preScale({1, 1, 2});
+  auto access = grid->getAccessor();
+  for (int x = -14; x <= 14; ++x)
+    for (int y = -14; y <= 14; ++y)
+      for (int z = -8; z <= 8; ++z)
+        access.setValue({x, y, z}, float(std::sqrt(double(x * x + y * y + 4 * z * z)) - 10.3));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  RunContext context;
+  const LevelSet level_set = make_level_set(grid);
+  const auto contoured = [&](const char* option, const char* value) {
+    const Options options("manifold-dual-contouring", manifold_dual_contouring_options(), {{option, value}});
+    return manifold_dual_contouring({.level_set = level_set, .options = options, .context = context});
+  };
+  EXPECT_TRUE(contoured("tolerance_world", "1") == contoured("tolerance", "0.5"));
+  EXPECT_FALSE(contoured("tolerance_world", "1") == contoured("tolerance", "1"));
 }
 
 /// Share of the cells that are held to their segments, of the last mesh made with the context.

@@ -43,9 +43,11 @@ bool passes_over(const Place& from, const Place& to) {
   return begin < end;
 }
 
-/// Whether the part over the triangle has some area. Seen along the triangle's normal, two of the distances beyond its sides
-/// are coordinates.
-bool TriangleOverlay::overlaps(const std::array<Place, 3>& places) {
+/// Whether the part over the triangle has some area, more than kNarrow from the sides: a part within that
+/// would have no side that passes_over(), and all else would be taken for covered. Seen along the triangle's
+/// normal, two of the distances beyond its sides are coordinates.
+bool TriangleOverlay::overlaps(std::array<Place, 3> places) {
+  for (Place& place : places) place.head<3>().array() += kNarrow;
   const ClippedTriangle part(places);
   double twice_area = 0;
   for (int i = 1; i + 1 < part.size; ++i) {

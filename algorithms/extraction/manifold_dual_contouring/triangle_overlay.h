@@ -112,7 +112,7 @@ class TriangleOverlay {
   }
 
  private:
-  static bool overlaps(const std::array<OverTriangle::Place, 3>& places);
+  static bool overlaps(std::array<OverTriangle::Place, 3> places);
   static bool is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
                                       const std::array<OverTriangle::Place, 3>& places, double within);
 

@@ -63,6 +63,9 @@ TEST(TriangleOverlay, SaysNoWhereTheFirstFaceLiesElsewhere) {
   EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(10, 0, 0), Vector3d(0, 10, 0)},
                        one({0, 0, 0}, {-5, 1, 0}, {1, -5, 0}), 0, 0.01))
       << "a corner in common";
+  EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(4, 0, 0), Vector3d(2, 3, 0)},
+                       one({1, 5e-10, 0}, {2, -1, 0}, {3, 5e-10, 0}), 0, 0.01))
+      << "a part too narrow to lead on to the others";
   // A fan whose steep sector lies below the triangle; the first face is the sector on the other side.
   const FineMesh fan({{0, 0, 0}, {-5, 1, 0}, {1, -5, 0}, {3, 3, -6}}, {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}});
   EXPECT_FALSE(is_near({Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0.7, 0.7, 0)}, fan, 0, 0.1));
