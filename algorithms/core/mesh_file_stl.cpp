@@ -65,6 +65,8 @@ class StlReader {
         add_corner(point);
       } else if (is(keyword, "endloop")) {
         end_polygon();
+      } else if (!corners_.empty() && !ended) {
+        cursor.fail("a facet that does not end in 'endloop'");
       } else if (is(keyword, "solid") || is(keyword, "facet") || is(keyword, "outer") || ended) {
         cursor.rest_of_line();  // a name, or a normal, which is not used
       } else if (!is(keyword, "endfacet")) {

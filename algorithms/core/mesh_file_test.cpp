@@ -424,6 +424,12 @@ TEST_F(MeshFileTest, RefusesAMeshWithoutPolygons) {
   EXPECT_EQ(error_of("a.obj", "v 0 0 0\nv 1 0 0\n"), "'a.obj': it holds no polygon");
   EXPECT_EQ(error_of("a.off", "OFF 1 0 0\n0 0 0\n"), "'a.off': it holds no polygon");
   EXPECT_EQ(error_of("a.stl", "solid nothing\nendsolid\n"), "'a.stl': it holds no polygon");
+  EXPECT_NE(
+      error_of("a.stl",
+               "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet\n"
+               "facet\nouter loop\nvertex 0 0 1\nvertex 1 0 1\nvertex 0 1 1\nendloop\nendfacet\nendsolid\n")
+          .find("does not end in 'endloop'"),
+      std::string::npos);
   EXPECT_EQ(error_of("a.ply",
                      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                      "property float z\nend_header\n0 0 0\n"),

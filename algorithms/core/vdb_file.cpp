@@ -43,7 +43,8 @@ std::string chosen_grid(openvdb::io::File& file, const fs::path& path) {
   if (grids == 0) throw Error(path.string() + " holds no grid");
   if (scalar.size() == 1) return scalar[0];
   if (grids == 1) return *file.beginName();  // its type is the reader's complaint
-  throw Error(path.string() + " holds several grids (" + grid_names(file) + "); choose one with --grid");
+  throw Error(path.string() + " holds several grids (" + grid_names(file) +
+              "); choose one with --grid, or keep a mask or a tolerance in a file of its own");
 }
 
 void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {

@@ -54,6 +54,11 @@ class Solid {
     return least;
   }
 
+  /// The shorter side of the near plane.
+  double near_side() const {
+    return std::min((corners_[1] - corners_[0]).norm(), (corners_[2] - corners_[0]).norm());
+  }
+
   Eigen::AlignedBox3d box() const {
     Eigen::AlignedBox3d box;
     for (const Vector3d& corner : corners_) box.extend(corner);
@@ -132,6 +137,16 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   const Solid solid(frustum);
   const Eigen::AlignedBox3d box = solid.box();
   const double voxel = box.sizes().maxCoeff() / resolution, band = 3.0 * voxel;
+  constexpr double kLeastVoxel = 1.5e-5;  // OpenVDB takes no transform whose determinant is below 3e-15
+  if (!(voxel > kLeastVoxel))
+    throw Error("the frustum is too small for a mask of " + std::to_string(resolution) +
+                " voxels along it; use larger units, or fewer voxels");
+  constexpr double kNarrow = 2.0;  // voxels between whose samples nothing of the frustum may be seen
+  if (solid.near_side() < kNarrow * voxel)
+    context.note(
+        "the frustum's near end is narrower than two voxels of its mask, which may lose it there; take "
+        "planes "
+        "nearer to what is seen, or more voxels");
   std::array<int, 3> first, count;
   for (int a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));

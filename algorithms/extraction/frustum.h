@@ -23,9 +23,9 @@ struct Frustum {
 /// an angle not between 0 and 180, an aspect not above 0, or planes that are not 0 < near < far.
 double signed_distance(const Frustum& frustum, const Eigen::Vector3d& point);
 
-/// Level set of the frustum with a band of three voxels, `resolution` voxels (8 to 4096) along the longest side of its
-/// box.
-/// @throws Error as above.
+/// Level set of the frustum with a band of three voxels, `resolution` voxels (8 to 4096) along the longest
+/// side of its box. A note says so where the near end is so narrow that the samples may miss it.
+/// @throws Error as above, or if the voxels would be smaller than OpenVDB takes.
 LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& context);
 
 }  // namespace hermesh

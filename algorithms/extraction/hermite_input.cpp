@@ -9,17 +9,15 @@ namespace {
 
 bool wants_polygons(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
-  return source == "exact" || (source == "auto" && input.source);
+  return source == "exact" || (source == "auto" && input.source && input.isovalue == 0.0);
 }
 
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
-  if (!input.source)
-    throw Error(variant +
-                " was asked for exact Hermite data, which needs the polygons; use 'remesh', or "
-                "-o hermite=level-set");
+  const PolygonMesh& source =
+      polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
-  FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, *input.source, input.context, &sampling);
+  FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, source, input.context, &sampling);
   const std::size_t missed = sampling.nearest + sampling.fallback;
   if (missed > 0)
     input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
@@ -35,6 +33,16 @@ std::vector<std::string> normal_code_names() {
 }
 
 }  // namespace
+
+const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std::string& asked,
+                                        const std::string& instead) {
+  if (!input.source) throw Error(asked + ", which need the polygons; use 'remesh', or " + instead);
+  if (input.isovalue != 0.0)
+    throw Error(asked +
+                ", but the polygons lie at the isovalue 0 and not where it is asked to contour; use " +
+                instead);
+  return *input.source;
+}
 
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant) {
   if (parse_representation(input.options.text("representation")) != Representation::sparse)

@@ -13,14 +13,21 @@ namespace hermesh {
 /// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
 std::vector<OptionSpec> hermite_options();
 
+/// The polygons, where a variant `asked` for what only they have; `instead` is the option to do without.
+/// @throws Error if they are not there, or if they do not lie at the isovalue, which is so only at 0.
+const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std::string& asked,
+                                        const std::string& instead);
+
 /// With the representation 'sparse': sampled as those options say, and never there as floats if from a level
 /// set. Its figures go to the run's context. None with another representation.
-/// @throws Error for exact data where there are no polygons.
+/// @throws Error for exact data where there are no polygons at the isovalue.
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Samples as those options say and passes the data through the representation; its figures go to the run's context,
-/// and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the sentences.
-/// @throws Error for exact data where there are no polygons, and where `needs_normals` but the representation has none.
+/// Samples as those options say and passes the data through the representation; its figures go to the run's
+/// context, and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the
+/// sentences.
+/// @throws Error for exact data where there are no polygons at the isovalue, and where `needs_normals` but
+/// the representation has none.
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);
 
 /// True where those options ask for the level set's own crossings as they are computed, so that an extractor may take

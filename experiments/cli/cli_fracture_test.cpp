@@ -77,6 +77,13 @@ TEST_F(FractureTest, MeshesCutInPlace) {
   EXPECT_EQ(json.at("pieces")[0].at("name"), "taken by sphere.off");
 }
 
+TEST_F(FractureTest, NumbersMustBeFinite) {
+  write_cube();
+  for (const char* option : {"--roughness", "--mesh-scale", "--impact-radius"})
+    EXPECT_EQ(fracture({"--cutters", "chunks:4", "--no-picture", option, "nan"}).exit_code, 2) << option;
+  EXPECT_EQ(fracture({"--cutters", "chunks:4", "--no-picture", "--impact", "nan", "0", "0"}).exit_code, 2);
+}
+
 TEST_F(FractureTest, ACutterThatTakesNothingIsNoted) {
   write_cube();
   const Outcome outcome = fracture({"--cutters", "planes:0,0,1,0.5;1,0,0,7", "--no-picture"});

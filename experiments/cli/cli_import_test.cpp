@@ -94,6 +94,8 @@ TEST_F(ImportTest, BadInputIsRefusedInASentence) {
   expect_refusal(2, {"import", "a.nii", "out.vdb", "--dims", "1,2,3", "--type", "int7"}, {"int7", "float64"});
   expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "100000,100000,100000", "--type", "int8"}, {"a.nii", "too short"});
   expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "2,2,2", "--type", "int8"}, {"a.nii", "goes on"});
+  expect_refusal(2, {"import", "nan.nii", "out.vdb", "--replace-nan", "1e39"},
+                 {"--replace-nan", "single precision"});
   const Outcome replaced = run({"import", "nan.nii", "nan.vdb", "--replace-nan", "-5"});
   EXPECT_EQ(replaced.exit_code, 0) << replaced.err;
   EXPECT_NE(replaced.err.find("replaced"), std::string::npos);
@@ -136,6 +138,7 @@ TEST_F(ImportTest, AttributesOfTheVolumeReachTheMesh) {
   ASSERT_EQ(run({"extract", "t.vdb", "one.ply", "--attributes", "colour"}).exit_code, 0);
   EXPECT_EQ(read_mesh_file(path("one.ply"), context, {.attributes = true}).attributes.size(), 1u);
   expect_refusal(1, {"extract", "t.vdb", "out.ply", "--attributes", "warmth"}, {"warmth", "colour"});
+  expect_refusal(2, {"extract", "t.vdb", "out.obj", "--attributes", "all"}, {"out.obj", "only .ply"});
 }
 
 }  // namespace

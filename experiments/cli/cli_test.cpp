@@ -137,6 +137,24 @@ TEST_F(CliTest, BandsAndIsovalueTakeEffect) {
   EXPECT_NEAR(volume("-0.2") / volume("0"), 0.512, 0.02);
 }
 
+/// The polygons, which remesh has at hand, lie at the isovalue 0.
+TEST_F(CliTest, RemeshesAtOtherIsovalues) {
+  write_sphere();
+  const auto volume = [&](const std::string& isovalue) {
+    EXPECT_EQ(
+        run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.1", "--isovalue", isovalue}).exit_code, 0);
+    return Json::parse(run({"validate", "out.ply", "--json"}).out).at("volume").get<double>();
+  };
+  EXPECT_NEAR(volume("0.05") / volume("0"), 1.158, 0.005);
+  for (const auto& [extractor, option] :
+       {std::pair("dual-contouring", "hermite=exact"), std::pair("marching-cubes", "crossings=exact")}) {
+    const Outcome refused = run({"remesh", "sphere.off", "x.ply", "--voxel-size", "0.1", "--isovalue", "0.05",
+                                 "--extractor", extractor, "-o", option});
+    EXPECT_EQ(refused.exit_code, 1) << extractor;
+    EXPECT_NE(refused.err.find("isovalue 0"), std::string::npos) << refused.err;
+  }
+}
+
 TEST_F(CliTest, EveryExtractorRuns) {
   write_sphere();
   const Json list = Json::parse(run({"list", "--json"}).out);

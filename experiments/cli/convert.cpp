@@ -112,6 +112,7 @@ void save(const std::string& path, const PolygonMesh& mesh, Session& session) {
 int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& session) {
   const ChosenExtractor chosen = choose_extractor(arguments);
   check_mesh_output(paths.out);
+  if (!arguments.attributes.empty()) check_keeps_attributes(paths.out);
   std::optional<PolygonMesh> source;
   if (!arguments.source.empty()) source = read_polygons(arguments.source, session);
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);

@@ -140,17 +140,18 @@ void add_cutter_options(CLI::App& command, Arguments& arguments) {
       .add_option(
           "--roughness", arguments.choices.roughness,
           "How far the walls of chunks are displaced, as a part of the distance of seeds (default: 0.12)")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(finite_number() & CLI::Range(0.0, 1.0));
   command.add_option("--impact", arguments.impact, "X Y Z: scatter densest about this point (world units)")
-      ->expected(3);
+      ->expected(3)
+      ->check(finite_number());
   command
       .add_option(
           "--impact-radius", arguments.choices.impact_radius,
           "Where the density about the impact has halved (world units; default: a quarter of the object)")
-      ->check(CLI::PositiveNumber);
+      ->check(finite_number() & CLI::PositiveNumber);
   command.add_option("--density", arguments.density, "A .vdb: scatter in proportion to its values");
   command.add_option("--mesh-scale", arguments.choices.mesh_scale, "Of scattered meshes (default: 1)")
-      ->check(CLI::PositiveNumber);
+      ->check(finite_number() & CLI::PositiveNumber);
 }
 
 }  // namespace

@@ -65,7 +65,11 @@ void check_nifti(const Arguments& arguments) {
 
 int run_import(const Arguments& arguments, Session& session) {
   ImportOptions options{.replacement = {}, .frame = arguments.frame};
-  if (arguments.replacement) options.replacement = static_cast<float>(*arguments.replacement);
+  if (arguments.replacement) {
+    options.replacement = static_cast<float>(*arguments.replacement);
+    if (!std::isfinite(*options.replacement))
+      throw UsageError("--replace-nan takes a value of single precision, at most 3.4e38 in magnitude");
+  }
   std::optional<RawLayout> layout;
   if (arguments.dims)
     layout = raw_layout(arguments, session);

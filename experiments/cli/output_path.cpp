@@ -7,6 +7,7 @@
 #include "algorithms/core/atomic_file.h"
 #include "algorithms/core/error.h"
 #include "algorithms/core/mesh_file.h"
+#include "experiments/cli/session.h"
 
 namespace hermesh::cli {
 namespace {
@@ -25,6 +26,11 @@ void check_mesh_output(const std::filesystem::path& path) {
     throw Error("cannot write a mesh to '" + path.string() +
                 "': its name must end in .ply, .obj, .off or .stl");
   check_writable(path);
+}
+
+void check_keeps_attributes(const std::filesystem::path& path) {
+  if (lower_case_extension(path) != ".ply")
+    throw UsageError("'" + path.string() + "' would lose the attributes: only .ply keeps them");
 }
 
 void check_volume_output(const std::filesystem::path& path) {

@@ -9,6 +9,9 @@ namespace hermesh::cli {
 /// throws.
 void check_mesh_output(const std::filesystem::path& path);
 
+/// @throws UsageError if meshes lose the attributes of their points in files of that kind: all but .ply.
+void check_keeps_attributes(const std::filesystem::path& path);
+
 /// @throws Error if the path does not end in .vdb, or check_writable() throws.
 void check_volume_output(const std::filesystem::path& path);
 

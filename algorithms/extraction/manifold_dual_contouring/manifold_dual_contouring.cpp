@@ -55,6 +55,7 @@ class FieldAtPoints {
   bool is_constant() const {
     return !evaluator_.simplifies_outside() && !evaluator_.leaves_out_outside() && !evaluator_.has_scale();
   }
+  bool simplifies() const { return evaluator_.simplifies_outside(); }
   bool leaves_out(const Eigen::Vector3d& p) const {
     return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
   }
@@ -150,10 +151,11 @@ Polygons polygons_of(const HermiteView& grid, ManifoldDualContouringOptions opti
                      const FilePoints& file, RunContext& context) {
   const bool regions = options.merging == ManifoldDualContouringOptions::Merging::regions;
   if (regions) options.uniform.reach = 0;
-  if (regions && options.tolerance > 0) return by_regions(grid, options, field, file, context);
+  const bool merges = options.tolerance > 0 || field.simplifies();
+  if (regions && merges) return by_regions(grid, options, field, file, context);
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
   report(uniform.counts, context);
-  if (uniform.points.empty() || options.tolerance <= 0) return as_they_are(std::move(uniform));
+  if (uniform.points.empty() || !merges) return as_they_are(std::move(uniform));
   return by_collapses(std::move(uniform), field, options.tolerance, file, context);
 }
 

@@ -234,6 +234,7 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
   const std::size_t everywhere = contour(hermite, 0.05, &field).points.size();
   field.outside = AdaptivityField::Outside::simplify;
   EXPECT_LT(contour(hermite, 0.05, &field).points.size(), 3 * everywhere / 4);
+  EXPECT_LT(contour(hermite, 0, &field).points.size(), 3 * contour(hermite, 0).points.size() / 4);
   field.outside = AdaptivityField::Outside::nothing;
   for (const double tolerance : {0.0, 0.05}) {
     const PolygonMesh part = contour(hermite, tolerance, &field);

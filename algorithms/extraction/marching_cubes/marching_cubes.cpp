@@ -5,6 +5,7 @@
 
 #include "algorithms/core/blocks.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
 #include "algorithms/hermite/representation.h"
 #include "algorithms/hermite/samplers.h"
@@ -85,12 +86,11 @@ void write_triangles(const BlockGrid& grid, std::int32_t index, const std::vecto
 /// interpolated.
 std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
   if (input.options.text("crossings") == "samples") return std::nullopt;
-  if (!input.source)
-    throw Error(
-        "marching-cubes was asked for exact crossings, which need the polygons; use 'remesh', or -o crossings=samples");
+  const PolygonMesh& source =
+      polygons_at_isovalue(input, "marching-cubes was asked for exact crossings", "-o crossings=samples");
   Represented data =
       through(Representation::directed, NormalCodeId::octahedral,
-              sample_polygons(input.level_set, input.isovalue, *input.source, input.context), input.context);
+              sample_polygons(input.level_set, input.isovalue, source, input.context), input.context);
   report_figures(data, input.level_set, input.context);
   return std::move(data.hermite);
 }
