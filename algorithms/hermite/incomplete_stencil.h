@@ -21,13 +21,15 @@ struct SampledVolume {
   float data_below;  ///< samples of no less than this magnitude are no data
 };
 
-/// Of a level set all but the band has the background's magnitude, and nothing else is asked; of any other volume the
-/// active samples are data.
+/// Near the surface at 0 of a level set all that is no data has the background's magnitude, and nothing else
+/// is asked. At other isovalues the band may be wider on that side than the background tells, and a
+/// background of 0 tells nothing; there, and in any other volume, the active samples are data.
 inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
-  const bool is_level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
-  return {table, !is_level_set,
-          is_level_set ? std::fabs(grid.background()) : std::numeric_limits<float>::max()};
+  const float background = std::fabs(grid.background());
+  if (grid.getGridClass() == openvdb::GRID_LEVEL_SET && table.rule().isovalue == 0.0f && background > 0.0f)
+    return {table, false, background};
+  return {table, true, std::numeric_limits<float>::max()};
 }
 
 /// One edge whose stencil has samples that are no data: differences to one side, or none.

@@ -102,6 +102,34 @@ TEST_F(LevelSetSamplerTest, AnIsovalueInsideTheBand) {
       1.25, 5000);
 }
 
+/// The band goes on where the background, or what is beyond it, ends: six voxels inside of a surface and
+/// three outside, and all of a volume over a background of 0.
+TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
+  const Vector3d centre(0.2, 0.1, 0.7);
+  for (const auto& [background, isovalue] : {std::pair(3.0f, -4.0), std::pair(0.0f, 0.0)}) {
+    const auto grid = openvdb::FloatGrid::create(background);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (int x = -19; x <= 19; ++x)
+      for (int y = -19; y <= 19; ++y)
+        for (int z = -19; z <= 19; ++z)
+          grid->tree().setValueOn(Coord(x, y, z),
+                                  std::min(3.0f, float((Vector3d(x, y, z) - centre).norm() - 14.0)));
+    RunContext context;
+    const FloatHermite hermite = sample_level_set(make_level_set(grid), isovalue, context);
+    std::size_t crossings = 0;
+    for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
+      for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+        const auto& lower = hermite.leaves[leaf].lower;
+        Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
+        place[axis] += crossing.offset;
+        const Vector3d normal(crossing.normal[0], crossing.normal[1], crossing.normal[2]);
+        ++crossings;
+        ASSERT_GT(normal.dot((place - centre).normalized()), 0.999) << background;
+      });
+    EXPECT_GT(crossings, 1500u);
+  }
+}
+
 TEST_F(LevelSetSamplerTest, ScatteredActiveSamplesOfAVolumeThatIsNoLevelSet) {
   // White noise, a third of it not active, over a background on either side of the isovalue.
   for (const float background : {-1.0f, 1.0f})
