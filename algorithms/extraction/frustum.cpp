@@ -144,9 +144,8 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   constexpr double kNarrow = 2.0;  // voxels between whose samples nothing of the frustum may be seen
   if (solid.near_side() < kNarrow * voxel)
     context.note(
-        "the frustum's near end is narrower than two voxels of its mask, which may lose it there; take "
-        "planes "
-        "nearer to what is seen, or more voxels");
+        "the frustum's near end is narrower than two voxels of its mask, which may lose it there; "
+        "take planes nearer to what is seen, or more voxels");
   std::array<int, 3> first, count;
   for (int a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));

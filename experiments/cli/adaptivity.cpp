@@ -83,9 +83,8 @@ void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments) {
   group
       ->add_option("--outside", arguments.outside,
                    "Outside the mask 'simplify' (the default) merges as far as the topology allows "
-                   "(manifold-dual-contouring: up to "
-                   "8 voxels), 'nothing' makes no polygons, so that the mesh is open, and 'everywhere' keeps "
-                   "the bound there, too")
+                   "(manifold-dual-contouring: up to 8 voxels), 'nothing' makes no polygons, so that the "
+                   "mesh is open, and 'everywhere' keeps the bound there, too")
       ->check(CLI::IsMember({"everywhere", "simplify", "nothing"}));
   group->add_option("--tolerance-grid", arguments.tolerance_grid,
                     "A .vdb whose values, none of them negative, scale the extractor's bound; beyond its data the "

@@ -25,14 +25,12 @@ struct CertifiedMesh {
 };
 
 /// A triangle's tolerance is the least of its corners. Each place of the fine mesh is then within its
-/// triangle's tolerance of the coarse one, and each place of that within the tolerance of some fine triangle
-/// from this, which where tolerances differ need not be the nearest.
+/// triangle's tolerance of the coarse one, and for each place of the coarse one there is a fine triangle
+/// within its own tolerance, which where tolerances differ need not be the nearest.
 /// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into
-/// another;
-///   others may go into them.
+///   another; others may go into them.
 /// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge
-/// its ends must be
-///   such; so a complex of patches keeps their rims.
+///   its ends must be such; so a complex of patches keeps their rims.
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);
 
