@@ -212,5 +212,28 @@ TEST(PieceAttributes, OriginalPolygonsTakeThoseOfTheSource) {
   EXPECT_NEAR(height[2], 3.0f, 1e-6);
 }
 
+/// A PLY has them at its points; the pieces have them at corners, where seams need others.
+TEST(PieceAttributes, TextureCoordinatesOfPointsGoIntoTheCorners) {
+  PolygonMesh source = cuboid({0, 0, 0}, {4, 4, 4});
+  std::vector<float> uv;
+  for (const Eigen::Vector3f& p : source.points) uv.insert(uv.end(), {0.25f * p.y(), 0.25f * p.z()});
+  source.attributes = {{"uv", AttributeDomain::point, 2, uv, {}}};
+  PolygonMesh piece;
+  piece.points = {{4, 1, 0.5f}, {4, 3, 1}, {4, 3, 2}, {2, 2, 2}};  // within one half of a face
+  piece.triangles = {{0, 1, 2}, {0, 2, 3}};
+  for (const char* name : {"surface", "neighbour"})
+    piece.attributes.push_back({name, AttributeDomain::polygon, 1, std::vector<std::int32_t>{0, 1}, {}});
+  add_cut_uv(piece, [](std::int32_t) { return Vector3d(1, 0, 0); });
+  const std::vector<float> cut = std::get<0>(piece.attributes.back().values);
+  RunContext context;
+  SourceAttributes(source, 1.0).add_to(piece, context);
+  ASSERT_EQ(piece.attributes.size(), 3u);
+  const auto& found = std::get<0>(piece.attributes.back().values);
+  ASSERT_EQ(found.size(), 12u);
+  const float expected[] = {0.25f, 0.125f, 0.75f, 0.25f, 0.75f, 0.5f};
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(found[i], expected[i], 1e-6) << i;
+  for (std::size_t i = 6; i < 12; ++i) EXPECT_EQ(found[i], cut[i]) << i;
+}
+
 }  // namespace
 }  // namespace hermesh

@@ -128,8 +128,10 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
   for (const MeshAttribute& attribute : source_.attributes) {
     const auto same = [&](const MeshAttribute& a) { return a.name == attribute.name; };
     const auto there = std::find_if(piece.attributes.begin(), piece.attributes.end(), same);
-    const bool uv_of_corners = attribute.name == "uv" && attribute.domain == AttributeDomain::corner;
-    if (there != piece.attributes.end() && !uv_of_corners) continue;
+    // Those of points go into the corners, too, where seams need values of their own.
+    const bool fills_uv = attribute.name == "uv" && attribute.domain != AttributeDomain::polygon &&
+                          attribute.components == 2 && attribute.values.index() == 0;
+    if (there != piece.attributes.end() && !fills_uv) continue;
     from.push_back(&attribute);
     to.push_back(static_cast<std::size_t>(there - piece.attributes.begin()));
     if (there == piece.attributes.end())
@@ -146,7 +148,7 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
     const std::uint32_t t = tree_->nearest(at);
     const Triangle& corners = tree_->triangles[t];
     for (std::size_t a = 0; a < from.size(); ++a)
-      if (from[a]->domain == AttributeDomain::point)
+      if (piece.attributes[to[a]].domain == AttributeDomain::point)
         take(*from[a], {corners[0], corners[1], corners[2]}, tree_->weights(t, at), piece.attributes[to[a]],
              p);
   });
@@ -156,12 +158,17 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
     const std::uint32_t t = tree_->nearest((local(own[0]) + local(own[1]) + local(own[2])) / 3.0);
     for (std::size_t a = 0; a < from.size(); ++a) {
       MeshAttribute& target = piece.attributes[to[a]];
-      if (from[a]->domain == AttributeDomain::polygon)
+      if (target.domain == AttributeDomain::polygon)
         take(*from[a], {polygon_of(t), polygon_of(t), polygon_of(t)}, Vector3d(1, 0, 0), target, i);
-      if (from[a]->domain == AttributeDomain::corner)
+      if (target.domain == AttributeDomain::corner) {
+        const Triangle& corners = tree_->triangles[t];
+        const std::array<std::size_t, 3> sources =
+            from[a]->domain == AttributeDomain::corner
+                ? std::array<std::size_t, 3>{corner_of(t, 0), corner_of(t, 1), corner_of(t, 2)}
+                : std::array<std::size_t, 3>{corners[0], corners[1], corners[2]};
         for (std::size_t c = 0; c < 3; ++c)
-          take(*from[a], {corner_of(t, 0), corner_of(t, 1), corner_of(t, 2)},
-               tree_->weights(t, local(own[c])), target, 3 * i + c);
+          take(*from[a], sources, tree_->weights(t, local(own[c])), target, 3 * i + c);
+      }
     }
   });
 }

@@ -27,8 +27,8 @@ void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane);
 /// polygons: those of polygons from the one nearest to the middle of the triangle, those of its corners from
 /// that one's nearest point to each corner, those of points from the polygon nearest to each point. Floats
 /// are interpolated, whole numbers taken from the nearest corner. Cut polygons and their corners get 0, whole
-/// numbers −1; points of the cuts take the nearest polygon's, as the rims must. "uv" goes into the corners
-/// that add_cut_uv() made.
+/// numbers −1; points of the cuts take the nearest polygon's, as the rims must. "uv", of corners or of
+/// points, goes into the corners that add_cut_uv() made.
 class SourceAttributes {
  public:
   /// The mesh has to outlive it. `voxel_size` in world units, as the scale of distances.
