@@ -30,23 +30,42 @@ struct KeyHash {
   }
 };
 
+/// Whether the triangles, their normals twice as long as they are large, are wound inside out: the volume is negative, that
+/// of an open mesh, which is that of the cone to it, wherever in the mesh's box the cone's apex is. (It is linear in the
+/// apex.) A flat sheet's is rounding, and says nothing.
+bool is_inside_out(const std::vector<IndexTriangle>& triangles) {
+  if (triangles.empty()) return false;
+  Eigen::AlignedBox3d box;
+  for (const IndexTriangle& t : triangles)
+    for (const Eigen::Vector3d& p : t.corner) box.extend(p);
+  const Eigen::Vector3d apex = box.center();
+  double volume = 0.0, area = 0.0;  // six times, about the apex; twice
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const IndexTriangle& t : triangles) {
+    volume += (t.corner[0] - apex).dot(t.normal);
+    sum += t.normal;
+    area += t.normal.norm();
+  }
+  constexpr double kNoVolume = 1e-6;  // of the area to the power of 1.5
+  return volume + 0.5 * sum.cwiseAbs().dot(box.sizes()) < -kNoVolume * std::pow(area, 1.5);
+}
+
 std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexToWorld& placement) {
   const Eigen::Matrix3d inverse = placement.linear.inverse();
   const Eigen::Vector3d shift = mesh.origin - placement.origin - placement.offset;
   const std::vector<Triangle> triangles = triangulated(mesh);
   std::vector<IndexTriangle> result(triangles.size());
-  double volume = 0.0;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     IndexTriangle& t = result[i];
     for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
     t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
-    volume += t.corner[0].dot(t.normal);
-    const double length = t.normal.norm();
-    if (length > 0) t.normal /= length;
   }
-  // An object wound inside out has its normals turned, so that they can tell an entry from an exit.
-  if (volume < 0)
-    for (IndexTriangle& t : result) t.normal = -t.normal;
+  // Then the normals are turned, so that they can tell an entry from an exit.
+  const double turn = is_inside_out(result) ? -1.0 : 1.0;
+  for (IndexTriangle& t : result) {
+    const double length = t.normal.norm();
+    if (length > 0) t.normal /= turn * length;
+  }
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
@@ -116,6 +117,31 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
       const Vector3d face = (at - centre).cwiseSign() / std::sqrt(3.0);
       ASSERT_GT(normal.dot(face), 1.0 - 1e-5);
     });
+  }
+}
+
+/// An open mesh's volume depends on where it is measured from, and the world's origin is no place of its own.
+TEST(PolygonSampler, AnOpenMeshFarFromTheOriginIsNotTurnedOver) {
+  initialize_openvdb();
+  for (const double far : {-500.0, 500.0}) {
+    const Vector3d centre(far + 0.31, far - 0.27, 0.13);
+    PolygonMesh open = octahedron(12.4, centre, false);
+    std::erase_if(open.triangles, [](const Triangle& t) { return std::ranges::count(t, 0u) > 0; });
+    auto grid = openvdb::FloatGrid::create(3.0f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (int x = -16; x <= 16; ++x)
+      for (int y = -16; y <= 16; ++y)
+        for (int z = -16; z <= 16; ++z) {
+          const Vector3d at(far + x, far + y, z);
+          const double d = ((at - centre).cwiseAbs().sum() - 12.4) / std::sqrt(3.0);
+          grid->tree().setValue(openvdb::Coord(int(far) + x, int(far) + y, z), static_cast<float>(d));
+        }
+    RunContext context;
+    PolygonSampling sampling;
+    const FloatHermite hermite = sample_polygons(make_level_set(grid), 0.0, open, context, &sampling);
+    EXPECT_GT(sampling.exact, hermite.crossings.size() / 3);
+    // Faces that were turned over would look inwards, so that no edge without a hit would find one that looks out.
+    EXPECT_GT(sampling.nearest, 0u) << far;
   }
 }
 
