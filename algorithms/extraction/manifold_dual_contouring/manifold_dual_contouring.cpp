@@ -56,6 +56,7 @@ class FieldAtPoints {
     return !evaluator_.simplifies_outside() && !evaluator_.leaves_out_outside() && !evaluator_.has_scale();
   }
   bool simplifies() const { return evaluator_.simplifies_outside(); }
+  bool leaves_out_outside() const { return evaluator_.leaves_out_outside(); }
   bool leaves_out(const Eigen::Vector3d& p) const {
     return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
   }
@@ -100,6 +101,9 @@ struct Polygons {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
+  /// By triangle, two of each quad after them; or empty, for none: whether it stands for polygons within the mask,
+  /// wherever its middle is.
+  std::vector<std::uint8_t> shown;
 };
 
 std::vector<float> tolerances(const std::vector<Eigen::Vector3d>& points, const FieldAtPoints& field, double tolerance,
@@ -123,8 +127,19 @@ CellTolerances cell_tolerances(const CellBlocks& cells, const FieldAtPoints& fie
   return CellTolerances(std::move(result));
 }
 
+/// @param is_shown called with the number of a triangle, which of its corners, and the corner's point
+template <class IsShown>
+std::vector<std::uint8_t> shown_by(const Polygons& polygons, IsShown&& is_shown) {
+  std::vector<std::uint8_t> result;
+  for (const Triangle& t : all_triangles(polygons.triangles, polygons.quads)) {
+    const std::size_t number = result.size();
+    result.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) || is_shown(number, 2, t[2]));
+  }
+  return result;
+}
+
 Polygons as_they_are(UniformMesh uniform) {
-  return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads)};
+  return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads), {}};
 }
 
 Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions& options, const FieldAtPoints& field,
@@ -135,7 +150,11 @@ Polygons by_regions(const HermiteView& grid, const ManifoldDualContouringOptions
   const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average;
   RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
   report(uniform.counts(), context);
-  return {std::move(merged.points), std::move(merged.triangles), std::move(merged.quads)};
+  Polygons result{std::move(merged.points), std::move(merged.triangles), std::move(merged.quads), {}};
+  if (field.leaves_out_outside())
+    // All cells of a cube have a tolerance, and so are in the mask.
+    result.shown = shown_by(result, [&](std::size_t, int, std::uint32_t point) { return merged.of_cube[point] != 0; });
+  return result;
 }
 
 Polygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
@@ -144,7 +163,14 @@ Polygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double to
                       all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})));
   const std::vector<float> asked = tolerances(fine.points(), field, tolerance, context);
   CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context);
-  return {std::move(coarse.points), std::move(coarse.triangles), {}};
+  Polygons result{std::move(coarse.points), std::move(coarse.triangles), {}, {}};
+  if (field.leaves_out_outside())
+    // What has moved was merged; what is in the mask has a tolerance.
+    result.shown = shown_by(result, [&](std::size_t t, int corner, std::uint32_t point) {
+      const std::uint32_t before = fine.triangles()[coarse.fine_triangle[t]][corner];
+      return asked[before] > 0 && result.points[point] != fine.points()[before];
+    });
+  return result;
 }
 
 Polygons polygons_of(const HermiteView& grid, ManifoldDualContouringOptions options, const FieldAtPoints& field,
@@ -159,13 +185,17 @@ Polygons polygons_of(const HermiteView& grid, ManifoldDualContouringOptions opti
   return by_collapses(std::move(uniform), field, options.tolerance, file, context);
 }
 
-/// Only the triangles that the field does not leave out, and their points.
+/// Only the triangles that the field does not leave out, and their points. A triangle of the uniform mesh is outside if its
+/// middle is; one that was merged may have its middle anywhere.
 Polygons within(const FieldAtPoints& field, Polygons all) {
   constexpr std::uint32_t kNone = 0xffffffffu;
   std::vector<std::uint32_t> number(all.points.size(), kNone);
   Polygons result;
+  std::size_t triangle = 0;
   for (Triangle t : all_triangles(std::move(all.triangles), std::move(all.quads))) {
-    if (field.leaves_out((all.points[t[0]] + all.points[t[1]] + all.points[t[2]]) / 3.0)) continue;
+    const bool shown = !all.shown.empty() && all.shown[triangle];
+    ++triangle;
+    if (!shown && field.leaves_out((all.points[t[0]] + all.points[t[1]] + all.points[t[2]]) / 3.0)) continue;
     for (std::uint32_t& p : t) {
       if (number[p] == kNone) {
         number[p] = static_cast<std::uint32_t>(result.points.size());
@@ -188,7 +218,7 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
   const FilePoints file(grid.placement());
   const FieldAtPoints at_points(field, grid.placement());
   Polygons polygons = polygons_of(grid, options, at_points, file, context);
-  if (field && field->outside == AdaptivityField::Outside::nothing) polygons = within(at_points, std::move(polygons));
+  if (at_points.leaves_out_outside()) polygons = within(at_points, std::move(polygons));
   return in_world(polygons.points, std::move(polygons.triangles), std::move(polygons.quads), file, context);
 }
 

@@ -280,6 +280,37 @@ TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
     }
 }
 
+/// A mask of just the cells that the surface passes through leaves out nothing, though merged polygons lie beside them.
+TEST(ManifoldDualContouring, MaskOfTheSurfacesOwnCellsLeavesOutNothing) {
+  initialize_openvdb();
+  const FloatHermite hermite = sphere();
+  const auto cells = openvdb::FloatGrid::create(0.0f);
+  cells->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
+  cells->transform().postTranslate(openvdb::Vec3d(0.5));  // to the cells' middles
+  for (int x = -18; x < 18; ++x)
+    for (int y = -18; y < 18; ++y)
+      for (int z = -18; z < 18; ++z) {
+        int inside = 0;
+        for (int corner = 0; corner < 8; ++corner)
+          inside += Vector3d(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)).norm() < kRadius;
+        if (inside % 8 != 0) cells->tree().setValueOn(openvdb::Coord(x, y, z), 1.0f);
+      }
+  AdaptivityField field;
+  field.outside = AdaptivityField::Outside::nothing;
+  field.mask = make_level_set(cells);
+  using Merging = ManifoldDualContouringOptions::Merging;
+  for (const Merging merging : {Merging::collapses, Merging::regions})
+    for (const double tolerance : {0.0, 0.5, 4.0}) {
+      RunContext context;
+      ManifoldDualContouringOptions options{.tolerance = tolerance, .uniform = {}};
+      options.merging = merging;
+      const auto triangles = [&](const AdaptivityField* with) {
+        return manifold_dual_contouring(view_of(hermite, context), options, with, context).triangle_count();
+      };
+      EXPECT_EQ(triangles(&field), triangles(nullptr)) << int(merging) << ' ' << tolerance;
+    }
+}
+
 /// Of a sphere in voxels of 1 × 1 × 2: half a voxel is one unit of the world along z, and less elsewhere.
 TEST(ManifoldDualContouring, ToleranceInTheWorldHoldsAlongTheLongestSideOfAVoxel) {
   initialize_openvdb();

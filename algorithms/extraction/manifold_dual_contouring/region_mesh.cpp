@@ -109,12 +109,14 @@ class RegionPolygons {
     });
     RegionMesh mesh;
     mesh.points.resize(exclusive_scan(points, "points"));
+    mesh.of_cube.resize(mesh.points.size());
     mesh.quads.resize(exclusive_scan(quads, "quads"));
     mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
     parallel_blocks(n, context, [&](std::size_t b) {
       auto at = static_cast<std::uint32_t>(points[b]);
       for_each_point(b, fine, [&](std::uint32_t name) {
         number(name) = at;
+        mesh.of_cube[at] = is_cube(name);
         mesh.points[at++] = place(name);
       });
     });

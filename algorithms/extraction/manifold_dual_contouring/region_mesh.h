@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
@@ -16,6 +17,7 @@ struct RegionMesh {
   std::vector<Eigen::Vector3d> points;  ///< as those of UniformMesh
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
+  std::vector<std::uint8_t> of_cube;  ///< by point: whether it stands for more than one cell
 };
 
 /// Closed, oriented, manifold and free of self-intersection if the uniform mesh is, and within the tolerance
