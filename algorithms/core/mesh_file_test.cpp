@@ -385,6 +385,18 @@ TEST_F(MeshFileTest, RefusesWrongNumbersAndNamesTheLine) {
   EXPECT_EQ(error_of("b.ply", ply), "'b.ply', line 6: 'quux' is no type of a PLY property");
 }
 
+TEST_F(MeshFileTest, RefusesIndicesThatAreNoWholeNumbers) {
+  const auto ply = [](float index) {
+    std::string file =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar float vertex_indices\nend_header\n";
+    for (const float x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) file += raw(x, false);
+    return file + raw<std::uint8_t>(3, false) + raw(0.0f, false) + raw(1.0f, false) + raw(index, false);
+  };
+  EXPECT_EQ(error_of("half.ply", ply(1.5f)), "'half.ply': an index is not a whole number");
+  EXPECT_EQ(error_of("whole.ply", ply(2.0f)), "");
+}
+
 TEST_F(MeshFileTest, RefusesIndicesOutOfRangeAndNamesThePolygon) {
   const std::string out_of_range = "polygon 1 refers to point 9, but there are 4 points (both count from 0)";
   for (auto [name, text] : {std::pair("a.ply", ascii_ply), std::pair("a.off", off)}) {
