@@ -102,9 +102,10 @@ std::vector<GridSummary> describe_vdb(const fs::path& path) {
       if (!box.empty())
         for (int axis = 0; axis < 3; ++axis)
           summary.lower[axis] = box.min()[axis], summary.upper[axis] = box.max()[axis];
-      summary.voxel_size = std::cbrt(std::abs(grid->transform().voxelVolume()));
-      if (const auto scalar = openvdb::gridConstPtrCast<openvdb::FloatGrid>(grid))
-        summary.background = scalar->background();
+      for (int axis = 0; axis < 3; ++axis) summary.voxel_size[axis] = grid->voxelSize()[axis];
+      using Numbers = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid,
+                                        openvdb::BoolGrid>;
+      grid->apply<Numbers>([&](const auto& of_numbers) { summary.background = double(of_numbers.background()); });
     }
     return summaries;
   });

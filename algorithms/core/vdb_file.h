@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,8 @@ struct GridSummary {
   std::string name, value_type, grid_class;
   std::uint64_t active_voxels = 0, memory_bytes = 0;
   std::array<int, 3> lower{}, upper{};  ///< active box, index space, inclusive
-  double voxel_size = 0.0;              ///< world units
-  double background = 0.0;              ///< of scalar grids
+  std::array<double, 3> voxel_size{};   ///< along each index axis, world units
+  std::optional<double> background;     ///< of grids of numbers
 };
 
 /// What a .vdb holds. @throws Error as read_level_set() does, and for a file with a grid of an unknown type, which OpenVDB

@@ -169,7 +169,8 @@ TYPED_TEST(DenseHermiteFile, IsDescribedAsAGrid) {
   EXPECT_EQ(grids[0].name, "hermite");
   EXPECT_NE(grids[0].value_type.find(TypeParam::type_name), std::string::npos);
   EXPECT_GT(grids[0].active_voxels, 0u);
-  EXPECT_NEAR(grids[0].voxel_size, std::cbrt(0.1 * 0.2 / 3), 1e-12);
+  const double sides[] = {std::sqrt(0.0101), std::sqrt(0.0409), 1.0 / 3};
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(grids[0].voxel_size[axis], sides[axis], 1e-10);
 }
 
 // The header's description of the packed file, read by OpenVDB alone.

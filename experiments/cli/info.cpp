@@ -1,5 +1,6 @@
 // hermesh info: what a file holds.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
@@ -34,12 +35,14 @@ void print_mesh(const std::filesystem::path& path, RunContext& context) {
 void print_grid(const GridSummary& grid) {
   std::cout << "grid           " << grid.name << "\n  values       " << grid.value_type;
   std::cout << "\n  class        " << grid.grid_class << '\n';
-  std::cout << "  voxel size   " << text(grid.voxel_size) << "\n  active       " << grid.active_voxels
-            << " voxels";
+  const auto& [x, y, z] = grid.voxel_size;
+  const bool cubes = std::max({x, y, z}) - std::min({x, y, z}) < 1e-6 * x;
+  std::cout << "  voxel size   " << (cubes ? text(x) : text(Eigen::Vector3d(x, y, z))) << "\n  active       "
+            << grid.active_voxels << " voxels";
   if (grid.active_voxels > 0)
     std::cout << ", indices " << index_text(grid.lower) << " to " << index_text(grid.upper);
-  std::cout << "\n  background   " << text(grid.background) << "\n  memory       " << grid.memory_bytes
-            << " bytes\n";
+  if (grid.background) std::cout << "\n  background   " << text(*grid.background);
+  std::cout << "\n  memory       " << grid.memory_bytes << " bytes\n";
 }
 
 /// What describe_vdb() cannot tell of grids that hold Hermite data.
