@@ -2,6 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
@@ -147,9 +148,11 @@ void LeafTable::number_leaves(RunContext& context) {
         leaves_[next++] = node.source->getTable()[slot].getChild();
       }
       for (int bit = 0; bit < 64; ++bit) {
-        const std::uint64_t is_tile = ~(node.child[word] >> bit) & 1;
-        if (is_tile && rule_(node.source->getTable()[64 * word + bit].getValue()))
-          node.tile_inside[word] |= std::uint64_t{1} << bit;
+        if (node.child[word] >> bit & 1) continue;
+        const float value = rule_.signed_value(node.source->getTable()[64 * word + bit].getValue());
+        if (!(value < 0.0f)) continue;
+        node.tile_inside[word] |= std::uint64_t{1} << bit;
+        node.nearest_inside = std::max(node.nearest_inside, value);
       }
     }
     // To wait for one leaf after the other would take longer than all the rest.
@@ -178,6 +181,24 @@ void LeafTable::read_signs(RunContext& context) {
     if (bad) not_finite = true;
   });
   if (not_finite) throw Error("the volume holds a value that is not finite; replace it before the extraction");
+}
+
+bool LeafTable::has_inactive_inside_nearer_than(float distance) const {
+  float nearest = kNoTile;
+  for (const Node& node : nodes_) nearest = std::max(nearest, node.nearest_inside);
+  if (nearest != kNoTile) return nearest > -distance;
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, size(), 64), false,
+      [&](const auto& range, bool found) {
+        for (std::size_t leaf = range.begin(); leaf < range.end() && !found; ++leaf) {
+          const BlockMask mask = active(leaf);
+          for (int word = 0; word < 8; ++word)
+            for (std::uint64_t bits = inside_[leaf][word] & ~mask[word]; bits != 0; bits &= bits - 1)
+              found = found || rule_.signed_value(values_[leaf][64 * word + std::countr_zero(bits)]) > -distance;
+        }
+        return found;
+      },
+      [](bool a, bool b) { return a || b; });
 }
 
 BlockMask LeafTable::active(std::size_t leaf) const {

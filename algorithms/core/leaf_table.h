@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <unordered_map>
 #include <vector>
 
@@ -47,6 +48,9 @@ class LeafTable {
   const BlockMask& signs(std::int32_t leaf) const {
     return leaf >= 0 ? inside_[static_cast<std::size_t>(leaf)] : leaf == kUniformInside ? kAllInside : kAllOutside;
   }
+  /// Whether anything that is inside and not active is less than `distance` from the isovalue. Looks at tiles, and only
+  /// where none is inside at samples, too.
+  bool has_inactive_inside_nearer_than(float distance) const;
   /// Samples of the band, at the bits of BlockMask.
   BlockMask active(std::size_t leaf) const;
   openvdb::Coord lower(std::size_t leaf) const;
@@ -69,12 +73,15 @@ class LeafTable {
   static constexpr int kWords = 64;  ///< of a mask of 16³ bits
   using NodeMask = std::array<std::uint64_t, kWords>;
 
+  static constexpr float kNoTile = -std::numeric_limits<float>::infinity();
+
   struct Node {
     openvdb::Coord lower;
     const TreeNode* source = nullptr;
     NodeMask child{}, tile_inside{};
     std::array<std::uint32_t, kWords> rank{};  ///< number of the first leaf of each word
     std::array<std::int32_t, 27> neighbours{};  ///< by neighbour_slot(); a node's number or kUniform…
+    float nearest_inside = kNoTile;  ///< signed value of the inside tile that is nearest to the isovalue
   };
   struct Place {
     std::uint32_t node;

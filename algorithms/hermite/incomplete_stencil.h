@@ -1,4 +1,5 @@
-// Crossings of edges whose stencils reach beyond the data, one at a time: what vector code leaves over.
+// Crossings of edges whose stencils reach beyond the data or single precision, one at a time: what vector code leaves
+// over.
 // Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
@@ -22,17 +23,19 @@ struct SampledVolume {
 };
 
 /// Near the surface at 0 of a level set all that is no data has the background's magnitude, and nothing else
-/// is asked. At other isovalues the band may be wider on that side than the background tells, and a
-/// background of 0 tells nothing; there, and in any other volume, the active samples are data.
+/// is asked. Where the band is narrower inside it has less there; at other isovalues the band may be wider on
+/// that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
+/// the active samples are data.
 inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
   const float background = std::fabs(grid.background());
-  if (grid.getGridClass() == openvdb::GRID_LEVEL_SET && table.rule().isovalue == 0.0f && background > 0.0f)
+  if (grid.getGridClass() == openvdb::GRID_LEVEL_SET && table.rule().isovalue == 0.0f && background > 0.0f &&
+      !table.has_inactive_inside_nearer_than(background))
     return {table, false, background};
   return {table, true, std::numeric_limits<float>::max()};
 }
 
-/// One edge whose stencil has samples that are no data: differences to one side, or none.
+/// One edge: where a sample is no data, differences to one side, or none.
 class IncompleteStencil {
  public:
   IncompleteStencil(const SampledVolume& volume, std::size_t leaf)

@@ -2,6 +2,7 @@
 // Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -43,7 +44,8 @@ class LeafStencils final : public edge_kernels::PlainCrossing {
     } else {
       input.active[13] = nullptr;
     }
-    input.data_below = volume_.data_below;
+    constexpr float kSquarable = 1e18f;  // twice it, squared and three times, is a number
+    input.data_below = std::min(volume_.data_below, kSquarable);
     input.isovalue = table.rule().isovalue;
     input.scale = table.rule().scale;
     input.incomplete = this;

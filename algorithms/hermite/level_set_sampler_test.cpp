@@ -1,8 +1,10 @@
 // The sampler against a plain one that looks up every sample in the tree.
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
+#include <openvdb/tools/Prune.h>
 #include <tbb/global_control.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -127,6 +129,68 @@ TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
         ASSERT_GT(normal.dot((place - centre).normalized()), 0.999) << background;
       });
     EXPECT_GT(crossings, 1500u);
+  }
+}
+
+/// A sphere's distances within `outer` voxels outside and `inner` inside, clamped to these beyond.
+openvdb::FloatGrid::Ptr uneven_band(double radius, const Vector3d& centre, double outer, double inner) {
+  const auto grid = openvdb::FloatGrid::create(float(outer));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  const int reach = int(radius + outer) + 2;
+  for (int x = -reach; x <= reach; ++x)
+    for (int y = -reach; y <= reach; ++y)
+      for (int z = -reach; z <= reach; ++z) {
+        const double distance = (Vector3d(x, y, z) - centre).norm() - radius;
+        if (distance >= outer) continue;
+        if (distance > -inner)
+          grid->tree().setValueOn(Coord(x, y, z), float(distance));
+        else
+          grid->tree().setValueOff(Coord(x, y, z), float(-inner));
+      }
+  return grid;
+}
+
+/// What is clamped inside is no data, though it is less in magnitude than the background; in a small object there is no
+/// tile to tell.
+TEST_F(LevelSetSamplerTest, ABandThatIsNarrowerInside) {
+  const Vector3d centre(0.2, 0.1, 0.7);
+  for (const double radius : {4.3, 21.4}) {
+    const auto grid = uneven_band(radius, centre, 4.0, 1.2);
+    openvdb::tools::prune(grid->tree());
+    RunContext context;
+    const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
+    double largest = 0;
+    for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
+      for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+        const auto& lower = hermite.leaves[leaf].lower;
+        Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
+        place[axis] += crossing.offset;
+        const Vector3d normal(crossing.normal[0], crossing.normal[1], crossing.normal[2]);
+        largest = std::max(largest, normal.cross((place - centre).normalized()).norm());
+      });
+    // One-sided differences of a sphere are off by half its curvature; clamped values would be by more than that again.
+    EXPECT_LT(largest, 0.6 / radius) << radius;
+  }
+}
+
+/// Squares of the differences would overflow single precision, or vanish in it.
+TEST_F(LevelSetSamplerTest, HugeAndTinyValuesHaveTheSameNormals) {
+  const auto scaled = [](float scale) {
+    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f);
+    for (auto it = grid->beginValueAll(); it; ++it) it.setValue(*it * scale);
+    grid->tree().root().setBackground(3.0f * scale, false);
+    RunContext context;
+    return sample_level_set(make_level_set(grid), 0.0, context);
+  };
+  const FloatHermite expected = scaled(1.0f);
+  for (const float scale : {0x1p80f, 0x1p-84f, 0x1p-110f}) {
+    const FloatHermite found = scaled(scale);
+    ASSERT_EQ(found.crossings.size(), expected.crossings.size()) << scale;
+    for (std::size_t i = 0; i < found.crossings.size(); ++i) {
+      ASSERT_NEAR(found.crossings[i].offset, expected.crossings[i].offset, 1e-5) << scale;
+      for (int a = 0; a < 3; ++a)
+        ASSERT_NEAR(found.crossings[i].normal[a], expected.crossings[i].normal[a], 1e-5) << scale;
+    }
   }
 }
 

@@ -15,7 +15,8 @@ struct UpperSigns {
   const std::uint64_t* inside[8];
 };
 
-/// The plain code for edges whose stencils have samples that are no data, which the vector code does not do.
+/// The plain code for edges whose stencils have samples that are no data, or differences whose squares single precision
+/// has no room for, which the vector code does not do.
 class PlainCrossing {
  public:
   /// Of an edge along `axis` that starts in the leaf or a step beyond: offset, and the normal along the axis and the two
@@ -31,8 +32,8 @@ struct LeafInput {
   UpperSigns signs;
   /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; where there is no leaf all must be infinite.
   const float* values[27];
-  /// Samples of no less than data_below in magnitude are no data; where active[13] is not null, neither are those without
-  /// a bit there.
+  /// Stencils with samples of no less than data_below in magnitude are left to `incomplete`; where active[13] is not null, so are those with samples
+  /// without a bit there.
   const std::uint64_t* active[27];
   float data_below;
   float isovalue, scale;  ///< as in InsideRule
