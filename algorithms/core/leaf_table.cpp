@@ -11,12 +11,13 @@
 #include <cstring>
 #include <limits>
 
-#if defined(__SSE2__)
-#include <emmintrin.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
 #endif
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -24,29 +25,80 @@ namespace {
 using openvdb::Coord;
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 
-/// Signs of 64 samples; `not_finite` is set where one of them is no number. Four at a time, because one after the other
-/// they would take longer than it takes to read them.
-std::uint64_t signs_of_64(const float* values, const InsideRule& rule, bool& not_finite) {
-  std::uint64_t bits = 0;
-#if defined(__SSE2__)
+/// Signs of a leaf's 512 samples; returns false if one of them is not finite. Many at a time, because one after the other
+/// they would take longer than it takes to read them. A comparison of magnitudes as whole numbers finds what is no number.
+using ReadSigns = bool(const float* values, const InsideRule& rule, BlockMask& inside);
+
+constexpr std::int32_t kMagnitude = 0x7fffffff, kLargestFinite = 0x7f7fffff;
+
+#if defined(__x86_64__)
+bool read_signs_sse2(const float* values, const InsideRule& rule, BlockMask& inside) {
   const __m128 iso = _mm_set1_ps(rule.isovalue);
-  const __m128i magnitude = _mm_set1_epi32(0x7fffffff), largest = _mm_set1_epi32(0x7f7fffff);
+  const __m128i magnitude = _mm_set1_epi32(kMagnitude), largest = _mm_set1_epi32(kLargestFinite);
   __m128i bad = _mm_setzero_si128();
-  for (int i = 0; i < 16; ++i) {
-    const __m128 v = _mm_loadu_ps(values + 4 * i);
-    const __m128 inside = rule.scale > 0 ? _mm_cmplt_ps(v, iso) : _mm_cmpgt_ps(v, iso);
-    bits |= static_cast<std::uint64_t>(_mm_movemask_ps(inside)) << (4 * i);
-    bad = _mm_or_si128(bad, _mm_cmpgt_epi32(_mm_and_si128(_mm_castps_si128(v), magnitude), largest));
+  for (std::size_t word = 0; word < 8; ++word) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 16; ++i) {
+      const __m128 v = _mm_loadu_ps(values + 64 * word + 4 * i);
+      const __m128 in = rule.scale > 0 ? _mm_cmplt_ps(v, iso) : _mm_cmpgt_ps(v, iso);
+      bits |= static_cast<std::uint64_t>(_mm_movemask_ps(in)) << (4 * i);
+      bad = _mm_or_si128(bad, _mm_cmpgt_epi32(_mm_and_si128(_mm_castps_si128(v), magnitude), largest));
+    }
+    inside[word] = bits;
   }
-  if (_mm_movemask_epi8(bad) != 0) not_finite = true;
-#else
-  for (int i = 0; i < 64; ++i) {
-    bits |= static_cast<std::uint64_t>(rule(values[i])) << i;
-    if (!std::isfinite(values[i])) not_finite = true;
-  }
-#endif
-  return bits;
+  return _mm_movemask_epi8(bad) == 0;
 }
+
+[[gnu::target("avx2")]] bool read_signs_avx2(const float* values, const InsideRule& rule, BlockMask& inside) {
+  const __m256 iso = _mm256_set1_ps(rule.isovalue);
+  const __m256i magnitude = _mm256_set1_epi32(kMagnitude);
+  __m256i greatest = _mm256_setzero_si256();
+  for (std::size_t word = 0; word < 8; ++word) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const __m256 v = _mm256_loadu_ps(values + 64 * word + 8 * i);
+      const __m256 in = rule.scale > 0 ? _mm256_cmp_ps(v, iso, _CMP_LT_OQ) : _mm256_cmp_ps(v, iso, _CMP_GT_OQ);
+      bits |= static_cast<std::uint64_t>(static_cast<unsigned>(_mm256_movemask_ps(in))) << (8 * i);
+      greatest = _mm256_max_epi32(greatest, _mm256_and_si256(_mm256_castps_si256(v), magnitude));
+    }
+    inside[word] = bits;
+  }
+  return _mm256_movemask_epi8(_mm256_cmpgt_epi32(greatest, _mm256_set1_epi32(kLargestFinite))) == 0;
+}
+
+[[gnu::target("avx512f")]] bool read_signs_avx512(const float* values, const InsideRule& rule, BlockMask& inside) {
+  const __m512 iso = _mm512_set1_ps(rule.isovalue);
+  const __m512i magnitude = _mm512_set1_epi32(kMagnitude);
+  __m512i greatest = _mm512_setzero_si512();
+  for (std::size_t word = 0; word < 8; ++word) {
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const __m512 v = _mm512_loadu_ps(values + 64 * word + 16 * i);
+      const __mmask16 in = rule.scale > 0 ? _mm512_cmp_ps_mask(v, iso, _CMP_LT_OQ) : _mm512_cmp_ps_mask(v, iso, _CMP_GT_OQ);
+      bits |= std::uint64_t{in} << (16 * i);
+      // (With a mask, because without one GCC 12 takes the intrinsic's unused operand for one that is read.)
+      greatest = _mm512_mask_max_epi32(greatest, 0xffff, greatest, _mm512_and_si512(_mm512_castps_si512(v), magnitude));
+    }
+    inside[word] = bits;
+  }
+  return _mm512_cmpgt_epi32_mask(greatest, _mm512_set1_epi32(kLargestFinite)) == 0;
+}
+
+ReadSigns& chosen_read_signs() {
+  return *of_level<ReadSigns*>(chosen_simd_level(), read_signs_sse2, read_signs_avx2, read_signs_avx512);
+}
+#else
+bool read_signs_plain(const float* values, const InsideRule& rule, BlockMask& inside) {
+  bool finite = true;
+  inside = {};
+  for (std::size_t i = 0; i < 512; ++i) {
+    inside[i >> 6] |= static_cast<std::uint64_t>(rule(values[i])) << (i & 63);
+    finite = finite && std::isfinite(values[i]);
+  }
+  return finite;
+}
+ReadSigns& chosen_read_signs() { return read_signs_plain; }
+#endif
 
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
@@ -173,12 +225,12 @@ void LeafTable::number_leaves(RunContext& context) {
 void LeafTable::read_signs(RunContext& context) {
   inside_.resize(size());
   std::atomic<bool> not_finite{false};
+  ReadSigns& read = chosen_read_signs();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
     context.check();
-    bool bad = false;
-    for (std::size_t i = range.begin(); i < range.end(); ++i)
-      for (int word = 0; word < 8; ++word) inside_[i][word] = signs_of_64(values_[i] + 64 * word, rule_, bad);
-    if (bad) not_finite = true;
+    bool finite = true;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) finite &= read(values_[i], rule_, inside_[i]);
+    if (!finite) not_finite = true;
   });
   if (not_finite) throw Error("the volume holds a value that is not finite; replace it before the extraction");
 }

@@ -4,10 +4,12 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -132,6 +134,37 @@ TEST_F(LeafTableTest, AComparisonWithARoundedIsovalueDecidesAsWithTheExactOne) {
         ASSERT_EQ(rule.signed_value(value) < 0.0f, expected);
       }
     }
+}
+
+/// Every sample of a leaf, values at the isovalue and beside it among them, and a bad value at every place.
+TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
+  std::mt19937 random(31);
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    for (const bool level_set : {true, false}) {
+      const float isovalue = level_set ? 0.0f : 0.25f;
+      const auto grid = openvdb::FloatGrid::create(level_set ? 3.0f : 0.0f);
+      if (level_set) grid->setGridClass(openvdb::GRID_LEVEL_SET);
+      auto* leaf = grid->tree().touchLeaf(Coord(0));
+      for (openvdb::Index i = 0; i < 512; ++i)
+        leaf->setValueOn(i, std::nextafter(isovalue, float(int(random() % 3) - 1)) + float(int(random() % 3) - 1));
+      const LeafTable leaves = table(grid, isovalue);
+      std::size_t number = 0;  // tiles beside it may have become leaves
+      while (leaves.lower(number) != Coord(0)) ++number;
+      for (int i = 0; i < 512; ++i) {
+        const float value = leaf->getValue(static_cast<openvdb::Index>(i));
+        ASSERT_EQ(test(leaves.inside(number), i), level_set ? value < isovalue : value > isovalue)
+            << i << " at " << name(level);
+      }
+    }
+    for (openvdb::Index i = 0; i < 512; ++i) {
+      const auto grid = openvdb::FloatGrid::create(3.0f);
+      const float infinite = std::numeric_limits<float>::infinity();
+      grid->tree().touchLeaf(Coord(0))->setValueOn(i, i % 3 == 0 ? infinite : i % 3 == 1 ? -infinite : infinite - infinite);
+      EXPECT_THROW(table(grid), Error) << i << " at " << name(level);
+    }
+  }
+  unsetenv("HERMESH_SIMD");
 }
 
 TEST_F(LeafTableTest, ValuesThatAreNotFiniteAreRefused) {
