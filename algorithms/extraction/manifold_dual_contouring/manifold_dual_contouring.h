@@ -32,7 +32,7 @@ inline constexpr double kSimplifiedTolerance = 8.0;
 /// every number of threads.
 /// @param field scales the tolerance by the place of the uniform mesh's points, may be null. Where it asks
 /// for no mesh outside of its mask, triangles whose middle lies outside are left out, and the mesh is open
-/// there; points outside are not merged, so that nothing that reaches far in is lost with them.
+/// there, but for those that stand for points within; points outside are not merged.
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
