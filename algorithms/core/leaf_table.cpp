@@ -29,9 +29,9 @@ using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 /// they would take longer than it takes to read them. A comparison of magnitudes as whole numbers finds what is no number.
 using ReadSigns = bool(const float* values, const InsideRule& rule, BlockMask& inside);
 
+#if defined(__x86_64__)
 constexpr std::int32_t kMagnitude = 0x7fffffff, kLargestFinite = 0x7f7fffff;
 
-#if defined(__x86_64__)
 bool read_signs_sse2(const float* values, const InsideRule& rule, BlockMask& inside) {
   const __m128 iso = _mm_set1_ps(rule.isovalue);
   const __m128i magnitude = _mm_set1_epi32(kMagnitude), largest = _mm_set1_epi32(kLargestFinite);

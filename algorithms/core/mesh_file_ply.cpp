@@ -73,7 +73,8 @@ class BinaryValues {
     }
     const double value = real(type);
     // Also false for what is not a number; 2^53 is far beyond any index.
-    if (!(std::abs(value) < 9007199254740992.0) || value != std::trunc(value)) builder_.fail("an index is not a whole number");
+    if (!(std::abs(value) < 9007199254740992.0) || value != std::trunc(value))
+      builder_.fail("an index is not a whole number");
     return static_cast<std::int64_t>(value);
   }
   void skip(Type type) {

@@ -86,6 +86,18 @@ void expect_as_plain(const openvdb::FloatGrid::Ptr& grid, double isovalue, std::
   EXPECT_EQ(expected.size(), 0u);
 }
 
+/// Calls f(place, normal) for every crossing, in index space.
+template <class F>
+void for_each_normal(const FloatHermite& hermite, F&& f) {
+  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
+    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
+      const auto& lower = hermite.leaves[leaf].lower;
+      Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
+      place[axis] += crossing.offset;
+      f(place, Vector3d(crossing.normal[0], crossing.normal[1], crossing.normal[2]));
+    });
+}
+
 class LevelSetSamplerTest : public testing::Test {
  protected:
   void SetUp() override { initialize_openvdb(); }
@@ -119,15 +131,10 @@ TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
     RunContext context;
     const FloatHermite hermite = sample_level_set(make_level_set(grid), isovalue, context);
     std::size_t crossings = 0;
-    for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
-      for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
-        const auto& lower = hermite.leaves[leaf].lower;
-        Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
-        place[axis] += crossing.offset;
-        const Vector3d normal(crossing.normal[0], crossing.normal[1], crossing.normal[2]);
-        ++crossings;
-        ASSERT_GT(normal.dot((place - centre).normalized()), 0.999) << background;
-      });
+    for_each_normal(hermite, [&](const Vector3d& place, const Vector3d& normal) {
+      ++crossings;
+      ASSERT_GT(normal.dot((place - centre).normalized()), 0.999) << background;
+    });
     EXPECT_GT(crossings, 1500u);
   }
 }
@@ -160,14 +167,9 @@ TEST_F(LevelSetSamplerTest, ABandThatIsNarrowerInside) {
     RunContext context;
     const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
     double largest = 0;
-    for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
-      for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
-        const auto& lower = hermite.leaves[leaf].lower;
-        Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
-        place[axis] += crossing.offset;
-        const Vector3d normal(crossing.normal[0], crossing.normal[1], crossing.normal[2]);
-        largest = std::max(largest, normal.cross((place - centre).normalized()).norm());
-      });
+    for_each_normal(hermite, [&](const Vector3d& place, const Vector3d& normal) {
+      largest = std::max(largest, normal.cross((place - centre).normalized()).norm());
+    });
     // One-sided differences of a sphere are off by half its curvature; clamped values would be by more than that again.
     EXPECT_LT(largest, 0.6 / radius) << radius;
   }

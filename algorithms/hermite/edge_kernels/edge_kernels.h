@@ -32,8 +32,8 @@ struct LeafInput {
   UpperSigns signs;
   /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; where there is no leaf all must be infinite.
   const float* values[27];
-  /// Stencils with samples of no less than data_below in magnitude are left to `incomplete`; where active[13] is not null, so are those with samples
-  /// without a bit there.
+  /// Stencils with samples of no less than data_below in magnitude are left to `incomplete`; where active[13] is not null,
+  /// so are those with samples without a bit there.
   const std::uint64_t* active[27];
   float data_below;
   float isovalue, scale;  ///< as in InsideRule
