@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/hermite/test_normals.h"
 
 namespace hermesh {
 namespace {
@@ -24,14 +25,9 @@ IndexToWorld lattice(double voxel_size) {
 /// Calls f(world position, normal).
 template <class F>
 void for_each_hit(const FloatHermite& hermite, F&& f) {
-  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
-    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
-      const auto& lower = hermite.leaves[leaf].lower;
-      Vector3d at(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
-      at[axis] += crossing.offset;
-      f(Vector3d(hermite.placement.local(at) + hermite.placement.origin),
-        Vector3d(crossing.normal[0], crossing.normal[1], crossing.normal[2]));
-    });
+  for_each_normal(hermite, [&](const Vector3d& place, const Vector3d& normal) {
+    f(Vector3d(hermite.placement.local(place) + hermite.placement.origin), normal);
+  });
 }
 
 TEST(FunctionSampler, HitsOfASphereAreOnItWithRadialNormals) {

@@ -14,6 +14,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/simd_level.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/hermite/test_normals.h"
 
 namespace hermesh {
 namespace {
@@ -85,18 +86,6 @@ void expect_as_plain(const openvdb::FloatGrid::Ptr& grid, double isovalue, std::
       expected.erase(found);
     });
   EXPECT_EQ(expected.size(), 0u);
-}
-
-/// Calls f(place, normal) for every crossing, in index space.
-template <class F>
-void for_each_normal(const FloatHermite& hermite, F&& f) {
-  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
-    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
-      const auto& lower = hermite.leaves[leaf].lower;
-      Vector3d place(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
-      place[axis] += crossing.offset;
-      f(place, Vector3d(crossing.normal[0], crossing.normal[1], crossing.normal[2]));
-    });
 }
 
 class LevelSetSamplerTest : public testing::Test {

@@ -8,23 +8,12 @@
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/hermite/test_normals.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-
-/// Calls f(position, normal) for every crossing, in index space.
-template <class F>
-void for_each_crossing(const FloatHermite& hermite, F&& f) {
-  for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
-    for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
-      const auto& lower = hermite.leaves[leaf].lower;
-      Vector3d at(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
-      at[axis] += crossing.offset;
-      f(at, Vector3d(crossing.normal[0], crossing.normal[1], crossing.normal[2]));
-    });
-}
 
 LevelSet sphere(float radius) {
   initialize_openvdb();
@@ -37,7 +26,7 @@ TEST(LevelSetSampler, SphereCrossingsLieOnItWithRadialNormals) {
   const FloatHermite grid = sample_level_set(sphere(20.0f), 0.0, context);
   const Vector3d centre(0.3, 0.1, -0.2);
   std::size_t crossings = 0;
-  for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
+  for_each_normal(grid, [&](const Vector3d& at, const Vector3d& normal) {
     ++crossings;
     ASSERT_NEAR((at - centre).norm(), 20.0, 0.01);  // linear interpolation errs by curvature / 8 at most
     ASSERT_GT(normal.dot((at - centre).normalized()), 0.998);
@@ -65,12 +54,12 @@ TEST(LevelSetSampler, NormalsAreExactOnAPlaneEvenWhereTheBandEnds) {
       }
   RunContext context;
   int checked = 0;
-  for_each_crossing(sample_level_set(make_level_set(grid), 0.0, context),
-                    [&](const Vector3d& at, const Vector3d& found) {
-                      if ((at.array() < 3).any() || (at.array() > 16).any()) return;
-                      ++checked;
-                      ASSERT_GT(found.dot(normal), 1.0 - 1e-5);
-                    });
+  for_each_normal(sample_level_set(make_level_set(grid), 0.0, context),
+                  [&](const Vector3d& at, const Vector3d& found) {
+                    if ((at.array() < 3).any() || (at.array() > 16).any()) return;
+                    ++checked;
+                    ASSERT_GT(found.dot(normal), 1.0 - 1e-5);
+                  });
   EXPECT_GT(checked, 100);
 }
 
@@ -112,7 +101,7 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
                                               octahedron(radius, centre, reversed), context, &sampling);
     EXPECT_EQ(sampling.fallback, 0u);
     EXPECT_EQ(sampling.exact, grid.crossings.size());
-    for_each_crossing(grid, [&](const Vector3d& at, const Vector3d& normal) {
+    for_each_normal(grid, [&](const Vector3d& at, const Vector3d& normal) {
       ASSERT_NEAR((at - centre).cwiseAbs().sum(), radius, 2e-5);
       const Vector3d face = (at - centre).cwiseSign() / std::sqrt(3.0);
       ASSERT_GT(normal.dot(face), 1.0 - 1e-5);
@@ -120,8 +109,9 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
   }
 }
 
-/// An open mesh's volume depends on where it is measured from, and the origin is no place of its own: away from it in either
-/// direction (but not so far that index coordinates have another base) the data are those at the origin. Edges without a hit tell, which want a polygon that looks outwards.
+/// An open mesh's volume depends on where it is measured from, and the origin is no place of its own: away from it in
+/// either direction (but not so far that index coordinates have another base) the data are those at the origin. Edges
+/// without a hit tell, which want a polygon that looks outwards.
 TEST(PolygonSampler, AnOpenMeshIsNotTurnedOverForItsPlace) {
   initialize_openvdb();
   constexpr double kHalf = 12.4;
@@ -180,7 +170,7 @@ TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
   const FloatHermite hermite = sample_polygons(make_level_set(grid), 0.0, mesh, context, &sampling);
   EXPECT_GT(sampling.ambiguous, 0u);
   int checked = 0;
-  for_each_crossing(hermite, [&](const Vector3d& at, const Vector3d& normal) {
+  for_each_normal(hermite, [&](const Vector3d& at, const Vector3d& normal) {
     if (at.z() < 3 || at.z() > 4 || normal.z() < 0.9) return;
     ++checked;
     EXPECT_NEAR(at.z(), 3.7, 1e-5);
