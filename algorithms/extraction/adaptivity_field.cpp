@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "algorithms/core/error.h"
@@ -31,15 +32,17 @@ void check_linear(const openvdb::FloatGrid& grid, const char* what) {
 }
 
 void check_scale(const openvdb::FloatGrid& grid) {
-  const auto good = [](float value) { return std::isfinite(value) && value >= 0.0f; };
+  // An imported volume whose least value is 0 has the next number below for a background.
+  const auto good = [](float value) { return std::isfinite(value) && value >= -std::numeric_limits<float>::min(); };
   if (!good(grid.background()))
-    throw Error("the scale of the tolerance has a background that is negative or not finite");
-  for (auto it = grid.cbeginValueAll(); it; ++it)
-    if (!good(*it)) {
-      std::ostringstream place;
-      place << it.getCoord();
-      throw Error("the scale of the tolerance is negative or not finite at index " + place.str());
-    }
+    throw Error("the scale of the tolerance has a background that is negative or not finite; give it one of 0 or more");
+  for (auto it = grid.cbeginValueAll(); it; ++it) {
+    if (good(*it)) continue;
+    std::ostringstream place;
+    place << it.getCoord();
+    throw Error("the scale of the tolerance is negative or not finite at index " + place.str() +
+                "; give it values of 0 or more");
+  }
 }
 
 /// Centre of a cell of a block, relative to the block's first sample.
@@ -98,7 +101,8 @@ void FieldEvaluator::scales(const std::array<std::int32_t, 3>& lower, const Bloc
   const openvdb::FloatGrid& grid = *scale_.grid().grid;
   const Accessor accessor = grid.getConstUnsafeAccessor();
   for_each_bit(cells, [&](int cell) {
-    out[static_cast<std::size_t>(cell)] = interpolated(accessor, index_of(grid, world(lower, centre(cell))));
+    const float scale = interpolated(accessor, index_of(grid, world(lower, centre(cell))));
+    out[static_cast<std::size_t>(cell)] = std::max(scale, 0.0f);
   });
 }
 

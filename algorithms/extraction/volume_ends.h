@@ -62,8 +62,8 @@ void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& end
 
 /// Cuts the mesh of close_ends()' volume off in the planes of the last samples. Polygons that straddle a plane are cut at
 /// their edges; points within 0.002 voxel of the plane are moved into it, and polygons that lie in it are left out. Edges
-/// stay manifold; where the surface touches the plane in a point (samples exactly at the isovalue), the boundary may touch
-/// itself there.
+/// stay manifold; where the surface comes that near to the plane without crossing it (samples at the isovalue, or all but at
+/// it), the boundary may touch itself, and polygons as thin as that may meet.
 /// @throws Error if the ends lie in no box.
 PolygonMesh open_ends(const PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends);
 

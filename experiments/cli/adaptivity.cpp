@@ -84,7 +84,7 @@ void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments) {
       ->add_option("--outside", arguments.outside,
                    "Outside the mask 'simplify' (the default) merges as far as the topology allows "
                    "(manifold-dual-contouring: up to 8 voxels), 'nothing' makes no polygons, so that the "
-                   "mesh is open, and 'everywhere' keeps the bound there, too")
+                   "mesh is open, with a boundary that may touch itself, and 'everywhere' keeps the bound there, too")
       ->check(CLI::IsMember({"everywhere", "simplify", "nothing"}));
   group->add_option("--tolerance-grid", arguments.tolerance_grid,
                     "A .vdb whose values, none of them negative, scale the extractor's bound; beyond its data the "
@@ -108,7 +108,13 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
       throw UsageError(std::string("--frustum: ") + error.what());
     }
   }
-  if (!arguments.tolerance_grid.empty()) field.scale = read_level_set(arguments.tolerance_grid, "", session.context);
+  if (!arguments.tolerance_grid.empty())
+    field.scale = about_file(arguments.tolerance_grid, [&] {
+      AdaptivityField scale;
+      scale.scale = read_level_set(arguments.tolerance_grid, "", session.context);
+      FieldEvaluator(&scale, {});  // looks at its values
+      return scale.scale;
+    });
   return field;
 }
 

@@ -51,9 +51,17 @@ TEST_F(AdaptivityTest, AMaskFromAFile) {
             0);
 }
 
+TEST_F(AdaptivityTest, AnImportedToleranceGridMayHoldZeros) {
+  // Its background lies just below them.
+  write("zero.raw", std::string(8, '\0'));
+  ASSERT_EQ(run({"import", "zero.raw", "zero.vdb", "--dims", "2,2,2", "--type", "uint8", "--spacing", "1,1,1"}).exit_code, 0);
+  EXPECT_GT(points({"-o", "threshold=1", "--tolerance-grid", "zero.vdb"}), points({"-o", "threshold=1"}));
+}
+
 TEST_F(AdaptivityTest, BadInputIsSaidInASentence) {
   expect_refused({"--mask", "missing.vdb"}, 1, "does not exist");
-  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1, "negative or not finite");
+  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1, "sphere.vdb: the scale of the tolerance is negative or not finite");
+  expect_refused({"--mask", ""}, 2, "--mask was given an empty value");
   expect_refused({"--outside", "nothing"}, 2, "needs --mask or --frustum");
   expect_refused({"--frustum", "0,0,3 0,0,0 60 1 0.1"}, 2, "it must be");
   expect_refused({"--frustum", "0,0,3 0;0;0 60 1 0.1 9"}, 2, "three numbers");

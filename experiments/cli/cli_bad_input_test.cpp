@@ -198,6 +198,10 @@ TEST_F(BadInputTest, Usage) {
   expect_refusal(2, {"validate", "cube.off", "--features", "cube.off", "--dihedral", "200"}, {"--dihedral"});
   expect_refusal(2, {"validate", "cube.off", "--samples", "0"}, {"--samples"});
   expect_refusal(2, {"run", "x.toml", "--tier", "huge"}, {"--tier", "quick"});
+  // What a variable of a script that was not set leaves.
+  expect_refusal(2, {"validate", "cube.off", "--reference", ""}, {"--reference", "empty"});
+  expect_refusal(2, {"import", "x.raw", "x.vdb", "--dims", "2,2,2", "--type", "uint8", "--offset", "99999999999999999999"},
+                 {"--offset"});
   expect_refusal(2, {"report", ".", "--format", "html"}, {"--format", "md"});
 }
 

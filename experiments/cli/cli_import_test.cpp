@@ -139,6 +139,7 @@ TEST_F(ImportTest, AttributesOfTheVolumeReachTheMesh) {
   EXPECT_EQ(read_mesh_file(path("one.ply"), context, {.attributes = true}).attributes.size(), 1u);
   expect_refusal(1, {"extract", "t.vdb", "out.ply", "--attributes", "warmth"}, {"warmth", "colour"});
   expect_refusal(2, {"extract", "t.vdb", "out.obj", "--attributes", "all"}, {"out.obj", "only .ply"});
+  expect_refusal(2, {"extract", "t.vdb", "out.ply", "--attributes", "colour,colour"}, {"--attributes", "colour twice"});
 }
 
 }  // namespace

@@ -119,7 +119,7 @@ TEST_F(VoxelizeTest, OptionsOfOtherVoxelizers) {
 TEST_F(VoxelizeTest, WrongUsage) {
   write_cube();
   expect_refusal(2, {"--grids", "sdf,smoke"}, {"smoke", "closest-point", "attribute:NAME"});
-  expect_refusal(2, {"--grids", ""}, {"missing"});
+  expect_refusal(2, {"--grids", ""}, {"--grids", "empty"});
   expect_refusal(2, {"--grids", "sdf,"}, {"missing", "fog"});
   expect_refusal(2, {"--grids", "fog", "--voxelizer", "openvdb"}, {"hermesh", "openvdb", "--grids"});
   expect_refusal(2, {"--fog-exterior"}, {"--fog-exterior", "fog"});

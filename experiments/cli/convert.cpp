@@ -1,5 +1,6 @@
 // hermesh extract, remesh: level set to mesh, and polygons to level set and back to a mesh in one.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -59,10 +60,13 @@ ChosenExtractor choose_extractor(const ExtractArguments& arguments) {
   });
 }
 
-std::vector<std::string> split_names(const std::string& list) {
+std::vector<std::string> attribute_names(const std::string& list) {
   std::vector<std::string> names;
   std::istringstream stream(list);
-  for (std::string name; std::getline(stream, name, ',');) names.push_back(name);
+  for (std::string name; std::getline(stream, name, ',');) {
+    if (std::ranges::find(names, name) != names.end()) throw UsageError("--attributes names " + name + " twice");
+    names.push_back(name);
+  }
   return names;
 }
 
@@ -77,24 +81,28 @@ void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
                                                 : "closed half a voxel beyond its last samples; see --ends"));
 }
 
-PolygonMesh extract(const LevelSet& level_set, const PolygonMesh* source, const ChosenExtractor& chosen,
-                    const ExtractArguments& arguments, Session& session) {
+/// `input`: the file that it is about.
+PolygonMesh extract(const std::string& input, const LevelSet& level_set, const PolygonMesh* source,
+                    const ChosenExtractor& chosen, const ExtractArguments& arguments, Session& session) {
   const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);
   const Stopwatch watch;
   const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
-  EndedMesh ended = extract_with_ends(
-      chosen.extractor, {level_set, arguments.isovalue, source, chosen.options, session.context, field ? &*field : nullptr},
-      treatment);
+  EndedMesh ended = about_file(input, [&] {
+    return extract_with_ends(
+        chosen.extractor, {level_set, arguments.isovalue, source, chosen.options, session.context, field ? &*field : nullptr},
+        treatment);
+  });
   PolygonMesh mesh = std::move(ended.mesh);
   session.context.check();
   // No reader takes a mesh file without polygons, ours included.
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
-    throw Error("there is no surface inside the mask, nothing was written");
+    throw Error(input + ": there is no surface inside the mask, nothing was written");
   if (mesh.empty()) {
     const auto [lowest, highest] = value_range(level_set);
-    throw Error("there is no surface at the isovalue " + text(arguments.isovalue) +
+    throw Error(input + ": there is no surface at the isovalue " + text(arguments.isovalue) +
                 ", nothing was written: the volume has no sample inside, or none outside; its values go from " +
-                text(lowest) + " to " + text(highest) + ", and " + text(level_set.background()) + " beyond");
+                exact_text(lowest) + " to " + exact_text(highest) + ", and " + exact_text(level_set.background()) +
+                " beyond");
   }
   note_ends(ended.ends, treatment, session);
   print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
@@ -111,16 +119,16 @@ void save(const std::string& path, const PolygonMesh& mesh, Session& session) {
 
 int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& session) {
   const ChosenExtractor chosen = choose_extractor(arguments);
+  const std::vector<std::string> attributes = attribute_names(arguments.attributes);
   check_mesh_output(paths.out);
-  if (!arguments.attributes.empty()) check_keeps_attributes(paths.out);
+  if (!attributes.empty()) check_keeps_attributes(paths.out);
   std::optional<PolygonMesh> source;
   if (!arguments.source.empty()) source = read_polygons(arguments.source, session);
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  PolygonMesh mesh = extract(level_set, source ? &*source : nullptr, chosen, arguments, session);
-  if (!arguments.attributes.empty()) {
+  PolygonMesh mesh = extract(paths.in, level_set, source ? &*source : nullptr, chosen, arguments, session);
+  if (!attributes.empty()) {
     std::string line = "attributes";
-    for (const std::string& name :
-         sample_attributes(mesh, paths.in, split_names(arguments.attributes), session.context))
+    for (const std::string& name : sample_attributes(mesh, paths.in, attributes, session.context))
       line += " " + name;
     print_summary(session, line);
   }
@@ -135,7 +143,7 @@ int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const Ex
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  save(paths.out, extract(level_set, &mesh, chosen, extracting, session), session);
+  save(paths.out, extract(paths.in, level_set, &mesh, chosen, extracting, session), session);
   return kDone;
 }
 

@@ -14,6 +14,13 @@ inline std::string text(double value) {
   return buffer;
 }
 
+/// As many as tell a number of single precision from all others.
+inline std::string exact_text(float value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.9g", double(value));
+  return buffer;
+}
+
 inline std::string text(const Eigen::Vector3d& point) {
   char buffer[96];
   std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", point.x(), point.y(), point.z());

@@ -102,7 +102,8 @@ void add_import(CLI::App& app, Session& session) {
                       "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le "
                       "(the default) or be behind");
   command->add_option("--spacing", arguments->spacing, "Raw: A,B,C, the distances of samples in mm (default: 1,1,1)");
-  command->add_option("--offset", arguments->offset, "Raw: bytes before the first sample (default: 0)");
+  command->add_option("--offset", arguments->offset, "Raw: bytes before the first sample (default: 0)")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000'000'000}));
   command
       ->add_option("--replace-nan", arguments->replacement,
                    "Value in place of samples that are not finite (default: such a volume is refused)")

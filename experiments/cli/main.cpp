@@ -55,6 +55,18 @@ int run_to_exit_code(Session& session) {
   }
 }
 
+/// An option whose value is an empty string, as a variable of a script that was not set leaves it; it would be taken for
+/// one that was not given. Empty if there is none.
+std::string option_without_value(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& given : option->results())
+      if (given.empty()) return option->get_name();
+  const auto all = [](const CLI::App*) { return true; };  // groups of options are commands, too
+  for (const CLI::App* command : app.get_subcommands(all))
+    if (const std::string found = option_without_value(*command); !found.empty()) return found;
+  return {};
+}
+
 int run_program(int argc, char** argv) {
   Session session;
   session.context.cancel = &handle_signals();
@@ -77,6 +89,8 @@ int run_program(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
   }
+  if (const std::string option = option_without_value(app); !option.empty())
+    return fail(kUsage, option + " was given an empty value; see hermesh --help");
   if (!session.command) return fail(kUsage, "say what to do: a command is missing; see hermesh --help");
 
   const int threads = session.threads.value_or(std::max(1u, std::thread::hardware_concurrency()));

@@ -93,7 +93,7 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
 }
 
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options) {
-  PolygonMesh mesh = read_mesh(path, session.context, options);
+  PolygonMesh mesh = about_file(path, [&] { return read_mesh(path, session.context, options); });
   choose_diagonals(mesh);
   return mesh;
 }
@@ -112,7 +112,9 @@ VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string&
 LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session) {
   const VoxelizationInput input = voxelization_input(mesh, file, arguments, chosen, session);
-  check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
+  about_file(file, [&] {
+    check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
+  });
   const Stopwatch watch;
   LevelSet level_set = chosen.voxelizer.voxelize(input);
   session.context.check();

@@ -230,7 +230,12 @@ double CellBlocks::margin_for_rounding() const {
       farthest = farthest.cwiseMax(placement.local(index).cwiseAbs());
     }
   const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
-  return std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
+  const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
+  if (!(margin <= kLargestMargin))
+    throw Error("single precision cannot hold a mesh of this volume to " + std::to_string(kLargestMargin / 8) +
+                " voxel, so nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far; resample "
+                "or divide it, or use --extractor dual-contouring");
+  return margin;
 }
 
 const CellSheets& CellBlocks::find(const SheetsOfBlock& list, int cell) {

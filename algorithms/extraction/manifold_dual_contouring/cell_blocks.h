@@ -73,6 +73,7 @@ class CellBlocks {
     int axis;
   };
 
+  /// @throws Error if margin() would leave crossings and points no room.
   CellBlocks(const CellGrid& grid, RunContext& context);
 
   /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
@@ -222,6 +223,7 @@ class CellBlocks {
   bool sign_of_added(const HermiteView::Block& block) const;
   BlockMask cells_with_cuts(std::int32_t block) const;
 
+  static constexpr double kLargestMargin = 0.25;
   double margin_for_rounding() const;
 
   const CellGrid& grid_;

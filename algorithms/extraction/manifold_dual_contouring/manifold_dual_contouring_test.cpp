@@ -370,6 +370,15 @@ TEST(ManifoldDualContouring, NeedsNoLastResortForAThinPlate) {
   EXPECT_EQ(share_held(context), 0.0);
 }
 
+/// Two axes of the lattice nearly on one line: the nearer, the more voxels single precision's rounding is.
+TEST(ManifoldDualContouring, RefusesALatticeOnWhichRoundingCouldMovePointsAcrossFaces) {
+  FloatHermite hermite = sphere();
+  hermite.placement.linear.row(1) = Eigen::RowVector3d(1.0, 1e-3, 0.0);
+  EXPECT_FALSE(contour(hermite, 0.1).empty());
+  hermite.placement.linear.row(1) = Eigen::RowVector3d(1.0, 1e-5, 0.0);
+  EXPECT_THROW(contour(hermite, 0.1), Error);
+}
+
 TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
   RunContext context;
   initialize_openvdb();
