@@ -207,12 +207,6 @@ void LeafTable::number_leaves(RunContext& context) {
         node.nearest_inside = std::max(node.nearest_inside, value);
       }
     }
-    // To wait for one leaf after the other would take longer than all the rest.
-    constexpr std::size_t kAhead = 16;
-    for (std::size_t leaf = counts[i]; leaf < next; ++leaf) {
-      if (leaf + kAhead < next) __builtin_prefetch(leaves_[leaf + kAhead]);
-      values_[leaf] = leaves_[leaf]->buffer().data();
-    }
     Accessor access(*tree_);
     for (int slot = 0; slot < 27; ++slot) {
       const Coord there = node.lower.offsetBy(kWidth * (slot / 9 - 1), kWidth * (slot / 3 % 3 - 1), kWidth * (slot % 3 - 1));
@@ -229,7 +223,20 @@ void LeafTable::read_signs(RunContext& context) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
     context.check();
     bool finite = true;
-    for (std::size_t i = range.begin(); i < range.end(); ++i) finite &= read(values_[i], rule_, inside_[i]);
+    // To wait for one leaf after the other, and for the samples that it points to, would take longer than all the rest.
+    constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4, kLine = 16;
+    const auto find = [&](std::size_t i) {
+      values_[i] = leaves_[i]->buffer().data();
+      for (std::size_t sample = 0; sample < 512; sample += kLine) __builtin_prefetch(values_[i] + sample);
+    };
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kLeavesAhead, range.end()); ++i)
+      __builtin_prefetch(leaves_[i]);
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kSamplesAhead, range.end()); ++i) find(i);
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      if (i + kLeavesAhead < range.end()) __builtin_prefetch(leaves_[i + kLeavesAhead]);
+      if (i + kSamplesAhead < range.end()) find(i + kSamplesAhead);
+      finite &= read(values_[i], rule_, inside_[i]);
+    }
     if (!finite) not_finite = true;
   });
   if (not_finite) throw Error("the volume holds a value that is not finite; replace it before the extraction");
