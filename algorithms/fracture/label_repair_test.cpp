@@ -56,7 +56,7 @@ TEST(LabelRepair, EndsOnNoiseAndTouchesNoOutside) {
     LabelledSolid solid = labelled(random_blobs(random), [&](int x, int y, int z) {
       return hashed(static_cast<std::uint64_t>(x * 1000003 + y * 1009 + z)) % kinds;
     });
-    const std::vector<HermiteView::Block> before = solid.blocks;
+    const HermiteView::Blocks before = solid.blocks;
     RunContext context;
     const RepairReport report = repair_labels(solid, context);
     EXPECT_GT(report.changed_samples, 0u);

@@ -29,7 +29,7 @@ class LabelledGrid : public CellGrid {
   LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                RunContext& context);
 
-  const std::vector<HermiteView::Block>& blocks() const override { return solid_.blocks; }
+  const HermiteView::Blocks& blocks() const override { return solid_.blocks; }
   const IndexToWorld& placement() const override { return solid_.placement; }
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override;
   std::span<const std::array<BlockMask, 3>> cuts() const override { return cuts_; }

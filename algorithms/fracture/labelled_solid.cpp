@@ -39,7 +39,7 @@ std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
   return all;
 }
 
-void find_neighbours(std::vector<ViewBlock>& blocks, RunContext& context) {
+void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
   const auto find = [&](const Lower& lower) {
     const auto at =
         std::lower_bound(blocks.begin(), blocks.end(), lower,
@@ -148,6 +148,7 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
   std::vector<std::uint64_t> samples(lowers.size());
   parallel_blocks(lowers.size(), context, [&](std::size_t b) {
     ViewBlock& block = solid.blocks[b];
+    block = {};
     block.lower = lowers[b];
     block.leaf = static_cast<std::int32_t>(b);
     const SignLeaf* leaf = hermite.find(lowers[b]);

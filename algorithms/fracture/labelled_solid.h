@@ -45,7 +45,7 @@ struct LabelledSolid {
   /// Each block that holds an inside sample, and the seven below it, so that every cell with an inside corner
   /// begins in one of them; ascending. What is in no block is outside. `leaf` is the number of the block, −1
   /// nowhere, and `crossing` is empty until a LabelledGrid is made.
-  std::vector<HermiteView::Block> blocks;
+  HermiteView::Blocks blocks;
   std::vector<std::int32_t> leaf_of;  ///< by block the leaf of the Hermite data, −1 for none
   /// What the cutters say of a sample: 0 outside, else 1 + its place in `code_values`. Never changed.
   LabelField codes;

@@ -9,9 +9,9 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// Blocks below `leaf` that hold a cell with one of its crossing edges: the cells around an edge begin at its own
-/// sample and one step down each axis that is not the edge's.
-void blocks_below(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges, std::vector<Lower>& found) {
+/// Directions, of which bit 1 << (|dx| + 2|dy| + 4|dz|) is set, of the blocks below a leaf that hold a cell with one of its
+/// crossing edges: the cells around an edge begin at its own sample and one step down each axis that is not the edge's.
+unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
   constexpr std::uint64_t kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
   // Whether an edge along `axis` starts in the first layers along the axes whose bits are set in `down`.
   const auto touches = [&](int axis, int down) {
@@ -20,14 +20,33 @@ void blocks_below(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges, s
       if (edges[axis][x] & bits) return true;
     return false;
   };
-  for (int down = 1; down < 7; ++down) {
-    bool wanted = false;
+  unsigned wanted = 0;
+  for (int down = 1; down < 7; ++down)
     for (int axis = 0; axis < 3; ++axis)
-      if (!((down >> axis) & 1)) wanted = wanted || touches(axis, down);
-    if (wanted)
-      found.push_back({leaf.lower[0] - 8 * (down & 1), leaf.lower[1] - 8 * ((down >> 1) & 1),
-                       leaf.lower[2] - 8 * (down >> 2)});
-  }
+      if (!((down >> axis) & 1) && touches(axis, down)) wanted |= 1u << down;
+  return wanted;
+}
+
+Lower below(const SignLeaf& leaf, int down) {
+  return {leaf.lower[0] - 8 * (down & 1), leaf.lower[1] - 8 * ((down >> 1) & 1), leaf.lower[2] - 8 * (down >> 2)};
+}
+
+/// Places in ascending order, each once, of the blocks that no leaf is at although one of its cells has a crossing edge.
+std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunContext& context) {
+  std::vector<std::uint8_t> missing(leaves.size());
+  parallel_blocks(leaves.size(), context, [&](std::size_t i) {
+    const unsigned wanted = blocks_below(crossing_edges(leaves[i]));
+    for (int down = 1; down < 7; ++down)
+      if (wanted >> down & 1 && !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
+        missing[i] = static_cast<std::uint8_t>(missing[i] | 1u << down);
+  });
+  std::vector<Lower> found;
+  for (std::size_t i = 0; i < leaves.size(); ++i)
+    for (int down = 1; down < 7; ++down)
+      if (missing[i] >> down & 1) found.push_back(below(leaves[i], down));
+  std::ranges::sort(found);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
 }
 
 /// Blocks of one x and y, which follow one another.
@@ -37,7 +56,7 @@ struct Column {
 };
 
 /// Column by column, each block's three neighbours in an adjacent column lie behind those of the block before it: no search.
-void find_neighbours(std::vector<HermiteView::Block>& blocks, RunContext& context) {
+void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::array<std::int32_t, 2> lower{blocks[i].lower[0], blocks[i].lower[1]};
@@ -69,40 +88,29 @@ void find_neighbours(std::vector<HermiteView::Block>& blocks, RunContext& contex
 
 HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context)
     : placement_(placement) {
-  std::vector<std::vector<Lower>> below(leaves.size());
-  blocks_.resize(leaves.size());
+  const std::vector<Lower> added = blocks_without_leaf(leaves, context);
+  std::vector<std::size_t> leaves_before;  // by added block
+  for (const Lower& lower : added) {
+    const auto at = std::ranges::lower_bound(leaves, lower, {}, &SignLeaf::lower);
+    leaves_before.push_back(static_cast<std::size_t>(at - leaves.begin()));
+  }
+  blocks_.resize(leaves.size() + added.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
-    Block& block = blocks_[i];
+    const auto added_before = std::ranges::upper_bound(leaves_before, i) - leaves_before.begin();
+    Block& block = blocks_[i + static_cast<std::size_t>(added_before)];
     block.lower = leaves[i].lower;
     block.leaf = static_cast<std::int32_t>(i);
     block.inside = leaves[i].inside;
     block.crossing = crossing_edges(leaves[i]);
     block.count_before();
-    blocks_below(leaves[i], block.crossing, below[i]);
   });
-  std::vector<Lower> added;
-  const auto find = [&](std::span<const Block> among, const Lower& lower) {
-    const auto at = std::lower_bound(among.begin(), among.end(), lower,
-                                     [](const Block& block, const Lower& wanted) { return block.lower < wanted; });
-    return at != among.end() && at->lower == lower ? static_cast<std::int32_t>(at - among.begin()) : -1;
-  };
-  for (const auto& list : below)
-    for (const Lower& lower : list)
-      if (find(blocks_, lower) < 0) added.push_back(lower);
-  std::sort(added.begin(), added.end());
-  added.erase(std::unique(added.begin(), added.end()), added.end());
-
   // The signs of an added block are those of no crossing edge; extraction reads them of owners only.
-  std::vector<Block> merged;
-  merged.reserve(blocks_.size() + added.size());
-  auto next = blocks_.begin();
-  for (const Lower& lower : added) {
-    while (next != blocks_.end() && next->lower < lower) merged.push_back(*next++);
-    merged.emplace_back();
-    merged.back().lower = lower;
+  for (std::size_t i = 0; i < added.size(); ++i) {
+    Block& block = blocks_[leaves_before[i] + i];
+    block = {};
+    block.lower = added[i];
+    block.leaf = -1;
   }
-  merged.insert(merged.end(), next, blocks_.end());
-  blocks_ = std::move(merged);
   find_neighbours(blocks_, context);
 }
 

@@ -6,8 +6,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
 
@@ -18,13 +18,13 @@ namespace hermesh {
 class HermiteView {
  public:
   struct Block {
-    std::array<std::int32_t, 3> lower{};  ///< index coordinates of the first sample
-    std::int32_t leaf = -1;               ///< number among the leaves that own crossings; −1 for none
-    BlockMask inside{};
-    std::array<BlockMask, 3> crossing{};  ///< by axis: samples whose up-wind edge is crossed
-    std::array<std::array<std::uint16_t, 8>, 3> before{};  ///< by axis and word: crossing edges of the block before it
+    std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample
+    std::int32_t leaf;                  ///< number among the leaves that own crossings; −1 for none
+    BlockMask inside;
+    std::array<BlockMask, 3> crossing;  ///< by axis: samples whose up-wind edge is crossed
+    std::array<std::array<std::uint16_t, 8>, 3> before;  ///< by axis and word: crossing edges of the block before it
     /// By neighbour_slot(); a block's number, or −1 where there is none.
-    std::array<std::int32_t, 27> neighbours{};
+    std::array<std::int32_t, 27> neighbours;
 
     /// Of a crossing edge among those of the block, by axis and then by sample.
     std::uint32_t rank(int axis, int sample) const {
@@ -43,8 +43,10 @@ class HermiteView {
     }
   };
 
+  using Blocks = LargeArray<Block>;  ///< no member of theirs is set before it is written
+
   virtual ~HermiteView() = default;
-  const std::vector<Block>& blocks() const { return blocks_; }
+  const Blocks& blocks() const { return blocks_; }
   const IndexToWorld& placement() const { return placement_; }
 
   /// Of an edge that is crossed.
@@ -58,7 +60,7 @@ class HermiteView {
 
  private:
   IndexToWorld placement_;
-  std::vector<Block> blocks_;
+  Blocks blocks_;
 };
 
 /// `Read` turns a crossing of the data into an EdgeCrossing.

@@ -66,7 +66,7 @@ class Correspondence {
 
   Correspondence(const LevelSet& volume, double isovalue)
       : hermite_(sample_level_set(volume, isovalue, context_)), view_(view_of(hermite_, context_)) {
-    const std::vector<HermiteView::Block>& blocks = view_.blocks();
+    const HermiteView::Blocks& blocks = view_.blocks();
     std::vector<std::uint32_t> first_point{0}, first_quad{0};
     for (std::size_t b = 0; b < blocks.size(); ++b) {
       for_each_bit(active_cells(view_, blocks[b]), [&](int cell) { cells_.emplace_back(b, cell); });

@@ -27,7 +27,7 @@ class CellGrid {
  public:
   virtual ~CellGrid() = default;
   /// Of a block whose `leaf` is −1 the signs are unknown, but one and the same.
-  virtual const std::vector<HermiteView::Block>& blocks() const = 0;
+  virtual const HermiteView::Blocks& blocks() const = 0;
   virtual const IndexToWorld& placement() const = 0;
   /// Of an edge that is crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
@@ -227,7 +227,7 @@ class CellBlocks {
   double margin_for_rounding() const;
 
   const CellGrid& grid_;
-  const std::vector<HermiteView::Block>& source_;  ///< the grid's blocks
+  const HermiteView::Blocks& source_;  ///< the grid's blocks
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;

@@ -406,7 +406,7 @@ class Contourer {
 class HermiteCells : public CellGrid {
  public:
   explicit HermiteCells(const HermiteView& view) : view_(view) {}
-  const std::vector<HermiteView::Block>& blocks() const override { return view_.blocks(); }
+  const HermiteView::Blocks& blocks() const override { return view_.blocks(); }
   const IndexToWorld& placement() const override { return view_.placement(); }
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override {
     return view_.crossing(block, sample, axis);
