@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <stdexcept>
+#include <string>
 
 namespace hermesh {
 
@@ -17,5 +18,17 @@ class Cancelled : public std::exception {
  public:
   const char* what() const noexcept override { return "cancelled"; }
 };
+
+/// Puts the file before an Error of `work` that does not name it.
+template <class Work>
+auto about_file(const std::string& file, Work&& work) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    const std::string sentence = error.what();
+    if (sentence.find(file) != std::string::npos) throw;
+    throw Error("'" + file + "': " + sentence);
+  }
+}
 
 }  // namespace hermesh

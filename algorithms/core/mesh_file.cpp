@@ -215,7 +215,7 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
   MeshFile file = read_mesh_file(path, context, options);
   std::vector<MeshAttribute> attributes = std::move(file.attributes);
   file.attributes.clear();
-  PolygonMesh mesh = to_polygon_mesh(file);
+  PolygonMesh mesh = about_file(path.string(), [&] { return to_polygon_mesh(file); });
   mesh.attributes = std::move(attributes);
   return mesh;
 }

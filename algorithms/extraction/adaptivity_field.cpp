@@ -32,7 +32,7 @@ void check_linear(const openvdb::FloatGrid& grid, const char* what) {
 }
 
 void check_scale(const openvdb::FloatGrid& grid) {
-  // An imported volume whose least value is 0 has the next number below for a background.
+  // An imported volume whose least value is 0 has the next normal number below for a background.
   const auto good = [](float value) { return std::isfinite(value) && value >= -std::numeric_limits<float>::min(); };
   if (!good(grid.background()))
     throw Error("the scale of the tolerance has a background that is negative or not finite; give it one of 0 or more");

@@ -39,22 +39,6 @@ std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
   return all;
 }
 
-void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
-  const auto find = [&](const Lower& lower) {
-    const auto at =
-        std::lower_bound(blocks.begin(), blocks.end(), lower,
-                         [](const ViewBlock& block, const Lower& wanted) { return block.lower < wanted; });
-    return at != blocks.end() && at->lower == lower ? static_cast<std::int32_t>(at - blocks.begin()) : -1;
-  };
-  parallel_blocks(blocks.size(), context, [&](std::size_t b) {
-    const Lower& at = blocks[b].lower;
-    for (int x = -1; x <= 1; ++x)
-      for (int y = -1; y <= 1; ++y)
-        for (int z = -1; z <= 1; ++z)
-          blocks[b].neighbours[neighbour_slot(x, y, z)] = find({at[0] + 8 * x, at[1] + 8 * y, at[2] + 8 * z});
-  });
-}
-
 /// The codes of one block as numbers in a list of those that occur in it.
 struct BlockCodes {
   std::vector<CutCode> values;

@@ -35,6 +35,7 @@ Lower below(const SignLeaf& leaf, int down) {
 std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunContext& context) {
   std::vector<std::uint8_t> missing(leaves.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
+    // The crossing edges are found anew for the blocks: to keep them would take longer.
     const unsigned wanted = blocks_below(crossing_edges(leaves[i]));
     for (int down = 1; down < 7; ++down)
       if (wanted >> down & 1 && !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
@@ -55,8 +56,10 @@ struct Column {
   std::size_t first;
 };
 
-/// Column by column, each block's three neighbours in an adjacent column lie behind those of the block before it: no search.
+}  // namespace
+
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
+  // Column by column: each block's three neighbours in an adjacent one lie behind those of the block before it.
   std::vector<Column> columns;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::array<std::int32_t, 2> lower{blocks[i].lower[0], blocks[i].lower[1]};
@@ -83,8 +86,6 @@ void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
     }
   });
 }
-
-}  // namespace
 
 HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context)
     : placement_(placement) {

@@ -63,6 +63,9 @@ class HermiteView {
   Blocks blocks_;
 };
 
+/// Sets `neighbours` of blocks in ascending order of (x, y, z).
+void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
+
 /// `Read` turns a crossing of the data into an EdgeCrossing.
 template <class Crossing, class Read>
 class SparseView : public HermiteView {

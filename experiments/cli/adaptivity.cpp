@@ -52,6 +52,16 @@ AdaptivityField::Outside read_outside(const std::string& name) {
   return name == "nothing" ? AdaptivityField::Outside::nothing : AdaptivityField::Outside::simplify;
 }
 
+/// The mask or the scale. What is wrong with it is said here, where its file is known, and before the work.
+LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, Session& session) {
+  return about_file(file, [&] {
+    AdaptivityField field{.mask = {}, .outside = AdaptivityField::Outside::simplify, .scale = {}};
+    field.*part = read_level_set(file, "", session.context);
+    FieldEvaluator(&field, IndexToWorld());
+    return field.*part;
+  });
+}
+
 /// Any other would make its usual mesh and leave the user in the belief that it did not.
 void check_adaptive(const Extractor& extractor) {
   for (const OptionSpec& option : extractor.options)
@@ -100,7 +110,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
   AdaptivityField field;
   field.outside = !has_mask ? AdaptivityField::Outside::everywhere
                             : read_outside(arguments.outside.empty() ? "simplify" : arguments.outside);
-  if (!arguments.mask.empty()) field.mask = read_level_set(arguments.mask, "", session.context);
+  if (!arguments.mask.empty()) field.mask = read_part(arguments.mask, &AdaptivityField::mask, session);
   if (!arguments.frustum.empty()) {
     try {
       field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution, session.context);
@@ -109,12 +119,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
     }
   }
   if (!arguments.tolerance_grid.empty())
-    field.scale = about_file(arguments.tolerance_grid, [&] {
-      AdaptivityField scale;
-      scale.scale = read_level_set(arguments.tolerance_grid, "", session.context);
-      FieldEvaluator(&scale, {});  // looks at its values
-      return scale.scale;
-    });
+    field.scale = read_part(arguments.tolerance_grid, &AdaptivityField::scale, session);
   return field;
 }
 

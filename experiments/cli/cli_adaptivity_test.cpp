@@ -60,7 +60,7 @@ TEST_F(AdaptivityTest, AnImportedToleranceGridMayHoldZeros) {
 
 TEST_F(AdaptivityTest, BadInputIsSaidInASentence) {
   expect_refused({"--mask", "missing.vdb"}, 1, "does not exist");
-  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1, "sphere.vdb: the scale of the tolerance is negative or not finite");
+  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1, "sphere.vdb': the scale of the tolerance is negative or not finite");
   expect_refused({"--mask", ""}, 2, "--mask was given an empty value");
   expect_refused({"--outside", "nothing"}, 2, "needs --mask or --frustum");
   expect_refused({"--frustum", "0,0,3 0,0,0 60 1 0.1"}, 2, "it must be");

@@ -96,10 +96,10 @@ PolygonMesh extract(const std::string& input, const LevelSet& level_set, const P
   session.context.check();
   // No reader takes a mesh file without polygons, ours included.
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
-    throw Error(input + ": there is no surface inside the mask, nothing was written");
+    throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
   if (mesh.empty()) {
     const auto [lowest, highest] = value_range(level_set);
-    throw Error(input + ": there is no surface at the isovalue " + text(arguments.isovalue) +
+    throw Error("'" + input + "': there is no surface at the isovalue " + text(arguments.isovalue) +
                 ", nothing was written: the volume has no sample inside, or none outside; its values go from " +
                 exact_text(lowest) + " to " + exact_text(highest) + ", and " + exact_text(level_set.background()) +
                 " beyond");

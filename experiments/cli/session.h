@@ -33,20 +33,6 @@ auto as_usage(Check check) {
   }
 }
 
-/// Puts the file before a failure of `work` that does not name it.
-template <typename Work>
-auto about_file(const std::string& file, Work work) {
-  try {
-    return work();
-  } catch (const UsageError&) {
-    throw;
-  } catch (const Error& error) {
-    const std::string sentence = error.what();
-    if (sentence.find(file) != std::string::npos) throw;
-    throw Error(file + ": " + sentence);
-  }
-}
-
 struct Session {
   RunContext context;
   bool quiet = false;

@@ -93,7 +93,7 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
 }
 
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options) {
-  PolygonMesh mesh = about_file(path, [&] { return read_mesh(path, session.context, options); });
+  PolygonMesh mesh = read_mesh(path, session.context, options);
   choose_diagonals(mesh);
   return mesh;
 }

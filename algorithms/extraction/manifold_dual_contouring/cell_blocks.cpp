@@ -232,9 +232,9 @@ double CellBlocks::margin_for_rounding() const {
   const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
   if (!(margin <= kLargestMargin))
-    throw Error("single precision cannot hold a mesh of this volume to " + std::to_string(kLargestMargin / 8) +
-                " voxel, so nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far; resample "
-                "or divide it, or use --extractor dual-contouring");
+    throw Error("single precision cannot hold a mesh of this volume to a thirty-second of a voxel, so nothing can be "
+                "promised of it: its axes lie nearly in a plane, or it reaches too far; resample or divide it, or use "
+                "--extractor dual-contouring");
   return margin;
 }
 
