@@ -79,6 +79,22 @@ std::vector<Coord> collect(std::size_t n, F&& f) {
 
 }  // namespace
 
+openvdb::CoordBBox active_box(const openvdb::FloatTree& tree) {
+  using Upper = Tree::RootNodeType::ChildNodeType;
+  using Lower = Upper::ChildNodeType;
+  openvdb::CoordBBox box;
+  for (auto tile = tree.root().cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Upper::DIM);
+  for (auto upper = tree.root().cbeginChildOn(); upper; ++upper) {
+    for (auto tile = upper->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Lower::DIM);
+    for (auto lower = upper->cbeginChildOn(); lower; ++lower) {
+      for (auto tile = lower->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Leaf::DIM);
+      for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
+        if (!box.isInside(openvdb::CoordBBox::createCube(leaf.getCoord(), Leaf::DIM))) leaf->evalActiveBoundingBox(box);
+    }
+  }
+  return box;
+}
+
 IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   if (!grid.transform().isLinear())
     throw Error(
@@ -89,7 +105,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
     for (int column = 0; column < 3; ++column) result.linear(row, column) = matrix(column, row);
   const Eigen::Vector3d translation(matrix(3, 0), matrix(3, 1), matrix(3, 2));
 
-  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  const openvdb::CoordBBox box = active_box(grid.tree());
   Bounds world;
   if (!box.empty()) {
     for (int axis = 0; axis < 3; ++axis) {

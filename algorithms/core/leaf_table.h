@@ -108,6 +108,10 @@ class LeafTable {
   LargeArray<BlockMask> inside_;
 };
 
+/// As FloatTree::evalActiveVoxelBoundingBox(), which reads where a leaf is from the leaf itself, and so waits for memory as
+/// often as there are leaves. Most lie within the box of those before them, and then the node above tells.
+openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
+
 /// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
 /// @throws Error for a grid with perspective.
 IndexToWorld placement_of(const openvdb::FloatGrid& grid);

@@ -177,5 +177,34 @@ TEST_F(LeafTableTest, ValuesThatAreNotFiniteAreRefused) {
   EXPECT_THROW(table(openvdb::FloatGrid::create(1.0f), std::nan("")), Error);
 }
 
+TEST(ActiveBox, IsThatOfVoxelsAndTilesAtAllLevels) {
+  std::mt19937 random(17);
+  const auto at_most = [&](int n) { return std::uniform_int_distribution<int>(-n, n)(random); };
+  EXPECT_TRUE(active_box(openvdb::FloatTree(1.0f)).empty());
+  for (int round = 0; round < 200; ++round) {
+    openvdb::FloatTree tree(1.0f);
+    for (int i = round % 12; i > 0; --i) {
+      const Coord place(at_most(5000), at_most(300), at_most(40));
+      switch (random() % 8) {
+        case 0:
+          tree.addTile(1 + random() % 3, place, 0.5f, random() % 2 == 0);
+          break;
+        case 1:
+          tree.touchLeaf(place);  // without an active voxel
+          break;
+        default:
+          for (int voxel = 0; voxel < 4; ++voxel) tree.setValue(place.offsetBy(at_most(9), at_most(9), at_most(9)), 0.5f);
+      }
+    }
+    openvdb::CoordBBox expected;
+    tree.evalActiveVoxelBoundingBox(expected);
+    const openvdb::CoordBBox box = active_box(tree);
+    EXPECT_EQ(box.empty(), expected.empty()) << round;
+    if (!expected.empty()) {
+      EXPECT_EQ(box, expected) << round;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hermesh
