@@ -22,21 +22,15 @@ using BlockMask = std::array<std::uint64_t, 8>;
 
 constexpr int sample_index(int x, int y, int z) { return 64 * x + 8 * y + z; }
 constexpr bool test(const BlockMask& mask, int sample) { return (mask[sample >> 6] >> (sample & 63)) & 1; }
-/// As std::popcount(), which is a call of a function where the processor's instruction may not be used.
-constexpr int bits_in(std::uint64_t word) {
-  word -= (word >> 1) & 0x5555555555555555u;
-  word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
-  return static_cast<int>((((word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu) * 0x0101010101010101u) >> 56);
-}
 constexpr int count(const BlockMask& mask) {
   int sum = 0;
-  for (const std::uint64_t word : mask) sum += bits_in(word);
+  for (const std::uint64_t word : mask) sum += std::popcount(word);
   return sum;
 }
 /// Set bits before `sample`.
 constexpr std::uint32_t rank_in(const BlockMask& mask, int sample) {
-  int before = bits_in(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1));
-  for (int word = 0; word < sample >> 6; ++word) before += bits_in(mask[word]);
+  int before = std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1));
+  for (int word = 0; word < sample >> 6; ++word) before += std::popcount(mask[word]);
   return static_cast<std::uint32_t>(before);
 }
 constexpr bool any(const BlockMask& mask) {

@@ -275,7 +275,7 @@ Coord LeafTable::lower(std::size_t leaf) const {
 
 std::int32_t LeafTable::find(const Node& node, std::uint32_t slot) const {
   const std::uint64_t bit = std::uint64_t{1} << (slot & 63), word = node.child[slot >> 6];
-  if (word & bit) return static_cast<std::int32_t>(node.rank[slot >> 6]) + bits_in(word & (bit - 1));
+  if (word & bit) return static_cast<std::int32_t>(node.rank[slot >> 6]) + std::popcount(word & (bit - 1));
   return uniform((node.tile_inside[slot >> 6] & bit) != 0);
 }
 
@@ -310,7 +310,7 @@ std::array<std::int32_t, 8> LeafTable::neighbours(std::size_t leaf, int side) co
 [[gnu::always_inline]] inline void LeafTable::find_three(const Node& node, std::uint32_t slot, std::int32_t* result) {
   const std::uint32_t at = slot >> 6, first = (slot & 63) - 1;
   const std::uint64_t child = node.child[at], inside = node.tile_inside[at];
-  auto next = static_cast<std::int32_t>(node.rank[at]) + bits_in(child & ((std::uint64_t{1} << first) - 1));
+  auto next = static_cast<std::int32_t>(node.rank[at]) + std::popcount(child & ((std::uint64_t{1} << first) - 1));
   for (std::uint32_t i = 0; i < 3; ++i) {
     const bool is_leaf = child >> (first + i) & 1;
     result[i] = is_leaf ? next : uniform(inside >> (first + i) & 1);
@@ -354,8 +354,8 @@ std::vector<std::uint32_t> LeafTable::in_order_of_place() const {
   const auto add_row = [&](const Node& node, int x, int y) {
     const int word = 4 * x + (y >> 2), shift = 16 * (y & 3);
     const std::uint64_t child = node.child[word];
-    std::uint32_t leaf = node.rank[word] + static_cast<std::uint32_t>(bits_in(child & ((std::uint64_t{1} << shift) - 1)));
-    for (int left = bits_in(child >> shift & 0xffff); left > 0; --left) result.push_back(leaf++);
+    std::uint32_t leaf = node.rank[word] + static_cast<std::uint32_t>(std::popcount(child & ((std::uint64_t{1} << shift) - 1)));
+    for (int left = std::popcount(child >> shift & 0xffff); left > 0; --left) result.push_back(leaf++);
   };
   for (std::size_t slab = 0, slab_end; slab < nodes.size(); slab = slab_end) {
     slab_end = end_of(slab, nodes.size(), 0);

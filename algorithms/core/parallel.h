@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 
 namespace hermesh {
@@ -23,6 +24,14 @@ void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
                       context.check();
                       for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
                     });
+}
+
+/// `n` copies, each written by whoever comes to it first. @throws Cancelled.
+template <class T>
+LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
+  LargeArray<T> result(n);
+  parallel_blocks(n, context, [&](std::size_t i) { result[i] = value; });
+  return result;
 }
 
 /// @throws Error if as many cannot be numbered by 32 bits.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 
@@ -30,15 +31,15 @@ class HermiteView {
     std::uint32_t rank(int axis, int sample) const {
       const int word = sample >> 6;
       return before[axis][word] +
-             static_cast<std::uint32_t>(bits_in(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+             static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
     }
-    int crossing_count() const { return before[2][7] + bits_in(crossing[2][7]); }
+    int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
     void count_before() {
       int sum = 0;
       for (int axis = 0; axis < 3; ++axis)
         for (int word = 0; word < 8; ++word) {
           before[axis][word] = static_cast<std::uint16_t>(sum);
-          sum += bits_in(crossing[axis][word]);
+          sum += std::popcount(crossing[axis][word]);
         }
     }
   };

@@ -1,7 +1,9 @@
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "algorithms/core/parallel.h"
@@ -26,7 +28,9 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       margin_(margin_for_rounding()),
       cuts_(grid.cuts()),
       told_(grid.joint_sheets()),
-      blocks_(grid.blocks().size()) {
+      blocks_(grid.blocks().size()),
+      joined_sheets_(blocks_.size()),
+      several_(blocks_.size()) {
   Stage stage(context, "find cells");
   std::array<bool, 256> is_plain;  // by signs of the corners
   for (std::size_t signs = 0; signs < 256; ++signs)
@@ -35,6 +39,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   std::vector<std::uint64_t> codes(n), points(n);
   parallel_blocks(n, context, [&](std::size_t b) {
     const HermiteView::Block& source = grid.blocks()[b];
+    blocks_[b] = {};
     blocks_[b].inside = source.inside;
     if (source.leaf < 0 && sign_of_added(source)) blocks_[b].inside.fill(~std::uint64_t{0});
   });
@@ -49,7 +54,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
       block.rank[word] = before;
-      before += static_cast<std::uint32_t>(bits_in(block.active[word]));
+      before += static_cast<std::uint32_t>(std::popcount(block.active[word]));
     }
     found[b].reserve(before);
     for_each_bit(block.active, [&](int cell) {
@@ -65,7 +70,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   codes_.resize(exclusive_scan(codes, "cells"));
   parallel_blocks(n, context, [&](std::size_t b) {
     blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
-    std::copy(found[b].begin(), found[b].end(), codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
+    const std::vector<std::uint8_t> own = std::move(found[b]);
+    std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
   cut_ambiguous_faces(context);
   parallel_blocks(n, context, [&](std::size_t b) {
@@ -73,10 +79,10 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     for_each_bit(blocks_[b].special, [&](int cell) {
       const int sheets = point_count(static_cast<std::int32_t>(b), cell);
       if (sheets <= 1) return;
-      blocks_[b].several.emplace_back(static_cast<std::uint16_t>(cell), later);
+      several_.at(b).emplace_back(static_cast<std::uint16_t>(cell), later);
       later = static_cast<std::uint16_t>(later + sheets - 1);
     });
-    points[b] = found[b].size() + later;
+    points[b] = cells_in(static_cast<std::int32_t>(b)) + later;
   });
   points_ = exclusive_scan(points, "points");
   for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
@@ -126,7 +132,7 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
       const std::size_t at = code_at(static_cast<std::int32_t>(b), cell);
       if (joined[at] == 0) return;
       blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
-      blocks_[b].joined_sheets.emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));
+      joined_sheets_.at(b).emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));
     });
   });
 }
@@ -223,12 +229,26 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
 double CellBlocks::margin_for_rounding() const {
   const IndexToWorld& placement = grid_.placement();
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
-  for (const HermiteView::Block& block : source_)
+  const auto include = [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
     for (int corner = 0; corner < 8; ++corner) {
-      Eigen::Vector3d index;
-      for (int a = 0; a < 3; ++a) index[a] = block.lower[a] - placement.base[a] + 8 * ((corner >> a) & 1);
+      Eigen::Vector3d index = lower;
+      for (int a = 0; a < 3; ++a)
+        if ((corner >> a) & 1) index[a] = upper[a];
       farthest = farthest.cwiseMax(placement.local(index).cwiseAbs());
     }
+  };
+  const auto lower_of = [&](const HermiteView::Block& block) {
+    return Eigen::Vector3d(block.lower[0] - placement.base[0], block.lower[1] - placement.base[1],
+                           block.lower[2] - placement.base[2]);
+  };
+  const Eigen::Vector3d side = Eigen::Vector3d::Constant(8);
+  if (placement.linear.isDiagonal(0)) {  // the farthest along each axis are those of the box about all blocks
+    Eigen::AlignedBox3d box;
+    for (const HermiteView::Block& block : source_) box.extend(lower_of(block));
+    if (!box.isEmpty()) include(box.min(), box.max() + side);
+  } else {
+    for (const HermiteView::Block& block : source_) include(lower_of(block), lower_of(block) + side);
+  }
   const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
   if (!(margin <= kLargestMargin))
@@ -253,10 +273,10 @@ std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const 
   const Block& block = blocks_[number];
   if (sheet == 0)
     return block.first_point + static_cast<std::uint32_t>(code_at(number, cell) - block.first_code);
-  const auto at = std::lower_bound(block.several.begin(), block.several.end(), cell,
+  const auto& several = several_[number];
+  const auto at = std::lower_bound(several.begin(), several.end(), cell,
                                    [](const auto& entry, int wanted) { return entry.first < wanted; });
-  const std::uint32_t cells = block.rank[7] + static_cast<std::uint32_t>(bits_in(block.active[7]));
-  return block.first_point + cells + at->second + static_cast<std::uint32_t>(sheet - 1);
+  return block.first_point + cells_in(number) + at->second + static_cast<std::uint32_t>(sheet - 1);
 }
 
 Eigen::Vector3d CellBlocks::corner(std::int32_t block, int sample) const {
@@ -283,7 +303,7 @@ int CellBlocks::crossings_on(const Edge& first, int length) const {
   }
   const std::uint64_t line =
       first.axis == 1 ? 0x0101010101010101u >> (8 * (8 - length)) : 0xffu >> (8 - length);
-  return bits_in((crossing[static_cast<std::size_t>(word)] >> bit) & line);
+  return std::popcount((crossing[static_cast<std::size_t>(word)] >> bit) & line);
 }
 
 Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge, const EdgeCrossing& crossing) const {

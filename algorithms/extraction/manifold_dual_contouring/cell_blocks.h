@@ -10,10 +10,13 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
+#include "algorithms/extraction/manifold_dual_contouring/by_block.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
 #include "algorithms/hermite/hermite_view.h"
 
@@ -45,17 +48,15 @@ class CellGrid {
 
 class CellBlocks {
  public:
+  /// (Without initialisers, so that many can be made without writing them twice.)
   struct Block {
-    BlockMask inside{};
-    BlockMask active{};  ///< cells with a crossing edge, by their first corner
-    BlockMask joints{};  ///< of these, those with a cut
-    BlockMask special{};  ///< of these, joints and those of several sheets or with an ambiguous face
-    BlockMask joined{};  ///< of the active ones, those with an ambiguous face whose inside is joined
-    SheetsOfBlock joined_sheets;
-    std::uint32_t first_point = 0, first_code = 0;
-    std::array<std::uint32_t, 8> rank{};  ///< active cells before each word
-    /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
-    std::vector<std::pair<std::uint16_t, std::uint16_t>> several;
+    BlockMask inside;
+    BlockMask active;   ///< cells with a crossing edge, by their first corner
+    BlockMask joints;   ///< of these, those with a cut
+    BlockMask special;  ///< of these, joints and those of several sheets or with an ambiguous face
+    BlockMask joined;   ///< of the active ones, those with an ambiguous face whose inside is joined
+    std::uint32_t first_point, first_code;
+    std::array<std::uint32_t, 8> rank;  ///< active cells before each word
   };
   struct Edge {
     std::int32_t block;
@@ -109,7 +110,7 @@ class CellBlocks {
   /// closes a tunnel of less than a voxel or opens a wall of less than one.
   const CellSheets& sheets(std::int32_t block, int cell) const {
     if (const CellSheets* told = told_sheets(block, cell)) return *told;
-    if (test(blocks_[block].joined, cell)) return find(blocks_[block].joined_sheets, cell);
+    if (test(blocks_[block].joined, cell)) return find(joined_sheets_[block], cell);
     return kCellSheets[codes_[code_at(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
@@ -120,6 +121,10 @@ class CellBlocks {
     return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
   }
   std::uint32_t point(std::int32_t block, int cell, int sheet) const;
+  std::uint32_t cells_in(std::int32_t block) const {
+    const auto next = static_cast<std::size_t>(block) + 1;
+    return (next < blocks_.size() ? blocks_[next].first_code : static_cast<std::uint32_t>(codes_.size())) - blocks_[block].first_code;
+  }
   /// How many points a block's cells have: those of its active cells' first sheets, ascending, and then those of all others.
   std::uint32_t points_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
@@ -206,7 +211,7 @@ class CellBlocks {
   std::size_t code_at(std::int32_t block, int cell) const {
     const Block& b = blocks_[block];
     const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
-    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(bits_in(before));
+    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
   }
   const CellSheets* told_sheets(std::int32_t block, int cell) const {
     return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;
@@ -231,7 +236,10 @@ class CellBlocks {
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;
-  std::vector<Block> blocks_;
+  LargeArray<Block> blocks_;
+  ByBlock<SheetsOfBlock> joined_sheets_;  ///< of the cells that are `joined`
+  /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
+  ByBlock<std::vector<std::pair<std::uint16_t, std::uint16_t>>> several_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
   std::size_t points_ = 0;
 };

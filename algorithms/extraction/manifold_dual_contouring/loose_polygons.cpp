@@ -6,6 +6,9 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
 
 namespace hermesh {
 namespace {
@@ -90,19 +93,24 @@ bool may_meet(const NamedPolygon& a, const NamedPolygon& b) {
 
 }  // namespace
 
-void LoosePolygons::ByPlace::add(std::uint32_t polygon, const Box3& box) {
-  for_each_place(box, [&](std::uint64_t place) { entries_.emplace_back(place, polygon); });
-}
-
-void LoosePolygons::ByPlace::sort() {
+LoosePolygons::ByPlace::ByPlace(std::span<const Box3> boxes, const RunContext& context) {
+  std::vector<std::uint64_t> starts(boxes.size());
+  parallel_blocks(boxes.size(), context,
+                  [&](std::size_t i) { for_each_place(boxes[i], [&](std::uint64_t) { ++starts[i]; }); });
+  entries_.resize(exclusive_scan(starts, "places of polygons"));
+  parallel_blocks(boxes.size(), context, [&](std::size_t i) {
+    for_each_place(boxes[i], [&, at = starts[i]](std::uint64_t place) mutable {
+      entries_[at++] = {place, static_cast<std::uint32_t>(i)};
+    });
+  });
   tbb::parallel_sort(entries_);
   std::size_t places = 0;
   for (std::size_t i = 0; i < entries_.size(); ++i)
-    places += i == 0 || entries_[i].first != entries_[i - 1].first;
+    places += i == 0 || entries_[i].place != entries_[i - 1].place;
   ranges_.assign(std::bit_ceil(4 * places + 1), Range{0, 0, 0});
   for (std::uint32_t first = 0, end; first < entries_.size(); first = end) {
-    for (end = first; end < entries_.size() && entries_[end].first == entries_[first].first;) ++end;
-    ranges_[slot_of(entries_[first].first)] = {entries_[first].first, first, end};
+    for (end = first; end < entries_.size() && entries_[end].place == entries_[first].place;) ++end;
+    ranges_[slot_of(entries_[first].place)] = {entries_[first].place, first, end};
   }
 }
 
@@ -119,18 +127,19 @@ template <class F>
 void LoosePolygons::ByPlace::for_each_near(const Box3& box, F&& f) const {
   for_each_place(box, [&](std::uint64_t place) {
     const Range& range = ranges_[slot_of(place)];
-    for (std::uint32_t i = range.first; i < range.end; ++i) f(entries_[i].second, place);
+    for (std::uint32_t i = range.first; i < range.end; ++i) f(entries_[i].polygon, place);
   });
 }
 
-LoosePolygons::LoosePolygons(std::vector<NamedPolygon> tested)
-    : polygons_(std::move(tested)), meets_(polygons_.size()) {
-  for (std::size_t i = 0; i < polygons_.size(); ++i) {
-    boxes_.push_back(box_of(polygons_[i]));
-    by_place_.add(static_cast<std::uint32_t>(i), boxes_.back());
-  }
-  by_place_.sort();
-}
+LoosePolygons::LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& context)
+    : polygons_(std::move(tested)),
+      boxes_([&] {
+        std::vector<Box3> boxes(polygons_.size());
+        parallel_blocks(boxes.size(), context, [&](std::size_t i) { boxes[i] = box_of(polygons_[i]); });
+        return boxes;
+      }()),
+      by_place_(boxes_, context),
+      meets_(polygons_.size()) {}
 
 /// Tested polygons near a box, with boxes relative to its lower corner: in single precision, and rounded up.
 struct LoosePolygons::Near {

@@ -3,31 +3,35 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_grid.h"
 
 namespace hermesh {
 
-/// A triangle, or a quad that is cut from its first corner to its third.
+/// A triangle, or a quad that is cut from its first corner to its third. (Without initialisers, so that many can be made
+/// without writing them twice.)
 struct NamedPolygon {
   std::uint64_t name;  ///< no other polygon's
   int corners;
   std::array<std::uint32_t, 4> names;  ///< of the corners: those of the same name are the same point
   std::array<Eigen::Vector3d, 4> points;
   /// Corners around which triangles are known not to meet (polygon_stars.h), a bit each.
-  unsigned settled = 0;
+  unsigned settled;
 };
 
 /// Which polygons meet another one in more than the corners and the edge that they share, or may do so, or
 /// themselves where they are quads.
 class LoosePolygons {
  public:
-  explicit LoosePolygons(std::vector<NamedPolygon> tested);
+  /// @throws Cancelled
+  LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& context);
 
   /// Of the polygons around, some that are near one another: with those that are tested among them, or
   /// without. Safe to call for several lots at once.
@@ -39,15 +43,18 @@ class LoosePolygons {
   /// Polygons by the cubes of a lattice that their boxes touch.
   class ByPlace {
    public:
-    void add(std::uint32_t polygon, const Box3& box);
-    /// Before the first question.
-    void sort();
+    ByPlace(std::span<const Box3> boxes, const RunContext& context);
     /// Calls f(polygon, the cube) for those that share a cube with the box.
     template <class F>
     void for_each_near(const Box3& box, F&& f) const;
 
    private:
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> entries_;  ///< places and polygons, ascending
+    struct Entry {
+      std::uint64_t place;
+      std::uint32_t polygon;
+      auto operator<=>(const Entry&) const = default;
+    };
+    LargeArray<Entry> entries_;  ///< ascending
     struct Range {
       std::uint64_t place;
       std::uint32_t first, end;  ///< none if they are equal
@@ -59,7 +66,7 @@ class LoosePolygons {
   struct Near;
   void find_near(const Box3& box, Near& near) const;
 
-  std::vector<NamedPolygon> polygons_;
+  LargeArray<NamedPolygon> polygons_;
   std::vector<Box3> boxes_;  ///< theirs
   ByPlace by_place_;
   std::vector<std::uint8_t> meets_;  ///< by polygon

@@ -23,7 +23,7 @@ struct Mesh {
   std::vector<Triangle> triangles;
 
   NamedPolygon polygon(const Which& which, const std::vector<std::uint32_t>& settled) const {
-    NamedPolygon result{2 * which.number + which.is_quad, which.is_quad ? 4 : 3, {}, {}};
+    NamedPolygon result{2 * which.number + which.is_quad, which.is_quad ? 4 : 3, {}, {}, 0};
     if (which.is_quad)
       result.names = quads[which.number];
     else
@@ -35,9 +35,9 @@ struct Mesh {
     return result;
   }
   Indices that_meet(const std::vector<Which>& tested, const std::vector<std::uint32_t>& settled = {}) const {
-    std::vector<NamedPolygon> polygons;
+    LargeArray<NamedPolygon> polygons;
     for (const Which& which : tested) polygons.push_back(polygon(which, settled));
-    LoosePolygons loose(polygons);
+    LoosePolygons loose(polygons, RunContext{});
     std::vector<NamedPolygon> all;
     for (std::size_t i = 0; i < quads.size(); ++i) all.push_back(polygon({i, true}, settled));
     for (std::size_t i = 0; i < triangles.size(); ++i) all.push_back(polygon({i, false}, settled));

@@ -23,18 +23,18 @@ using Eigen::Vector3d;
 /// when others are proposed, and then points on fanned edges, which do not.
 class RegionPolygons {
  public:
-  RegionPolygons(const Regions& regions, const UniformPoints& points)
+  RegionPolygons(const Regions& regions, const UniformPoints& points, const RunContext& context)
       : regions_(regions),
         cells_(regions.cells()),
         points_(points),
         first_cube_(static_cast<std::uint32_t>(cells_.point_count())),
         lone_edges_(cells_.size()),
         made_(cells_.size()),
-        untested_(cells_.size()) {}
+        untested_(filled(cells_.size(), BlockMask{}, context)) {}
 
   /// Makes those of blocks anew where any are others than they were.
   /// @param changed by block the samples whose edges may have others
-  void update(const std::vector<BlockMask>& changed, RunContext& context) {
+  void update(std::span<const BlockMask> changed, RunContext& context) {
     Stage stage(context, "connect regions");
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       if (!any(changed[b])) return;
@@ -61,7 +61,7 @@ class RegionPolygons {
   }
 
   /// Edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
-  std::vector<CellBlocks::Edge> loose_that_meet(const std::vector<BlockMask>& changed,
+  std::vector<CellBlocks::Edge> loose_that_meet(std::span<const BlockMask> changed,
                                                 RunContext& context) const {
     Stage stage(context, "test loose polygons");
     const std::vector<std::uint8_t> near = two_on(changed);
@@ -76,7 +76,7 @@ class RegionPolygons {
   /// was asked last.
   std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "test loose polygons");
-    const std::vector<BlockMask> changed = std::exchange(untested_, std::vector<BlockMask>(made_.size()));
+    const LargeArray<BlockMask> changed = std::exchange(untested_, filled(made_.size(), BlockMask{}, context));
     return that_meet(changed, two_on(changed), nullptr, context, [&](std::size_t b, auto&& test) {
       std::uint64_t part = 0;
       for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
@@ -91,8 +91,8 @@ class RegionPolygons {
     });
   }
 
-  /// @param fine has the polygons of lone edges
-  RegionMesh mesh(const EdgePolygons& fine, RunContext& context) const {
+  /// There are no polygons here any more then. @param fine has those of lone edges
+  RegionMesh take_mesh(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "connect regions");
     const std::size_t n = cells_.size();
     check_indices(cells_.point_count() + regions_.cube_count() + fine.fanned_edges(), "points and cubes");
@@ -130,6 +130,7 @@ class RegionPolygons {
       for_each_polygon(
           b, fine, [&](const Quad& q) { *quad++ = numbered(q); },
           [&](const Triangle& t) { *triangle++ = numbered(t); });
+      made_[b] = {};
     });
     return mesh;
   }
@@ -185,7 +186,7 @@ class RegionPolygons {
   bool is_cube(std::uint32_t name) const { return name >= first_cube_ && name < first_fan(); }
   /// @param stars of cubes' points; none if null
   NamedPolygon named(const Polygon& polygon, const PolygonStars* stars) const {
-    NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}};
+    NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}, 0};
     for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i) {
       const std::uint32_t name = polygon.names[i];
       result.points[i] = place(name);
@@ -196,7 +197,7 @@ class RegionPolygons {
 
   /// Of the cubes that new loose polygons have. A cube's polygons are in blocks next to its own, or there.
   /// @param near two_on(changed)
-  PolygonStars stars_of_loose(const std::vector<BlockMask>& changed, const std::vector<std::uint8_t>& near,
+  PolygonStars stars_of_loose(std::span<const BlockMask> changed, const std::vector<std::uint8_t>& near,
                               RunContext& context) const {
     PolygonStars stars(regions_.cube_count());
     parallel_blocks(made_.size(), context, [&](std::size_t b) {
@@ -237,23 +238,30 @@ class RegionPolygons {
   /// @param others called with a block and a function, which it calls with samples of edges, and functions
   /// for their polygons
   template <class F>
-  std::vector<CellBlocks::Edge> that_meet(const std::vector<BlockMask>& changed,
+  std::vector<CellBlocks::Edge> that_meet(std::span<const BlockMask> changed,
                                           const std::vector<std::uint8_t>& near, const PolygonStars* stars,
                                           RunContext& context, F&& others) const {
     std::vector<CellBlocks::Edge> result;
     // New loose ones beside all others, and then the others beside new ones.
     for (const bool is_new : {true, false}) {
-      std::vector<const Polygon*> asked;
-      for (std::size_t b = 0; b < made_.size(); ++b)
-        if (near[b])
-          for (const std::uint32_t number : made_[b].loose)
-            if (const Polygon& polygon = made_[b].polygons[number];
-                test(changed[b], polygon.sample()) == is_new)
-              asked.push_back(&polygon);
+      const auto for_each_asked = [&](std::size_t b, auto&& f) {
+        if (!near[b]) return;
+        for (const std::uint32_t number : made_[b].loose)
+          if (const Polygon& polygon = made_[b].polygons[number]; test(changed[b], polygon.sample()) == is_new) f(polygon);
+      };
+      std::vector<std::uint64_t> first(made_.size());
+      parallel_blocks(made_.size(), context,
+                      [&](std::size_t b) { for_each_asked(b, [&](const Polygon&) { ++first[b]; }); });
+      LargeArray<const Polygon*> asked(exclusive_scan(first, "loose polygons"));
       if (asked.empty()) continue;
-      std::vector<NamedPolygon> polygons(asked.size());
-      parallel_blocks(asked.size(), context, [&](std::size_t i) { polygons[i] = named(*asked[i], stars); });
-      LoosePolygons loose(std::move(polygons));
+      LargeArray<NamedPolygon> polygons(asked.size());
+      parallel_blocks(made_.size(), context, [&](std::size_t b) {
+        for_each_asked(b, [&, at = first[b]](const Polygon& polygon) mutable {
+          asked[at] = &polygon;
+          polygons[at++] = named(polygon, stars);
+        });
+      });
+      LoosePolygons loose(std::move(polygons), context);
       parallel_blocks(made_.size(), context, [&](std::size_t b) {
         if (!near[b]) return;
         thread_local std::vector<NamedPolygon> beside;
@@ -315,7 +323,7 @@ class RegionPolygons {
   }
 
   /// Blocks at most two from those that have any.
-  std::vector<std::uint8_t> two_on(const std::vector<BlockMask>& cells) const {
+  std::vector<std::uint8_t> two_on(std::span<const BlockMask> cells) const {
     std::vector<std::uint8_t> result(cells.size());
     std::vector<std::size_t> last, next;
     for (std::size_t b = 0; b < cells.size(); ++b)
@@ -323,6 +331,7 @@ class RegionPolygons {
         result[b] = 1;
         last.push_back(b);
       }
+    if (last.size() == cells.size()) return result;
     for (int step = 0; step < 2; ++step) {
       for (const std::size_t b : last)
         for (const std::int32_t there : cells_.source(static_cast<std::int32_t>(b)).neighbours)
@@ -339,7 +348,7 @@ class RegionPolygons {
   const std::uint32_t first_cube_;  ///< name
   EdgeMasks lone_edges_;            ///< by block and axis: those whose polygons are of the uniform mesh
   std::vector<Made> made_;          ///< by block
-  std::vector<BlockMask> untested_;  ///< by block: as update() has it, against the uniform mesh
+  LargeArray<BlockMask> untested_;   ///< by block: as update() has it, against the uniform mesh
 };
 
 /// By point of the uniform mesh, those on fanned edges included.
@@ -367,21 +376,21 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
 template <class Connect>
 RegionMesh merge(const Regions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
                  RunContext& context) {
-  RegionPolygons merged(regions, points);
+  RegionPolygons merged(regions, points, context);
   const auto call_bold = [&](const std::vector<CellBlocks::Edge>& meeting) {
     for (const CellBlocks::Edge& edge : meeting) proof.call_bold(edge);
     return !meeting.empty();
   };
   for (std::size_t splits = 0;;) {
     splits += proof.run();
-    const std::vector<BlockMask> changed = proof.take_changed();
+    const LargeArray<BlockMask> changed = proof.take_changed();
     merged.update(changed, context);
     if (call_bold(merged.loose_that_meet(changed, context))) continue;
     const auto& fine = connect(merged.lone_edges());
     if (call_bold(merged.loose_that_meet(fine, context))) continue;
     context.figure("split_regions", double(splits));
     context.figure("loose_polygons", double(merged.loose_count()));
-    return merged.mesh(fine, context);
+    return merged.take_mesh(fine, context);
   }
 }
 

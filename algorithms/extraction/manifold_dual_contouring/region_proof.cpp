@@ -12,6 +12,12 @@
 namespace hermesh {
 namespace {
 
+constexpr BlockMask kAll = [] {
+  BlockMask mask;
+  mask.fill(~std::uint64_t{0});
+  return mask;
+}();
+
 void add(BlockMask& mask, const Region& region) {
   for (int x = 0; x < region.side(); ++x)
     mask[static_cast<std::size_t>((region.cell >> 6) + x)] |= rows_of(region.cell, region.side(), 0, 0);
@@ -45,13 +51,12 @@ RegionProof::RegionProof(Regions& regions, RegionSlabs* slabs, const RegionShell
       context_(context),
       bold_(cells_.size()),
       any_bold_(cells_.size()),
-      changed_(cells_.size()),
-      fresh_(cells_.size()),
-      stirred_(cells_.size()),
+      changed_(filled(cells_.size(), kAll, context)),
+      fresh_(filled(cells_.size(), kAll, context)),
+      stirred_(filled(cells_.size(), kAll, context)),
       open_(shell ? cells_.size() : 0),
       loose_(slabs ? cells_.size() : 0) {
-  for (auto* masks : {&changed_, &fresh_, &stirred_})
-    for (BlockMask& mask : *masks) mask.fill(~std::uint64_t{0});
+  if (!slabs && !shell) return;
   for (std::size_t b = 0; b < cells_.size(); ++b) {
     const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
     turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 |
@@ -75,14 +80,14 @@ std::size_t RegionProof::run() {
   }
 }
 
-std::vector<BlockMask> RegionProof::take_changed() {
-  return std::exchange(changed_, std::vector<BlockMask>(cells_.size()));
+LargeArray<BlockMask> RegionProof::take_changed() {
+  return std::exchange(changed_, filled(cells_.size(), BlockMask{}, context_));
 }
 
 void RegionProof::place_lone_points() {
-  std::vector<BlockMask> alone(cells_.size());
+  LargeArray<BlockMask> alone(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-    if (any(fresh_[b])) alone[b] = regions_.alone(static_cast<std::int32_t>(b));
+    alone[b] = any(fresh_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
   });
   uniform_->place(alone, context_);
 }

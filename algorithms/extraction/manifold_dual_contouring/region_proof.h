@@ -61,7 +61,7 @@ class RegionProof {
   std::size_t run();
 
   /// By block the samples whose edges may have other polygons than when this was asked last.
-  std::vector<BlockMask> take_changed();
+  LargeArray<BlockMask> take_changed();
 
   /// The largest cube around the edge is to be split when run() is called again.
   void call_bold(const CellBlocks::Edge& edge);
@@ -91,10 +91,10 @@ class RegionProof {
   std::vector<std::array<std::uint64_t, Regions::kLevels>>
       bold_;                            ///< by block and level, less 1: cubes to be split
   std::vector<std::uint8_t> any_bold_;  ///< by block
-  std::vector<BlockMask> changed_;      ///< by block: stirred since take_changed()
+  LargeArray<BlockMask> changed_;       ///< by block: stirred since take_changed()
   // Cells by block:
-  std::vector<BlockMask> fresh_;    ///< of cubes that were split (all at the beginning),
-  std::vector<BlockMask> stirred_;  ///< or next to one
+  LargeArray<BlockMask> fresh_;     ///< of cubes that were split (all at the beginning),
+  LargeArray<BlockMask> stirred_;   ///< or next to one
   bool is_fresh_ = true;            ///< nothing was looked at yet
   std::vector<std::array<BlockMask, 3>>
       open_;  ///< by block and axis: edges whose polygons are not shown; with a shell

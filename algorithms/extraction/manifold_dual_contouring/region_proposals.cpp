@@ -159,10 +159,10 @@ bool RegionProposals::is_disc(int first, int side) const {
     faces[0][i] = i > 0 ? lower_faces_[0][x] & rows : 0;
     faces[1][i] = lower_faces_[1][x] & upper_rows;
     faces[2][i] = lower_faces_[2][x] & right;
-    count += bits_in(cells[i]);
-    euler -= bits_in(faces[0][i]) + bits_in(faces[1][i]) + bits_in(faces[2][i]);
-    euler += bits_in(crossing[0][x] & both);
-    if (i > 0) euler += bits_in(crossing[1][x] & right) + bits_in(crossing[2][x] & upper_rows);
+    count += std::popcount(cells[i]);
+    euler -= std::popcount(faces[0][i]) + std::popcount(faces[1][i]) + std::popcount(faces[2][i]);
+    euler += std::popcount(crossing[0][x] & both);
+    if (i > 0) euler += std::popcount(crossing[1][x] & right) + std::popcount(crossing[2][x] & upper_rows);
   }
   if (count < 2 || euler + count != 1) return false;
   std::array<std::uint64_t, 8> reached{};
@@ -182,7 +182,7 @@ bool RegionProposals::is_disc(int first, int side) const {
     for (std::size_t i = 0; i < n; ++i) spread(i);
     for (std::size_t i = n; i-- > 0;) spread(i);
     now = 0;
-    for (std::size_t i = 0; i < n; ++i) now += bits_in(reached[i]);
+    for (std::size_t i = 0; i < n; ++i) now += std::popcount(reached[i]);
   }
   for (std::size_t i = 0; i < n; ++i)
     if (reached[i] != cells[i]) return false;

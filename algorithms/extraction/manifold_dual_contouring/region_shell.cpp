@@ -142,7 +142,7 @@ RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, c
   for (std::size_t b = 0; b < first.size(); ++b)
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (std::size_t x = 0; x < 8; ++x)
-        first[b] += static_cast<std::uint64_t>(bits_in(quads_in(b, axis, x)));
+        first[b] += static_cast<std::uint64_t>(std::popcount(quads_in(b, axis, x)));
   quads_.resize(exclusive_scan(first, "edge crossings"));
   upright_.resize(quads_.size());
   for (LargeArray<float>& coordinates : in_blocks_)
@@ -166,7 +166,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   described.points_before = own.rank.data();
   described.first_point = own.first_point;
   const std::uint32_t points = cells_.points_in(block),
-                      cells = own.several.empty() ? points : static_cast<std::uint32_t>(count(own.active));
+                      cells = cells_.cells_in(block);
   described.first_later = own.first_point + cells;
   described.later_points = points - cells;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -31,9 +31,11 @@ Regions::Regions(const CellBlocks& cells, const UniformPoints& points, const Reg
   Stage stage(context, "propose regions");
   const int level = std::countr_zero(static_cast<unsigned>(options.largest_cube));
   const std::uint64_t all = ~std::uint64_t{0} >> (64 - (512 >> (3 * level)));
-  for (std::size_t b = 0; b < cells.size(); ++b)
+  parallel_blocks(cells.size(), context, [&](std::size_t b) {
+    blocks_[b] = {};
     if (any(cells[static_cast<std::int32_t>(b)].active))
       blocks_[b].asked[static_cast<std::size_t>(level - 1)] = all;
+  });
   propose_parts(context);
 }
 
@@ -50,27 +52,37 @@ void Regions::propose_parts(RunContext& context) {
     before[i] = blocks_[asked[i]].proposed;
     propose(proposals.local(), static_cast<std::int32_t>(asked[i]), blocks_[asked[i]], found[i]);
   });
+  const auto added_to = [&](std::size_t i) {
+    std::array<std::uint64_t, kLevels> added;
+    for (std::size_t at = 0; at < added.size(); ++at) added[at] = blocks_[asked[i]].proposed[at] & ~before[i][at];
+    return added;
+  };
+  std::size_t cubes = cubes_.size();
   for (std::size_t i = 0; i < asked.size(); ++i) {
     BlockRegions& block = blocks_[asked[i]];
-    std::array<std::uint64_t, kLevels> added;
-    for (std::size_t at = 0; at < added.size(); ++at) added[at] = block.proposed[at] & ~before[i][at];
-    auto next = static_cast<std::uint32_t>(cubes_.size());
-    const auto number_from = [&](std::uint32_t& first, std::uint64_t cubes) {
-      if (cubes == 0) return;
+    const std::array<std::uint64_t, kLevels> added = added_to(i);
+    auto next = static_cast<std::uint32_t>(cubes);
+    const auto number_from = [&](std::uint32_t& first, std::uint64_t some) {
+      if (some == 0) return;
       first = next;
-      next += static_cast<std::uint32_t>(bits_in(cubes));
+      next += static_cast<std::uint32_t>(std::popcount(some));
     };
     for (std::size_t at = 1; at < added.size(); ++at) number_from(block.first_cube[at - 1], added[at]);
     for (int larger = 0; larger < 8; ++larger)
       number_from(block.first_part[static_cast<std::size_t>(larger)], added[0] & parts_of(larger, 2));
-    cubes_.resize(next);
-    const ProposedCube* cube = found[i].data();
+    cubes += found[i].size();
+  }
+  check_indices(cubes, "regions");
+  cubes_.resize(cubes);
+  parallel_blocks(asked.size(), context, [&](std::size_t i) {
+    const std::array<std::uint64_t, kLevels> added = added_to(i);
+    const std::vector<ProposedCube> own = std::move(found[i]);
+    const ProposedCube* cube = own.data();
     for (int level = kLevels; level > 0; --level)
       for (std::uint64_t left = added[static_cast<std::size_t>(level - 1)]; left != 0; left &= left - 1)
         cubes_[number(region_of(static_cast<std::int32_t>(asked[i]), std::countr_zero(left), level))] =
             *cube++;
-  }
-  check_indices(cubes_.size(), "regions");
+  });
 }
 
 void Regions::propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,

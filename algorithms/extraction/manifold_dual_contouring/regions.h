@@ -67,10 +67,10 @@ class Regions {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
     const int number = cube_of(cube.cell, cube.level);
     std::uint64_t before = own.proposed[cube.level - 1u] & ((std::uint64_t{1} << number) - 1);
-    if (cube.level > 1) return own.first_cube[cube.level - 2u] + static_cast<std::uint32_t>(bits_in(before));
+    if (cube.level > 1) return own.first_cube[cube.level - 2u] + static_cast<std::uint32_t>(std::popcount(before));
     const int larger = cube_of(cube.cell, 2);
     before &= parts_of(larger, 2);
-    return own.first_part[static_cast<std::size_t>(larger)] + static_cast<std::uint32_t>(bits_in(before));
+    return own.first_part[static_cast<std::size_t>(larger)] + static_cast<std::uint32_t>(std::popcount(before));
   }
   /// Leaves single cells until propose_parts() is called. Safe to call for several blocks at once.
   void split(const Region& region);
@@ -109,12 +109,13 @@ class Regions {
   const RegionOptions& options() const { return options_; }
 
  private:
+  /// (Without initialisers, so that many can be made without writing them twice.)
   struct BlockRegions {
-    std::array<std::uint64_t, kLevels> proposed{}, alive{};  ///< by level, less 1: a bit a cube
-    std::array<std::uint32_t, kLevels - 1> first_cube{};     ///< number, of 4³ and 8³ cells
-    std::array<std::uint32_t, 8> first_part{};               ///< of 2³ cells, within each 4³
-    BlockMask merged{};
-    std::array<std::uint64_t, kLevels> asked{};  ///< as `alive`: where cubes are to be proposed
+    std::array<std::uint64_t, kLevels> proposed, alive;  ///< by level, less 1: a bit a cube
+    std::array<std::uint32_t, kLevels - 1> first_cube;   ///< number, of 4³ and 8³ cells
+    std::array<std::uint32_t, 8> first_part;             ///< of 2³ cells, within each 4³
+    BlockMask merged;
+    std::array<std::uint64_t, kLevels> asked;  ///< as `alive`: where cubes are to be proposed
   };
   /// Those of a block that are asked for, and where there are none, finer ones.
   static void propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
@@ -128,8 +129,8 @@ class Regions {
   const UniformPoints& points_;
   const RegionOptions& options_;
   const FilePoints& file_;
-  std::vector<BlockRegions> blocks_;
-  std::vector<ProposedCube> cubes_;  ///< by number
+  LargeArray<BlockRegions> blocks_;
+  LargeArray<ProposedCube> cubes_;  ///< by number
 };
 
 }  // namespace hermesh

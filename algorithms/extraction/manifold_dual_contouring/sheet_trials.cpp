@@ -71,7 +71,7 @@ class Trials {
         });
     });
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      untested_[b] = {};
+      untested_.clear(b);
       for (const CellBlocks::Edge& edge : meeting[b]) mark(edge);
     });
     return joined(found);
@@ -84,7 +84,7 @@ class Trials {
     return all;
   }
   void mark(const CellBlocks::Edge& edge) {
-    untested_[edge.block][edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
+    untested_.at(static_cast<std::size_t>(edge.block))[edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
   }
   void mark_edges(const CellBlocks::Cell& cell) {
     for (int edge = 0; edge < 12; ++edge)
@@ -138,8 +138,8 @@ class Trials {
   EdgePolygons& polygons_;
   PolygonNeighbourhood mesh_;
   UniformPoints& points_;
-  Cells tried_;                                     ///< all that were when this began
-  std::vector<std::array<BlockMask, 3>> untested_;  ///< by block and axis: edges whose polygons may meet others
+  Cells tried_;         ///< all that were when this began
+  EdgeMasks untested_;  ///< edges whose polygons may meet others
 };
 
 Cells without_repeats(Cells cells) {

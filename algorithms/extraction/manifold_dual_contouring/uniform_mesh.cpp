@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
@@ -91,10 +92,10 @@ class Contourer {
         file_(file),
         wishes_(cells_.size()),
         points_(UniformPoints::of_few(cells_.point_count())) {
-    for (std::size_t b = 0; b < cells_.size(); ++b) {
-      counts_.cells += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].active));
+    counts_.cells = cells_.cell_count();
+    if (grid.cuts().empty()) return;  // no joints
+    for (std::size_t b = 0; b < cells_.size(); ++b)
       counts_.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
-    }
   }
 
   const CellBlocks& cells() const { return cells_; }
@@ -122,13 +123,15 @@ class Contourer {
   }
 
   /// @param wanted active cells, by block, whose points are not there yet
-  void place_points(const std::vector<BlockMask>& wanted, RunContext& context) {
-    for (std::size_t b = 0; b < wanted.size(); ++b)
+  void place_points(std::span<const BlockMask> wanted, RunContext& context) {
+    parallel_blocks(wanted.size(), context, [&](std::size_t b) {
       for_each_bit(wanted[b], [&](int cell) {
         const auto block = static_cast<std::int32_t>(b);
         for (int sheet = 0; sheet < cells_.point_count(block, cell); ++sheet)
-          points_.make_room(cells_.point(block, cell, sheet));
+          points_.ask(cells_.point(block, cell, sheet));
       });
+    });
+    points_.make_room();
     place_points_of([&](std::size_t b) { return wanted[b]; }, context);
   }
 
@@ -427,11 +430,11 @@ UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& o
 struct UniformCells::Made {
   Made(const HermiteView& view, const DualContouringOptions& options, const FilePoints& file,
        RunContext& context)
-      : grid(view), contourer(grid, options, file, context, nullptr), placed(contourer.cells().size()) {}
+      : grid(view), contourer(grid, options, file, context, nullptr), placed(filled(contourer.cells().size(), BlockMask{}, context)) {}
 
   const HermiteCells grid;
   Contourer contourer;
-  std::vector<BlockMask> placed;
+  LargeArray<BlockMask> placed;  ///< cells by block whose points are there
 };
 
 UniformCells::UniformCells(const HermiteView& grid, const DualContouringOptions& options,
@@ -443,13 +446,14 @@ const CellBlocks& UniformCells::cells() const { return made_->contourer.cells();
 const UniformPoints& UniformCells::points() const { return made_->contourer.points(); }
 const UniformCounts& UniformCells::counts() const { return made_->contourer.counts(); }
 
-void UniformCells::place(const std::vector<BlockMask>& wanted, RunContext& context) {
-  std::vector<BlockMask> missing(wanted.size());
-  for (std::size_t b = 0; b < missing.size(); ++b)
+void UniformCells::place(std::span<const BlockMask> wanted, RunContext& context) {
+  LargeArray<BlockMask> missing(wanted.size());
+  parallel_blocks(missing.size(), context, [&](std::size_t b) {
     for (std::size_t word = 0; word < missing[b].size(); ++word) {
       missing[b][word] = wanted[b][word] & ~made_->placed[b][word];
       made_->placed[b][word] |= wanted[b][word];
     }
+  });
   made_->contourer.place_points(missing, context);
 }
 

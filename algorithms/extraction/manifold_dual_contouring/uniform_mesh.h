@@ -88,7 +88,7 @@ class UniformCells {
   /// Of what was made so far.
   const UniformCounts& counts() const;
   /// The points of active cells, by block. @throws Cancelled
-  void place(const std::vector<BlockMask>& wanted, RunContext& context);
+  void place(std::span<const BlockMask> wanted, RunContext& context);
   /// Those of all cells, which takes less time than if they were asked for one by one. Nothing has been
   /// placed before. @throws Cancelled
   void place_all(RunContext& context);

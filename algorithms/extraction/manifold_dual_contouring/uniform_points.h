@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -25,21 +27,34 @@ class UniformPoints {
   /// None as yet.
   static UniformPoints of_few(std::size_t count) {
     UniformPoints result;
-    result.runs_.resize(runs_of(count), kNone);
     result.is_whole_ = false;
+    result.number(count);
     return result;
   }
 
-  /// Of a point that there is room for. Not safe while room is made.
+  /// Of a point that there is room for. Not safe while room is asked for or made.
   Eigen::Vector3d& operator[](std::uint32_t point) { return places_[slot(point)]; }
   const Eigen::Vector3d& operator[](std::uint32_t point) const { return places_[slot(point)]; }
 
-  void make_room(std::uint32_t point) {
+  /// That make_room() makes room for it. Safe to call for several at once.
+  void ask(std::uint32_t point) {
     if (is_whole_) return;
-    std::uint32_t& run = runs_[point / kRun];
-    if (run != kNone) return;
-    run = static_cast<std::uint32_t>(places_.size());
-    places_.resize(places_.size() + kRun);
+    const std::uint32_t run = point / kRun;
+    if (runs_[run] != kNone) return;
+    const std::uint64_t bit = std::uint64_t{1} << (run % 64);
+    const std::atomic_ref asked(asked_[run / 64]);
+    if (!(asked.load(std::memory_order_relaxed) & bit)) asked.fetch_or(bit, std::memory_order_relaxed);
+  }
+  void make_room() {
+    std::size_t runs = 0, slot = places_.size();
+    for (const std::uint64_t asked : asked_) runs += static_cast<std::size_t>(std::popcount(asked));
+    // With room for the few that follow when some of what merged is split, without which all would move then.
+    const std::size_t slots = slot + kRun * runs;
+    if (slots > places_.capacity()) places_.reserve(slots + slots / 8);
+    places_.resize(slots);
+    for (std::size_t i = 0; i < asked_.size(); ++i)
+      for (std::uint64_t left = std::exchange(asked_[i], 0); left != 0; left &= left - 1, slot += kRun)
+        runs_[64 * i + static_cast<std::size_t>(std::countr_zero(left))] = static_cast<std::uint32_t>(slot);
   }
   /// There are `count` points then, with room for those from `first` on.
   void extend(std::size_t first, std::size_t count) {
@@ -47,8 +62,9 @@ class UniformPoints {
       places_.resize(count);
       return;
     }
-    runs_.resize(runs_of(count), kNone);
-    for (std::size_t point = first; point < count; ++point) make_room(static_cast<std::uint32_t>(point));
+    number(count);
+    for (std::size_t point = first; point < count; ++point) ask(static_cast<std::uint32_t>(point));
+    make_room();
   }
 
   /// Where a point's place is among slots(): a number for arrays beside this one.
@@ -62,11 +78,15 @@ class UniformPoints {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu, kRun = 8;
-  static constexpr std::size_t runs_of(std::size_t points) { return (points + kRun - 1) / kRun; }
   UniformPoints() = default;
+  void number(std::size_t points) {
+    runs_.resize((points + kRun - 1) / kRun, kNone);
+    asked_.resize((runs_.size() + 63) / 64);
+  }
 
   std::vector<Eigen::Vector3d> places_;
-  std::vector<std::uint32_t> runs_;  ///< slots of the first points of runs
+  std::vector<std::uint32_t> runs_;   ///< slots of the first points of runs
+  std::vector<std::uint64_t> asked_;  ///< a bit a run
   bool is_whole_ = true;
 };
 

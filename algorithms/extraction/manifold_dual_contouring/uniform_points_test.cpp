@@ -17,8 +17,9 @@ TEST(UniformPoints, OfFewHasRoomForThoseOnly) {
   EXPECT_EQ(points.slots(), 0u);
   std::set<std::uint32_t> wanted;
   for (std::uint32_t p = 5; p < kCells; p += 97) {
-    points.make_room(p);
-    points.make_room(p);
+    points.ask(p);
+    points.ask(p);
+    points.make_room();
     points[p] = Vector3d::Constant(p);
     wanted.insert(p);
   }
