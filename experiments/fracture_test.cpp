@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <ostream>
 
 #include "algorithms/core/error.h"
 #include "algorithms/core/mesh_file.h"
@@ -113,6 +114,8 @@ struct Case {
   const char* cutters;
   std::size_t count;
 };
+/// Without it a test would be named after the addresses of the texts.
+void PrintTo(const Case& c, std::ostream* out) { *out << c.object << " " << c.cutters << " " << c.count; }
 
 class Fracture : public testing::TestWithParam<Case> {};
 

@@ -87,6 +87,7 @@ openvdb::CoordBBox active_box(const openvdb::FloatTree& tree) {
   for (auto upper = tree.root().cbeginChildOn(); upper; ++upper) {
     for (auto tile = upper->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Lower::DIM);
     for (auto lower = upper->cbeginChildOn(); lower; ++lower) {
+      if (box.isInside(lower->getNodeBoundingBox())) continue;
       for (auto tile = lower->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Leaf::DIM);
       for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
         if (!box.isInside(openvdb::CoordBBox::createCube(leaf.getCoord(), Leaf::DIM))) leaf->evalActiveBoundingBox(box);

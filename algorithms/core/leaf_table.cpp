@@ -354,7 +354,8 @@ std::vector<std::uint32_t> LeafTable::in_order_of_place() const {
   const auto add_row = [&](const Node& node, int x, int y) {
     const int word = 4 * x + (y >> 2), shift = 16 * (y & 3);
     const std::uint64_t child = node.child[word];
-    std::uint32_t leaf = node.rank[word] + static_cast<std::uint32_t>(std::popcount(child & ((std::uint64_t{1} << shift) - 1)));
+    const std::uint64_t before = child & ((std::uint64_t{1} << shift) - 1);
+    std::uint32_t leaf = node.rank[word] + static_cast<std::uint32_t>(std::popcount(before));
     for (int left = std::popcount(child >> shift & 0xffff); left > 0; --left) result.push_back(leaf++);
   };
   for (std::size_t slab = 0, slab_end; slab < nodes.size(); slab = slab_end) {

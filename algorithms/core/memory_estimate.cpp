@@ -14,7 +14,6 @@
 
 #include "algorithms/core/block_table.h"
 #include "algorithms/core/error.h"
-#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -112,8 +111,8 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
     for (std::size_t i = part * kChunk; i < std::min(mesh.points.size(), (part + 1) * kChunk); ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
-        block[std::size_t(axis)] =
-            floor_to_int(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex));
+        block[std::size_t(axis)] = static_cast<std::int32_t>(
+            std::floor(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex)));
       parts[part].insert(block);
     }
   });

@@ -7,7 +7,8 @@
 
 namespace hermesh {
 
-/// `sse2` stands for vectors of four, which all that runs the program has (x86-64-v2); `avx512` is what Ice Lake and Zen 4 were the first to have: F, BW, DQ, VL and VBMI2.
+/// `sse2` is what every target is compiled for (x86-64-v2): vectors of four. `avx512` is what Ice Lake and Zen 4 were the
+/// first to have: F, BW, DQ, VL and VBMI2.
 enum class SimdLevel { sse2, avx2, avx512 };
 
 std::string_view name(SimdLevel level);

@@ -51,7 +51,7 @@ bool find_rule(const openvdb::FloatGrid& grid, double isovalue, EndRule& rule) {
       rule.largest_rise[axis] = static_cast<float>(kTolerance * placement.linear.col(axis).norm());
     return double(grid.background()) >= isovalue;  // otherwise space beyond is inside
   }
-  rule.box = grid.evalActiveVoxelBoundingBox();
+  rule.box = active_box(grid.tree());
   if (rule.box.empty()) return false;
   const bool is_fog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
   return !is_fog || grid.activeVoxelCount() == rule.box.volume();
@@ -178,7 +178,7 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
     edges = EndFinder(table, rule).find(context);
   }
   if (edges.empty()) return {level_set, {}};
-  const openvdb::CoordBBox active = rule.level_set ? grid.evalActiveVoxelBoundingBox() : rule.box;
+  const openvdb::CoordBBox active = rule.level_set ? active_box(grid.tree()) : rule.box;
   return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active)};
 }
 

@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -22,9 +21,10 @@ constexpr std::size_t kMostBlocks = 256, kMostObstacles = 20000;
 template <class F>
 bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
   const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
-  for (std::int32_t x = floor_to_int(low[0]); x <= high[0]; ++x)
-    for (std::int32_t y = floor_to_int(low[1]); y <= high[1]; ++y)
-      for (std::int32_t z = floor_to_int(low[2]); z <= high[2]; ++z)
+  const auto first = [&](int axis) { return static_cast<std::int32_t>(std::floor(low[axis])); };
+  for (std::int32_t x = first(0); x <= high[0]; ++x)
+    for (std::int32_t y = first(1); y <= high[1]; ++y)
+      for (std::int32_t z = first(2); z <= high[2]; ++z)
         if (!f(CellObstacles::Voxel{x, y, z})) return false;
   return true;
 }

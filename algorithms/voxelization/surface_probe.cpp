@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -76,7 +75,8 @@ void SurfaceProbe::enter(const Voxel& cell) {
 
 /// By straight ways to the corners of the cell that p is in.
 Side SurfaceProbe::seen_from(const Vector3d& p) {
-  enter({floor_to_int(p[0]), floor_to_int(p[1]), floor_to_int(p[2])});
+  const auto cell = [&](int axis) { return static_cast<std::int32_t>(std::floor(p[axis])); };
+  enter({cell(0), cell(1), cell(2)});
   const auto sees_one = [&](unsigned corners) {
     for (; corners != 0; corners &= corners - 1) {
       const Voxel voxel = corner(cell_, unsigned(std::countr_zero(corners)));

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -25,7 +24,7 @@ constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kMany = 256;
 
-std::int32_t block_of(double voxel) { return floor_to_int(voxel) >> 3; }
+std::int32_t block_of(double voxel) { return static_cast<std::int32_t>(std::floor(voxel)) >> 3; }
 
 BlockAt block_of_centre(const VoxelBox& box) {
   BlockAt block;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/core/rounding.h"
 
 namespace hermesh {
 namespace {
@@ -33,7 +32,8 @@ struct Hinge {
 }  // namespace
 
 CellObstacles::Voxel cell_of(const Vector3d& place) {
-  return {floor_to_int(place[0]), floor_to_int(place[1]), floor_to_int(place[2])};
+  const auto cell = [&](int axis) { return static_cast<std::int32_t>(std::floor(place[axis])); };
+  return {cell(0), cell(1), cell(2)};
 }
 
 Vector3d WallWalk::normal_of(std::uint32_t triangle) const {

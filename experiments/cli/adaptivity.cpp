@@ -53,9 +53,10 @@ AdaptivityField::Outside read_outside(const std::string& name) {
 }
 
 /// The mask or the scale. What is wrong with it is said here, where its file is known, and before the work.
-LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, Session& session) {
+LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, AdaptivityField::Outside outside,
+                   Session& session) {
   return about_file(file, [&] {
-    AdaptivityField field{.mask = {}, .outside = AdaptivityField::Outside::simplify, .scale = {}};
+    AdaptivityField field{.mask = {}, .outside = outside, .scale = {}};
     field.*part = read_level_set(file, "", session.context);
     FieldEvaluator(&field, IndexToWorld());
     return field.*part;
@@ -110,7 +111,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
   AdaptivityField field;
   field.outside = !has_mask ? AdaptivityField::Outside::everywhere
                             : read_outside(arguments.outside.empty() ? "simplify" : arguments.outside);
-  if (!arguments.mask.empty()) field.mask = read_part(arguments.mask, &AdaptivityField::mask, session);
+  if (!arguments.mask.empty()) field.mask = read_part(arguments.mask, &AdaptivityField::mask, field.outside, session);
   if (!arguments.frustum.empty()) {
     try {
       field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution, session.context);
@@ -119,7 +120,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
     }
   }
   if (!arguments.tolerance_grid.empty())
-    field.scale = read_part(arguments.tolerance_grid, &AdaptivityField::scale, session);
+    field.scale = read_part(arguments.tolerance_grid, &AdaptivityField::scale, field.outside, session);
   return field;
 }
 

@@ -113,9 +113,11 @@ CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, 
 }  // namespace hermesh::cli
 
 int main(int argc, char** argv) {
+  // What runs before this is compiled for x86-64-v2, too, but is not likely to need it.
   if (!__builtin_cpu_supports("sse4.2") || !__builtin_cpu_supports("popcnt"))
-    return hermesh::cli::fail(hermesh::cli::kFailed, "this processor does not show the instructions that the program needs (x86-64-v2: "
-                                                     "SSE4.2 and POPCNT); all since 2009 have them, but a virtual machine may hide them");
+    return hermesh::cli::fail(hermesh::cli::kFailed,
+                              "this processor lacks SSE4.2 or POPCNT (x86-64-v2), which the program needs; if this is a "
+                              "virtual machine, let it show the host's processor");
   try {
     return hermesh::cli::run_program(argc, argv);
   } catch (const std::exception& error) {

@@ -251,6 +251,7 @@ double CellBlocks::margin_for_rounding() const {
   }
   const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
+  static_assert(kLargestMargin == 0.25);  // eight times what the error names
   if (!(margin <= kLargestMargin))
     throw Error("single precision cannot hold a mesh of this volume to a thirty-second of a voxel, so nothing can be "
                 "promised of it: its axes lie nearly in a plane, or it reaches too far; resample or divide it, or use "

@@ -121,14 +121,17 @@ class CellBlocks {
     return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
   }
   std::uint32_t point(std::int32_t block, int cell, int sheet) const;
+  /// How many active cells a block has.
   std::uint32_t cells_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
-    return (next < blocks_.size() ? blocks_[next].first_code : static_cast<std::uint32_t>(codes_.size())) - blocks_[block].first_code;
+    const std::size_t end = next < blocks_.size() ? blocks_[next].first_code : codes_.size();
+    return static_cast<std::uint32_t>(end) - blocks_[block].first_code;
   }
   /// How many points a block's cells have: those of its active cells' first sheets, ascending, and then those of all others.
   std::uint32_t points_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
-    return (next < blocks_.size() ? blocks_[next].first_point : static_cast<std::uint32_t>(points_)) - blocks_[block].first_point;
+    const std::size_t end = next < blocks_.size() ? blocks_[next].first_point : points_;
+    return static_cast<std::uint32_t>(end) - blocks_[block].first_point;
   }
   /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;

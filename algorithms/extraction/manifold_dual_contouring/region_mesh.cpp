@@ -91,7 +91,7 @@ class RegionPolygons {
     });
   }
 
-  /// There are no polygons here any more then. @param fine has those of lone edges
+  /// There are no polygons here any more then: what a block has is freed in parallel, too. @param fine has those of lone edges
   RegionMesh take_mesh(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "connect regions");
     const std::size_t n = cells_.size();

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
@@ -99,7 +100,7 @@ class RegionProof {
   std::vector<std::array<BlockMask, 3>>
       open_;  ///< by block and axis: edges whose polygons are not shown; with a shell
   std::vector<std::array<BlockMask, 3>> loose_;  ///< by block and axis: edges of loose polygons; with slabs
-  std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are
+  std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are; with slabs or a shell
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };
 

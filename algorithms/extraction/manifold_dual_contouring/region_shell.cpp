@@ -165,8 +165,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   described.active = own.active.data();
   described.points_before = own.rank.data();
   described.first_point = own.first_point;
-  const std::uint32_t points = cells_.points_in(block),
-                      cells = cells_.cells_in(block);
+  const std::uint32_t points = cells_.points_in(block), cells = cells_.cells_in(block);
   described.first_later = own.first_point + cells;
   described.later_points = points - cells;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "algorithms/core/large_array.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"

@@ -84,7 +84,8 @@ class Trials {
     return all;
   }
   void mark(const CellBlocks::Edge& edge) {
-    untested_.at(static_cast<std::size_t>(edge.block))[edge.axis][edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
+    BlockMask& edges = untested_.at(static_cast<std::size_t>(edge.block))[edge.axis];
+    edges[edge.sample >> 6] |= std::uint64_t{1} << (edge.sample & 63);
   }
   void mark_edges(const CellBlocks::Cell& cell) {
     for (int edge = 0; edge < 12; ++edge)

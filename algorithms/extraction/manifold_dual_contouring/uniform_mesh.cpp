@@ -430,7 +430,9 @@ UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& o
 struct UniformCells::Made {
   Made(const HermiteView& view, const DualContouringOptions& options, const FilePoints& file,
        RunContext& context)
-      : grid(view), contourer(grid, options, file, context, nullptr), placed(filled(contourer.cells().size(), BlockMask{}, context)) {}
+      : grid(view),
+        contourer(grid, options, file, context, nullptr),
+        placed(filled(contourer.cells().size(), BlockMask{}, context)) {}
 
   const HermiteCells grid;
   Contourer contourer;

@@ -36,6 +36,7 @@
 #include <cstdint>
 #include <memory>
 #include <utility>
+#include <span>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"

@@ -32,7 +32,7 @@ class UniformPoints {
     return result;
   }
 
-  /// Of a point that there is room for. Not safe while room is asked for or made.
+  /// Of a point that there is room for. Not safe while room is made.
   Eigen::Vector3d& operator[](std::uint32_t point) { return places_[slot(point)]; }
   const Eigen::Vector3d& operator[](std::uint32_t point) const { return places_[slot(point)]; }
 
@@ -45,6 +45,7 @@ class UniformPoints {
     const std::atomic_ref asked(asked_[run / 64]);
     if (!(asked.load(std::memory_order_relaxed) & bit)) asked.fetch_or(bit, std::memory_order_relaxed);
   }
+  /// For all that were asked for, in ascending order. What is there stays, but elsewhere in memory.
   void make_room() {
     std::size_t runs = 0, slot = places_.size();
     for (const std::uint64_t asked : asked_) runs += static_cast<std::size_t>(std::popcount(asked));

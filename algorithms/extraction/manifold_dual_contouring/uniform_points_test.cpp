@@ -16,12 +16,13 @@ TEST(UniformPoints, OfFewHasRoomForThoseOnly) {
   UniformPoints points = UniformPoints::of_few(kCells);
   EXPECT_EQ(points.slots(), 0u);
   std::set<std::uint32_t> wanted;
-  for (std::uint32_t p = 5; p < kCells; p += 97) {
-    points.ask(p);
-    points.ask(p);
+  for (std::uint32_t p = 5; p < 480; p += 97) {
+    for (const std::uint32_t asked : {p + 512, p, p}) points.ask(asked);
     points.make_room();
-    points[p] = Vector3d::Constant(p);
-    wanted.insert(p);
+    for (const std::uint32_t asked : {p, p + 512}) {
+      points[asked] = Vector3d::Constant(asked);
+      wanted.insert(asked);
+    }
   }
   EXPECT_LE(points.slots(), 8 * wanted.size());
   points.extend(kCells, kAll);  // begins within the last cells' run
