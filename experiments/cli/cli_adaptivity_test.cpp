@@ -1,3 +1,6 @@
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {
@@ -49,6 +52,17 @@ TEST_F(AdaptivityTest, AMaskFromAFile) {
                  "--mask", "sphere.vdb"})
                 .exit_code,
             0);
+}
+
+TEST_F(AdaptivityTest, AMaskWithPerspectiveIsRefusedWhereItIsLookedAt) {
+  openvdb::initialize();
+  const auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setTransform(openvdb::math::Transform::createFrustumTransform(
+      openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), /*taper=*/0.5, /*depth=*/1.0, /*voxelDim=*/0.1));
+  grid->tree().setValue(openvdb::Coord(1, 2, 3), -1.0f);
+  openvdb::io::File(path("perspective.vdb").string()).write({grid});
+  expect_refused({"--mask", "perspective.vdb"}, 1, "perspective.vdb': the mask has a transform with perspective");
+  EXPECT_EQ(points({"--mask", "perspective.vdb", "--outside", "everywhere"}), points({}));
 }
 
 TEST_F(AdaptivityTest, AnImportedToleranceGridMayHoldZeros) {

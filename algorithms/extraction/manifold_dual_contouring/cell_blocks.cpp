@@ -70,7 +70,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   codes_.resize(exclusive_scan(codes, "cells"));
   parallel_blocks(n, context, [&](std::size_t b) {
     blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
-    const std::vector<std::uint8_t> own = std::move(found[b]);
+    const std::vector<std::uint8_t> own = std::move(found[b]);  // freed here, in parallel
     std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
   cut_ambiguous_faces(context);

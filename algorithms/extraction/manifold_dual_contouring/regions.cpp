@@ -76,7 +76,7 @@ void Regions::propose_parts(RunContext& context) {
   cubes_.resize(cubes);
   parallel_blocks(asked.size(), context, [&](std::size_t i) {
     const std::array<std::uint64_t, kLevels> added = added_to(i);
-    const std::vector<ProposedCube> own = std::move(found[i]);
+    const std::vector<ProposedCube> own = std::move(found[i]);  // freed here, in parallel
     const ProposedCube* cube = own.data();
     for (int level = kLevels; level > 0; --level)
       for (std::uint64_t left = added[static_cast<std::size_t>(level - 1)]; left != 0; left &= left - 1)
