@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "algorithms/core/mesh_file_formats.h"
+#include "algorithms/core/polygon_cut.h"
 
 namespace hermesh {
 
@@ -135,8 +136,36 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   } else if (corners.size() == 4) {
     mesh.quads.push_back({at(0), at(1), at(2), at(3)});
   } else {
+    if (corners.size() > 4) fans_.push_back({polygon, mesh.triangles.size(), corners.size()});
     for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
   }
+}
+
+void MeshBuilder::cut_concave_polygons() {
+  /// Larger ones, which no modeller makes, could take minutes.
+  constexpr std::size_t kMostCorners = 1 << 13;
+  std::size_t left = 0;
+  std::vector<std::uint32_t> numbers;
+  std::vector<Eigen::Vector3d> corners;
+  for (const Fan& fan : fans_) {
+    context_.check();
+    const std::span triangles = std::span(mesh.triangles).subspan(fan.first_triangle, fan.corners - 2);
+    numbers = {triangles[0][0], triangles[0][1]};
+    for (const Triangle& triangle : triangles) numbers.push_back(triangle[2]);
+    corners.clear();
+    for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
+    if (is_fan(corners)) continue;
+    std::vector<CornerTriple> cut;
+    if (corners.size() <= kMostCorners) cut = clip_ears(corners);
+    left += cut.empty();
+    for (std::size_t i = 0; i < cut.size(); ++i)
+      triangles[i] = {numbers[cut[i][0]], numbers[cut[i][1]], numbers[cut[i][2]]};
+    if (attributes_ && !cut.empty()) attributes_->cut_polygon(fan.polygon, std::move(cut));
+  }
+  if (left > 0)
+    context_.note(in_quotes(file_) + ": " + std::to_string(left) +
+                  " concave polygons cross themselves or have more than " + std::to_string(kMostCorners) +
+                  " corners; they were cut into fans, which may cover more than they do");
 }
 
 void MeshBuilder::add_comment(std::string_view text) {
@@ -163,6 +192,7 @@ MeshFile MeshBuilder::finish() {
     if (!mesh.points[i].allFinite())
       fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
   if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
+  cut_concave_polygons();
   if (dropped_ > 0)
     context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
                   " polygons with fewer than three corners were dropped");

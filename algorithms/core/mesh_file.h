@@ -11,8 +11,8 @@
 namespace hermesh {
 
 /// A mesh exactly as a file holds it: points in world units and double precision. Judges work on this.
-/// Polygons with more than four corners are cut into a fan about their first corner; STL's points are shared
-/// where all three coordinates are equal.
+/// Polygons with more than four corners are cut into a fan about their first corner, or into ears where they are so concave
+/// that a fan would leave them (polygon_cut.h); STL's points are shared where all three coordinates are equal.
 struct MeshFile {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
@@ -38,7 +38,7 @@ struct MeshFile {
 /// |               | r g b behind the coordinates of a point                  | "colour" of points                   |
 /// |               | usemtl                                                   | "material" of polygons, with labels  |
 ///
-/// A fan takes its corners' values along, and each of its triangles its polygon's; a polygon that is dropped drops its
+/// What is cut takes its corners' values along, and each of its triangles its polygon's; a polygon that is dropped drops its
 /// values. Degenerate polygons and points that no polygon uses keep theirs; nothing is welded in these formats. Where
 /// only some elements have a value, the others get 0, or −1 where the values are whole numbers, and a note says so. A
 /// name that is taken gets the domain in front ("polygon-quality"). OFF and STL give none.

@@ -18,25 +18,12 @@ const char* name_of(AttributeDomain domain) { return domain_names[static_cast<st
 /// For each element of the mesh its number in the file.
 using Order = std::vector<std::size_t>;
 
-/// As MeshBuilder::add_polygon() cuts and drops: triangles and fans first, then the quads.
+/// As MeshBuilder::add_polygon() cuts and drops: triangles and what is cut first, then the quads.
 Order polygon_order(const std::vector<std::uint32_t>& sizes) {
   Order order, quads;
   for (std::size_t polygon = 0; polygon < sizes.size(); ++polygon) {
     if (sizes[polygon] == 4) quads.push_back(polygon);
     if (sizes[polygon] == 3 || sizes[polygon] > 4) order.insert(order.end(), sizes[polygon] - 2, polygon);
-  }
-  order.insert(order.end(), quads.begin(), quads.end());
-  return order;
-}
-
-Order corner_order(const std::vector<std::uint32_t>& sizes) {
-  Order order, quads;
-  std::size_t first = 0;
-  for (const std::uint32_t size : sizes) {
-    if (size == 4) quads.insert(quads.end(), {first, first + 1, first + 2, first + 3});
-    if (size != 4)
-      for (std::uint32_t i = 2; i < size; ++i) order.insert(order.end(), {first, first + i - 1, first + i});
-    first += size;
   }
   order.insert(order.end(), quads.begin(), quads.end());
   return order;
@@ -67,6 +54,26 @@ void reorder(MeshAttribute& attribute, const Order& order, std::size_t elements)
 }
 
 }  // namespace
+
+std::vector<std::size_t> AttributeBuilder::corner_order() const {
+  Order order, quads;
+  std::size_t first = 0;
+  auto cut = cut_polygons_.begin();
+  for (std::size_t polygon = 0; polygon < polygon_sizes_.size(); ++polygon) {
+    const std::uint32_t size = polygon_sizes_[polygon];
+    if (cut != cut_polygons_.end() && cut->polygon == polygon) {
+      for (const CornerTriple& triangle : (cut++)->triangles)
+        for (const std::uint32_t corner : triangle) order.push_back(first + corner);
+    } else if (size == 4) {
+      quads.insert(quads.end(), {first, first + 1, first + 2, first + 3});
+    } else {
+      for (std::uint32_t i = 2; i < size; ++i) order.insert(order.end(), {first, first + i - 1, first + i});
+    }
+    first += size;
+  }
+  order.insert(order.end(), quads.begin(), quads.end());
+  return order;
+}
 
 void AttributeBuilder::fail(const Gathered& gathered, const std::string& what) {
   const MeshAttribute& attribute = gathered.result;
@@ -151,7 +158,7 @@ std::vector<MeshAttribute> AttributeBuilder::finish(RunContext& context) {
     return std::ranges::any_of(gathered_, [&](const Gathered& g) { return g.result.domain == domain; });
   };
   const Order polygons = any_of(AttributeDomain::polygon) ? polygon_order(polygon_sizes_) : Order();
-  const Order corners = any_of(AttributeDomain::corner) ? corner_order(polygon_sizes_) : Order();
+  const Order corners = any_of(AttributeDomain::corner) ? corner_order() : Order();
   std::vector<MeshAttribute> attributes;
   for (Gathered& gathered : gathered_) {
     context.check();

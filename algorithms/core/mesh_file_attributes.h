@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/core/mesh_attribute.h"
+#include "algorithms/core/polygon_cut.h"
 #include "algorithms/core/run_context.h"
 
 namespace hermesh::mesh_formats {
@@ -31,6 +32,11 @@ class AttributeBuilder {
   /// Once for each polygon of the file, also for those that are dropped; their corners begin on their own.
   void add_polygon(std::size_t corners) { polygon_sizes_.push_back(static_cast<std::uint32_t>(corners)); }
 
+  /// That it is cut in this way, by numbers of its corners, and not into a fan. Polygons ascend.
+  void cut_polygon(std::size_t polygon, std::vector<CornerTriple> triangles) {
+    cut_polygons_.push_back({polygon, std::move(triangles)});
+  }
+
   /// In the order of MeshFile, its polygons cut as MeshBuilder cuts them. Notes how many elements of an
   /// attribute got no value.
   std::vector<MeshAttribute> finish(RunContext& context);
@@ -40,6 +46,12 @@ class AttributeBuilder {
     MeshAttribute result;
     std::size_t given = 0;  ///< elements with a value
   };
+  struct CutPolygon {
+    std::size_t polygon;
+    std::vector<CornerTriple> triangles;
+  };
+  /// For each corner of the mesh its number in the file.
+  std::vector<std::size_t> corner_order() const;
   std::size_t& begun(AttributeDomain domain) { return begun_[static_cast<std::size_t>(domain)]; }
   void grow(Gathered& gathered);
   std::string unused_name(std::string name, AttributeDomain domain) const;
@@ -50,6 +62,7 @@ class AttributeBuilder {
   std::vector<Gathered> gathered_;
   std::array<std::size_t, 3> begun_{};  ///< elements, by domain
   std::vector<std::uint32_t> polygon_sizes_;
+  std::vector<CutPolygon> cut_polygons_;
 };
 
 }  // namespace hermesh::mesh_formats

@@ -57,6 +57,22 @@ TEST_F(AttributeFileTest, NoneUnlessAskedFor) {
   EXPECT_EQ(to_polygon_mesh(file).attributes, file.attributes);
 }
 
+TEST_F(AttributeFileTest, ConcavePolygonsTakeTheirCornersAlong) {
+  // The same numbers as the points have, so that they have to go the same way.
+  const MeshFile file = obj(
+      "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n"
+      "vt 2 0\nvt 2 1\nvt 1 1\nvt 1 2\nvt 0 2\nvt 0 0\n"
+      "f 6/6 1/1 2/2\nf 1/1 2/2 3/3 4/4 5/5 6/6\nf 1/1 2/2 3/3 6/6\nf 6/6 1/1 2/2 3/3 4/4\n");
+  ASSERT_EQ(file.attributes.size(), 1u);
+  const auto& uv = std::get<std::vector<float>>(file.attributes[0].values);
+  ASSERT_EQ(file.triangles.size(), 1u + 4u + 3u);
+  ASSERT_EQ(uv.size(), 2u * (3u * 8u + 4u));
+  for (std::size_t t = 0; t < file.triangles.size(); ++t)
+    for (std::size_t i = 0; i < 3; ++i)
+      for (int a = 0; a < 2; ++a)
+        EXPECT_EQ(uv[2 * (3 * t + i) + static_cast<std::size_t>(a)], file.points[file.triangles[t][i]][a]) << t;
+}
+
 TEST_F(AttributeFileTest, PlyGroupsInAnyOrder) {
   const MeshFile file = ply(ply_text(
       "property uchar blue\nproperty float ny\nproperty uchar green\nproperty uchar red\nproperty float nx\n"

@@ -85,11 +85,18 @@ class MeshBuilder {
 
  private:
   [[noreturn]] void fail_index(std::size_t polygon, std::int64_t corner) const;
+  void cut_concave_polygons();
+
+  /// Of more than four corners; a fan until all points are there.
+  struct Fan {
+    std::size_t polygon, first_triangle, corners;
+  };
   std::string file_;
   RunContext& context_;
   std::optional<AttributeBuilder> attributes_;
   std::size_t ticks_ = 0, polygons_ = 0, dropped_ = 0, polygon_of_largest_ = 0;
   std::int64_t largest_ = -1;
+  std::vector<Fan> fans_;
 };
 
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
 #include <clocale>
 #include <csignal>
 #include <cstring>
@@ -227,6 +228,27 @@ TEST_F(MeshFileTest, PolygonsBecomeFansAndSliversOfTwoCornersGo) {
   EXPECT_EQ(mesh.triangle_count(), 5u);
   ASSERT_EQ(context.notes.size(), 1u);
   EXPECT_NE(context.notes[0].find("2 polygons with fewer than three corners"), std::string::npos);
+}
+
+TEST_F(MeshFileTest, ConcavePolygonsAreNotLeftByTheirTriangles) {
+  // An L whose first corner does not see all of it, and whose points come behind it.
+  const MeshFile mesh = read("a.obj", "f 1 2 3 4 5 6\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n");
+  ASSERT_EQ(mesh.triangles.size(), 4u);
+  double area = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Eigen::Vector3d n = (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]);
+    EXPECT_GT(n.z(), 0);
+    area += 0.5 * n.z();
+  }
+  EXPECT_EQ(area, 3.0);
+  EXPECT_TRUE(context.notes.empty());
+}
+
+TEST_F(MeshFileTest, CrossingPolygonsBecomeFansAndANoteSaysSo) {
+  const MeshFile mesh = read("a.off", "OFF 6 1 0\n0 0 0\n4 0 0\n0 4 0\n4 4 0\n1 -2 0\n3 9 0\n6 0 1 2 3 4 5\n");
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}}));
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_NE(context.notes[0].find("1 concave polygons cross themselves"), std::string::npos);
 }
 
 TEST_F(MeshFileTest, NumbersDoNotDependOnTheLocale) {

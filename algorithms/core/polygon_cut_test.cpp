@@ -1,0 +1,162 @@
+// Polygons whose areas are known, and random ones: triangles face alike, do not overlap, and have the
+// polygon's area.
+#include "algorithms/core/polygon_cut.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Polygon = std::vector<Vector3d>;
+
+Polygon flat(std::initializer_list<std::pair<double, double>> corners) {
+  Polygon polygon;
+  for (const auto& [x, y] : corners) polygon.emplace_back(x, y, 0);
+  return polygon;
+}
+
+Vector3d area(const Polygon& p, const CornerTriple& t) {
+  return 0.5 * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+}
+
+/// Where all areas along the normal are positive and their sum is that of the polygon, nothing is covered
+/// twice and nothing beyond it; and sides are those of the polygon or shared by two triangles.
+void expect_cover(const Polygon& polygon, const Vector3d& whole) {
+  const std::vector<CornerTriple> triangles = clip_ears(polygon);
+  ASSERT_EQ(triangles.size(), polygon.size() - 2);
+  Vector3d sum = Vector3d::Zero();
+  double absolute = 0;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+  for (const CornerTriple& t : triangles) {
+    const Vector3d a = area(polygon, t);
+    EXPECT_GE(a.dot(whole), -1e-9 * whole.squaredNorm());
+    sum += a;
+    absolute += std::abs(a.dot(whole.normalized()));
+    for (int i = 0; i < 3; ++i) {
+      ++sides[{t[i], t[(i + 1) % 3]}];
+      --sides[{t[(i + 1) % 3], t[i]}];
+    }
+  }
+  EXPECT_NEAR(absolute, whole.norm(), 1e-9 * whole.norm());
+  EXPECT_LT((sum - whole).norm(), 1e-9 * whole.norm());
+  const auto n = static_cast<std::uint32_t>(polygon.size());
+  for (const auto& [side, count] : sides) {
+    const bool of_polygon = side.second == (side.first + 1) % n || side.first == (side.second + 1) % n;
+    EXPECT_EQ(std::abs(count), of_polygon ? 1 : 0) << side.first << " " << side.second;
+  }
+}
+
+TEST(IsFan, ConvexPolygonsAndThoseSeenWholeFromTheirFirstCorner) {
+  EXPECT_TRUE(is_fan(flat({{0, 0}, {2, 0}, {3, 1}, {2, 2}, {0, 2}})));
+  EXPECT_TRUE(is_fan(flat({{0, 0}, {0, 2}, {2, 2}, {3, 1}, {2, 0}})));  // clockwise
+  EXPECT_TRUE(is_fan(flat({{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}})));  // straight at a corner
+  const Polygon corner = flat({{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}});
+  EXPECT_TRUE(is_fan(corner));
+  Polygon turned = corner;
+  std::rotate(turned.begin(), turned.begin() + 1, turned.end());
+  EXPECT_FALSE(is_fan(turned));
+}
+
+TEST(ClipEars, Letters) {
+  const Polygon l = flat({{2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}, {0, 0}});
+  expect_cover(l, Vector3d(0, 0, 3));
+  const Polygon u = flat({{0, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}});
+  EXPECT_FALSE(is_fan(u));
+  expect_cover(u, Vector3d(0, 0, 7));
+  Polygon clockwise(u.rbegin(), u.rend());
+  expect_cover(clockwise, Vector3d(0, 0, -7));
+}
+
+TEST(ClipEars, StraightCornersAndPointsThatCoincide) {
+  expect_cover(flat({{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}}),
+               Vector3d(0, 0, 7));
+  expect_cover(flat({{0, 0}, {3, 0}, {3, 0}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}}),
+               Vector3d(0, 0, 7));
+  // Two triangles that meet in a point.
+  expect_cover(flat({{0, 0}, {2, 0}, {1, 1}, {2, 2}, {0, 2}, {1, 1}}), Vector3d(0, 0, 2));
+}
+
+TEST(ClipEars, ABridgeToAHole) {
+  const Polygon square =
+      flat({{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}});
+  EXPECT_FALSE(is_fan(square));
+  for (std::size_t turn = 0; turn < square.size(); ++turn) {
+    Polygon turned = square;
+    std::rotate(turned.begin(), turned.begin() + static_cast<std::ptrdiff_t>(turn), turned.end());
+    expect_cover(turned, Vector3d(0, 0, 12));
+  }
+  // Two holes from the same corner.
+  expect_cover(flat({{0, 0},
+                     {6, 0},
+                     {6, 4},
+                     {0, 4},
+                     {0, 0},
+                     {1, 2},
+                     {2, 3},
+                     {3, 2},
+                     {1, 2},
+                     {0, 0},
+                     {4, 1},
+                     {4, 2},
+                     {5, 2},
+                     {5, 1},
+                     {4, 1}}),
+               Vector3d(0, 0, 24 - 1 - 1));
+}
+
+TEST(ClipEars, NoneOfABorderThatCrossesItself) {
+  EXPECT_TRUE(clip_ears(flat({{0, 0}, {4, 0}, {0, 4}, {4, 4}, {1, -2}, {3, 9}})).empty());
+}
+
+/// Seen as a whole from a point inside, so that the area is a sum.
+TEST(ClipEars, RandomStarsInRandomPlanes) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (const std::size_t n : {5u, 6u, 9u, 40u, 400u})
+    for (int repeat = 0; repeat < 40; ++repeat) {
+      const Eigen::Matrix3d turn =
+          Eigen::Quaterniond(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5)
+              .normalized()
+              .toRotationMatrix();
+      const Vector3d away(1e3 * unit(random), -50, 7);
+      Polygon star;
+      double twice = 0;
+      std::vector<double> radius(n);
+      for (double& r : radius) r = 0.2 + unit(random);
+      const double step = 2 * std::numbers::pi / double(n);
+      for (std::size_t i = 0; i < n; ++i) {
+        star.push_back(
+            away + turn * (radius[i] * Vector3d(std::cos(step * double(i)), std::sin(step * double(i)), 0)));
+        twice += radius[i] * radius[(i + 1) % n] * std::sin(step);
+      }
+      expect_cover(star, turn * Vector3d(0, 0, 0.5 * twice));
+    }
+}
+
+/// Nearly every corner of its inner wall hides the ears of the others.
+TEST(ClipEars, ASpiral) {
+  Polygon spiral;
+  constexpr int kSteps = 1000;
+  const auto add = [&](int i, double width) {
+    const double angle = 0.05 * i, radius = 1 + 0.02 * i + width;
+    spiral.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0);
+  };
+  for (int i = 0; i < kSteps; ++i) add(i, 1.0);
+  for (int i = kSteps; i-- > 0;) add(i, 0.0);
+  Vector3d whole = Vector3d::Zero();
+  for (std::size_t i = 0; i < spiral.size(); ++i)
+    whole += 0.5 * spiral[i].cross(spiral[(i + 1) % spiral.size()]);
+  expect_cover(spiral, whole);
+}
+
+}  // namespace
+}  // namespace hermesh
