@@ -1,80 +1,20 @@
 #include "algorithms/core/mesh_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <Eigen/Geometry>
+#include <atomic>
 #include <clocale>
-#include <csignal>
 #include <cstring>
-#include <fstream>
 #include <random>
 #include <sstream>
-#include <thread>
 
-#include "algorithms/core/atomic_file.h"
-#include "algorithms/core/mesh_file_formats.h"
+#include "algorithms/core/test_mesh_files.h"
 
 namespace hermesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-class MeshFileTest : public testing::Test {
- protected:
-  MeshFileTest() {
-    std::string pattern = (fs::temp_directory_path() / "hermesh-test-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~MeshFileTest() override { fs::remove_all(folder); }
-
-  fs::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder / name, std::ios::binary) << bytes;
-    return folder / name;
-  }
-  std::string bytes_of(const fs::path& path) const {
-    std::ostringstream text;
-    text << std::ifstream(path, std::ios::binary).rdbuf();
-    return text.str();
-  }
-  /// Without a file, unless it is gzipped.
-  MeshFile read(const std::string& name, const std::string& bytes) {
-    const std::optional<mesh_formats::MeshPath> path = mesh_formats::parse_mesh_path(name);
-    if (!path || path->gzipped || bytes.empty()) return read_mesh_file(write(name, bytes), context);
-    return mesh_formats::parse_mesh(bytes, path->format, name, context);
-  }
-  /// What the call throws, without the folder; empty if it succeeds.
-  template <class Call>
-  std::string error_in(Call call) const {
-    try {
-      call();
-    } catch (const Error& error) {
-      std::string text = error.what();
-      const std::size_t at = text.find(folder.string() + "/");
-      return at == std::string::npos ? text : text.erase(at, folder.string().size() + 1);
-    }
-    return "";
-  }
-  std::string error_of_path(const fs::path& path) {
-    return error_in([&] { read_mesh_file(path, context); });
-  }
-  std::string error_of(const std::string& name, const std::string& bytes) {
-    return error_in([&] { read(name, bytes); });
-  }
-  std::string write_error_to(const fs::path& path, const PolygonMesh& mesh) {
-    return error_in([&] { write_mesh(path, mesh, context); });
-  }
-  std::vector<std::string> files() const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder))
-      names.push_back(entry.path().filename().string());
-    return names;
-  }
-
-  fs::path folder;
-  RunContext context;
-};
 
 const std::vector<Eigen::Vector3d> tetrahedron_points = {{0, 0, 0}, {1, 0, 0}, {0, 1.5, 0}, {0, 0, -2.25}};
 const std::vector<Triangle> tetrahedron_triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
@@ -265,54 +205,6 @@ TEST_F(MeshFileTest, TinyNumbersAreNotTakenForHugeOnes) {
             "'b.obj': point 0 (counting from 0) has a coordinate that is not a finite number");
 }
 
-/// A mesh with triangles and quads whose points are as the argument makes them.
-PolygonMesh random_mesh(std::uint32_t seed, const Eigen::Vector3d& origin, std::size_t count = 500) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> unit(-0.5f, 0.5f);
-  PolygonMesh mesh;
-  mesh.origin = origin;
-  for (std::size_t i = 0; i < count; ++i) mesh.points.emplace_back(unit(random), unit(random), unit(random));
-  const auto corner = [&] { return static_cast<std::uint32_t>(random() % count); };
-  for (std::size_t i = 0; i < count; ++i) mesh.triangles.push_back({corner(), corner(), corner()});
-  for (std::size_t i = 0; i < count; ++i) mesh.quads.push_back({corner(), corner(), corner(), corner()});
-  return mesh;
-}
-
-TEST_F(MeshFileTest, RoundTripsKeepEveryBit) {
-  for (const Eigen::Vector3d& origin :
-       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1e6, -1e6, 3), Eigen::Vector3d(0.5, 0, 0)}) {
-    // The smallest coordinates of the mesh are above 2^-30, so that the sums with these origins are exact.
-    PolygonMesh mesh = random_mesh(7, origin);
-    for (Eigen::Vector3f& point : mesh.points)
-      for (float& x : point) x = std::abs(x) < 1e-3f ? 0.25f : x;
-    for (const char* name : {"a.ply", "a.obj", "a.off", "b.ply.gz", "b.obj.gz", "b.off.gz"}) {
-      write_mesh(folder / name, mesh, context);
-      const MeshFile file = read_mesh_file(folder / name, context);
-      EXPECT_EQ(file.points, to_mesh_file(mesh).points) << name;
-      EXPECT_EQ(file.triangles, mesh.triangles) << name;
-      EXPECT_EQ(file.quads, mesh.quads) << name;
-      EXPECT_TRUE(to_polygon_mesh(file) == mesh) << name;
-    }
-  }
-  EXPECT_TRUE(context.notes.empty());
-}
-
-TEST_F(MeshFileTest, AnOriginThatTheReaderWouldNotChooseIsKeptToo) {
-  PolygonMesh mesh;  // far from the origin, yet relative to zero
-  mesh.points = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
-  mesh.triangles = {{0, 1, 2}};
-  write_mesh(folder / "a.ply", mesh, context);
-  EXPECT_TRUE(read_mesh(folder / "a.ply", context) == mesh);
-}
-
-TEST_F(MeshFileTest, PlyIsSinglePrecisionWhereThatLosesNothing) {
-  const PolygonMesh near = random_mesh(1, {0, 0, 0}), far = random_mesh(1, {1e6, 1e6, 1e6});
-  write_mesh(folder / "near.ply", near, context);
-  write_mesh(folder / "far.ply", far, context);
-  EXPECT_NE(bytes_of(folder / "near.ply").find("property float x"), std::string::npos);
-  EXPECT_NE(bytes_of(folder / "far.ply").find("property double x"), std::string::npos);
-}
-
 TEST_F(MeshFileTest, FilesAreReadRelativeToAnOriginNearTheirPoints) {
   std::ostringstream text;
   text.precision(17);
@@ -322,31 +214,6 @@ TEST_F(MeshFileTest, FilesAreReadRelativeToAnOriginNearTheirPoints) {
   const PolygonMesh mesh = read_mesh(path, context);
   EXPECT_LE(mesh.origin.cwiseAbs().maxCoeff(), 1000001.0);
   EXPECT_LE((mesh.world(1) - Eigen::Vector3d(1000001.0000001, 1000000, 1000000)).norm(), 1e-7);
-}
-
-TEST_F(MeshFileTest, StlRoundTripKeepsSinglePrecisionPoints) {
-  const PolygonMesh mesh = random_mesh(3, {0, 0, 0});
-  for (const char* name : {"a.stl", "a.stl.gz"}) {
-    write_mesh(folder / name, mesh, context);
-    const MeshFile file = read_mesh_file(folder / name, context);
-    const std::vector<Triangle> triangles = triangulated(mesh);
-    ASSERT_EQ(file.triangles.size(), triangles.size());
-    for (std::size_t i = 0; i < triangles.size(); ++i)
-      for (std::size_t k = 0; k < 3; ++k)
-        ASSERT_EQ(file.points[file.triangles[i][k]], mesh.world(triangles[i][k]));
-  }
-}
-
-TEST_F(MeshFileTest, StlSaysWhatItLoses) {
-  PolygonMesh mesh;
-  mesh.origin = {1e6, 0, 0};
-  mesh.points = {{0, 0, 0}, {0.001f, 0, 0}, {1, 1, 0}, {0, 1, 0}, {9, 9, 9}};
-  mesh.quads = {{0, 1, 2, 3}};
-  write_mesh(folder / "a.stl", mesh, context);
-  ASSERT_EQ(context.notes.size(), 2u) << context.notes[0];
-  EXPECT_NE(context.notes[0].find("1 points moved, by at most 0.001, and 1 became equal"), std::string::npos)
-      << context.notes[0];
-  EXPECT_NE(context.notes[1].find("1 points that no polygon uses"), std::string::npos) << context.notes[1];
 }
 
 TEST_F(MeshFileTest, GzipMayHaveSeveralMembers) {
@@ -549,37 +416,6 @@ TEST_F(MeshFileTest, DamagedFilesAreEitherRefusedOrValid) {
   }
   EXPECT_GT(refused, 1000u);
   EXPECT_GT(accepted, 1000u);
-}
-
-TEST_F(MeshFileTest, WritingFailsWithASentenceAndLeavesNothingBehind) {
-  PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 20);
-  EXPECT_NE(write_error_to(folder / "a.xyz", mesh).find("unknown type"), std::string::npos);
-  EXPECT_NE(write_error_to(folder / "none" / "a.ply", mesh).find("cannot write"), std::string::npos);
-  EXPECT_NE(write_error_to("/dev/null/a.ply", mesh).find("cannot write"), std::string::npos);
-  mesh.points[3].y() = std::numeric_limits<float>::infinity();
-  EXPECT_NE(write_error_to(folder / "a.ply", mesh).find("point 3 is not finite"), std::string::npos);
-  fs::create_directory(folder / "sub.ply");
-  EXPECT_NE(write_error_to(folder / "sub.ply", mesh), "");
-  EXPECT_EQ(files(), std::vector<std::string>{"sub.ply"});
-}
-
-/// A limit on the size of files stands in for a full disk.
-TEST_F(MeshFileTest, AFullDiskIsAnErrorAndKeepsTheOldFile) {
-  const PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 20000);
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit unlimited;
-  getrlimit(RLIMIT_FSIZE, &unlimited);
-  const rlimit small = {.rlim_cur = 10000, .rlim_max = unlimited.rlim_max};
-  write("a.ply", "old");
-  write("a.off.gz", "old");
-  setrlimit(RLIMIT_FSIZE, &small);
-  const std::string plain = write_error_to(folder / "a.ply", mesh);
-  const std::string packed = write_error_to(folder / "a.off.gz", mesh);
-  setrlimit(RLIMIT_FSIZE, &unlimited);
-  EXPECT_NE(plain.find("cannot write"), std::string::npos);
-  EXPECT_NE(packed.find("cannot write"), std::string::npos);
-  EXPECT_EQ(bytes_of(folder / "a.ply"), "old");
-  EXPECT_EQ(files().size(), 2u);
 }
 
 TEST_F(MeshFileTest, CancellingLeavesNothingBehind) {
