@@ -142,7 +142,7 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
 }
 
 void MeshBuilder::cut_concave_polygons() {
-  /// Larger ones, which no modeller makes, could take minutes.
+  // Larger ones, which no modeller makes, could take minutes.
   constexpr std::size_t kMostCorners = 1 << 13;
   std::size_t left = 0;
   std::vector<std::uint32_t> numbers;
@@ -155,7 +155,7 @@ void MeshBuilder::cut_concave_polygons() {
     corners.clear();
     for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
     if (is_fan(corners)) continue;
-    std::vector<CornerTriple> cut;
+    std::vector<Triangle> cut;
     if (corners.size() <= kMostCorners) cut = clip_ears(corners);
     left += cut.empty();
     for (std::size_t i = 0; i < cut.size(); ++i)

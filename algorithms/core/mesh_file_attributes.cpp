@@ -62,7 +62,7 @@ std::vector<std::size_t> AttributeBuilder::corner_order() const {
   for (std::size_t polygon = 0; polygon < polygon_sizes_.size(); ++polygon) {
     const std::uint32_t size = polygon_sizes_[polygon];
     if (cut != cut_polygons_.end() && cut->polygon == polygon) {
-      for (const CornerTriple& triangle : (cut++)->triangles)
+      for (const Triangle& triangle : (cut++)->triangles)
         for (const std::uint32_t corner : triangle) order.push_back(first + corner);
     } else if (size == 4) {
       quads.insert(quads.end(), {first, first + 1, first + 2, first + 3});

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "algorithms/core/mesh_attribute.h"
-#include "algorithms/core/polygon_cut.h"
+#include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 
 namespace hermesh::mesh_formats {
@@ -33,7 +33,7 @@ class AttributeBuilder {
   void add_polygon(std::size_t corners) { polygon_sizes_.push_back(static_cast<std::uint32_t>(corners)); }
 
   /// That it is cut in this way, by numbers of its corners, and not into a fan. Polygons ascend.
-  void cut_polygon(std::size_t polygon, std::vector<CornerTriple> triangles) {
+  void cut_polygon(std::size_t polygon, std::vector<Triangle> triangles) {
     cut_polygons_.push_back({polygon, std::move(triangles)});
   }
 
@@ -48,7 +48,7 @@ class AttributeBuilder {
   };
   struct CutPolygon {
     std::size_t polygon;
-    std::vector<CornerTriple> triangles;
+    std::vector<Triangle> triangles;
   };
   /// For each corner of the mesh its number in the file.
   std::vector<std::size_t> corner_order() const;

@@ -27,7 +27,7 @@ double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
-      : places_(corners.size()), next_(corners.size()), before_(corners.size()), is_reflex_(corners.size()) {
+      : places_(corners.size()), next_(corners.size()), before_(corners.size()) {
     // Along the axis that the polygon faces most, counter-clockwise: nothing but signs of areas matters
     // below.
     const Vector3d normal = newell(corners);
@@ -44,17 +44,16 @@ class Ring {
     for (const Vector2d& p : places_) extent = std::max(extent, p.cwiseAbs().maxCoeff());
     constexpr double kRounding = 1e-13;
     flat_ = kRounding * extent * extent;
-    for (std::uint32_t i = 0; i < corners.size(); ++i) {
-      is_reflex_[i] = area_at(i) <= 0;
-      if (is_reflex_[i]) reflex_.push_back(i);
-    }
+    for (std::uint32_t i = 0; i < corners.size(); ++i)
+      if (area_at(i) <= 0) reflex_.push_back(i);
   }
 
-  std::vector<CornerTriple> clip() {
-    std::vector<CornerTriple> triangles;
+  std::vector<Triangle> clip() {
+    std::vector<Triangle> triangles;
+    std::uint32_t at = 0;
     std::size_t left = places_.size(), failed = 0;
-    bool flat_ones = false;
-    for (std::uint32_t at = 0; left > 3;) {
+    bool flat_ones = false;  // corners in a straight line may go, for there is no ear
+    while (left > 3) {
       if (flat_ones ? std::abs(area_at(at)) <= flat_ : is_ear(at)) {
         triangles.push_back({before_[at], at, next_[at]});
         // Not the neighbour next, which would make a fan of slivers.
@@ -62,16 +61,16 @@ class Ring {
         --left;
         failed = 0;
         flat_ones = false;
-      } else {
-        at = next_[at];
-        if (++failed < left) continue;
-        if (flat_ones) return {};
-        flat_ones = true;
-        failed = 0;
+        continue;
       }
-      if (left == 3) triangles.push_back({before_[at], at, next_[at]});
-      if (left == 3 && area_at(at) < -flat_) return {};
+      at = next_[at];
+      if (++failed < left) continue;
+      if (flat_ones) return {};
+      flat_ones = true;
+      failed = 0;
     }
+    if (area_at(at) < -flat_) return {};
+    triangles.push_back({before_[at], at, next_[at]});
     return triangles;
   }
 
@@ -79,11 +78,11 @@ class Ring {
   double area_at(std::uint32_t i) const { return area(places_[before_[i]], places_[i], places_[next_[i]]); }
 
   bool is_ear(std::uint32_t at) const {
-    if (is_reflex_[at]) return false;
+    if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
     return std::ranges::none_of(reflex_, [&](std::uint32_t i) {
       const Vector2d& p = places_[i];
-      if (!is_reflex_[i] || i == before_[at] || i == at || i == next_[at]) return false;
+      if (i == before_[at] || i == next_[at]) return false;
       // Where the border comes back to the tip it may enter between the sides; from the two other corners it
       // could not get far without a corner inside.
       if (p == b) return is_between(a, b, c, places_[before_[i]]) || is_between(a, b, c, places_[next_[i]]);
@@ -100,21 +99,16 @@ class Ring {
     const std::uint32_t before = before_[at], next = next_[at];
     next_[before] = next;
     before_[next] = before;
-    std::erase(reflex_, at);
     // Corners become convex as ears go, and stay so but for rounding.
-    for (const std::uint32_t i : {before, next}) {
-      const bool was = is_reflex_[i];
-      is_reflex_[i] = area_at(i) <= 0;
-      if (was && !is_reflex_[i]) std::erase(reflex_, i);
-      if (!was && is_reflex_[i]) reflex_.push_back(i);
-    }
+    std::erase_if(reflex_, [&](std::uint32_t i) { return i == at || i == before || i == next; });
+    for (const std::uint32_t i : {before, next})
+      if (area_at(i) <= 0) reflex_.push_back(i);
     return next;
   }
 
   std::vector<Vector2d> places_;
   std::vector<std::uint32_t> next_, before_;
-  std::vector<char> is_reflex_;        ///< or straight
-  std::vector<std::uint32_t> reflex_;  ///< those
+  std::vector<std::uint32_t> reflex_;  ///< corners that are no convex ones, straight ones among them
   double flat_;                        ///< an area that is none
 };
 
@@ -131,6 +125,6 @@ bool is_fan(std::span<const Vector3d> corners) {
   return true;
 }
 
-std::vector<CornerTriple> clip_ears(std::span<const Vector3d> corners) { return Ring(corners).clip(); }
+std::vector<Triangle> clip_ears(std::span<const Vector3d> corners) { return Ring(corners).clip(); }
 
 }  // namespace hermesh

@@ -2,24 +2,21 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
 
-namespace hermesh {
+#include "algorithms/core/polygon_mesh.h"
 
-/// By number among the polygon's corners; facing as the polygon does.
-using CornerTriple = std::array<std::uint32_t, 3>;
+namespace hermesh {
 
 /// Whether the fan about the first corner is right: no triangle of it faces against the polygon, as it is
 /// seen along its mean normal (Newell's: Tampieri 1992). So it is in every convex polygon.
 bool is_fan(std::span<const Eigen::Vector3d> corners);
 
-/// Triangles, two fewer than corners, that cover a polygon once, seen along its mean normal: an ear is cut
-/// off until three corners are left (Meisters 1975). Corners in a straight line, and a border that touches
-/// itself at points or runs there and back as a bridge to a hole does, are allowed. Empty if no ear is found,
-/// as where the border crosses itself.
-std::vector<CornerTriple> clip_ears(std::span<const Eigen::Vector3d> corners);
+/// Triangles, two fewer than corners and by their numbers among these, that cover a polygon once, seen along
+/// its mean normal: an ear is cut off until three corners are left (Meisters 1975). Corners in a straight
+/// line, and a border that touches itself at points or runs there and back as a bridge to a hole does, are
+/// allowed. Empty if no ear is found, as where the border crosses itself.
+std::vector<Triangle> clip_ears(std::span<const Eigen::Vector3d> corners);
 
 }  // namespace hermesh

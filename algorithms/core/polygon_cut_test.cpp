@@ -24,19 +24,19 @@ Polygon flat(std::initializer_list<std::pair<double, double>> corners) {
   return polygon;
 }
 
-Vector3d area(const Polygon& p, const CornerTriple& t) {
+Vector3d area(const Polygon& p, const Triangle& t) {
   return 0.5 * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
 }
 
 /// Where all areas along the normal are positive and their sum is that of the polygon, nothing is covered
 /// twice and nothing beyond it; and sides are those of the polygon or shared by two triangles.
 void expect_cover(const Polygon& polygon, const Vector3d& whole) {
-  const std::vector<CornerTriple> triangles = clip_ears(polygon);
+  const std::vector<Triangle> triangles = clip_ears(polygon);
   ASSERT_EQ(triangles.size(), polygon.size() - 2);
   Vector3d sum = Vector3d::Zero();
   double absolute = 0;
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
-  for (const CornerTriple& t : triangles) {
+  for (const Triangle& t : triangles) {
     const Vector3d a = area(polygon, t);
     EXPECT_GE(a.dot(whole), -1e-9 * whole.squaredNorm());
     sum += a;
