@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <optional>
 
 #include "algorithms/core/leaf_table.h"
@@ -17,13 +19,15 @@ struct LiveLeaf {
   std::uint32_t first;   ///< number of its first crossing
 };
 
+/// edge_kernels::Sample and SamplePacked.
+template <class Crossing>
+using SampleLeaves = void(const edge_kernels::LeafInput* leaves, int count, Crossing* const* out);
+
 /// Count, scan, fill.
 template <class Crossing>
 class Sampler {
  public:
-  using Sample = void(const edge_kernels::LeafInput& input, Crossing* out);
-
-  Sampler(const SampledVolume& volume, Sample* sample, RunContext& context)
+  Sampler(const SampledVolume& volume, SampleLeaves<Crossing>* sample, RunContext& context)
       : volume_(volume), table_(volume.table), sample_(sample), context_(context) {}
 
   void run(SparseHermite<Crossing>& result) {
@@ -32,17 +36,31 @@ class Sampler {
     result.leaves.resize(live_.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, live_.size(), 64), [&](const auto& range) {
       context_.check();
-      std::optional<LeafStencils> stencils[2];  // this leaf's and the next one's
-      const auto find = [&](std::size_t i) { stencils[i & 1].emplace(volume_, live_[i].leaf).prefetch(); };
-      find(range.begin());
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        if (i + 1 < range.end()) find(i + 1);
-        fill(live_[i], *stencils[i & 1], result.leaves[live_[i].number], result.crossings.data() + live_[i].first);
+      Batch batches[2];  // one's samples are on their way while the other is worked on
+      const auto prepare = [&](std::size_t first) {
+        Batch& batch = batches[first / kBatch & 1];
+        batch.count = static_cast<int>(std::min(kBatch, range.end() - first));
+        for (std::size_t i = 0; i < std::size_t(batch.count); ++i) add(live_[first + i], batch, i, result);
+      };
+      prepare(range.begin());
+      for (std::size_t first = range.begin(); first < range.end(); first += kBatch) {
+        if (first + kBatch < range.end()) prepare(first + kBatch);
+        const Batch& batch = batches[first / kBatch & 1];
+        sample_(batch.inputs.data(), batch.count, batch.out.data());
       }
     });
   }
 
  private:
+  static constexpr std::size_t kBatch = edge_kernels::kBatch;
+  /// Leaves whose crossings are found together.
+  struct Batch {
+    std::array<std::optional<LeafStencils>, kBatch> stencils;
+    std::array<edge_kernels::LeafInput, kBatch> inputs;
+    std::array<Crossing*, kBatch> out;
+    int count;
+  };
+
   /// Returns how many crossings there are.
   std::uint64_t find_live_leaves() {
     LargeArray<std::uint16_t> counts(table_.size());
@@ -76,14 +94,18 @@ class Sampler {
     return signs;
   }
 
-  void fill(const LiveLeaf& live, LeafStencils& stencils, SignLeaf& leaf, Crossing* crossings) const {
+  /// Writes all of the leaf but its crossings, and what these are made from to that place of the batch.
+  void add(const LiveLeaf& live, Batch& batch, std::size_t place, SparseHermite<Crossing>& result) const {
+    LeafStencils& stencils = batch.stencils[place].emplace(volume_, live.leaf);
+    stencils.prefetch();
     const auto& around = stencils.around();
     const std::int32_t above[3] = {around[neighbour_slot(1, 0, 0)], around[neighbour_slot(0, 1, 0)],
                                    around[neighbour_slot(0, 0, 1)]};
-    edge_kernels::LeafInput input;
+    edge_kernels::LeafInput& input = batch.inputs[place];
     input.signs = upper_signs(live.leaf, above[0], above[1], above[2]);
     stencils.fill(input);
-    sample_(input, crossings);
+    batch.out[place] = result.crossings.data() + live.first;
+    SignLeaf& leaf = result.leaves[live.number];
     const openvdb::Coord lower = table_.lower(live.leaf);
     leaf.lower = {lower.x(), lower.y(), lower.z()};
     leaf.first = live.first;
@@ -93,7 +115,7 @@ class Sampler {
 
   const SampledVolume& volume_;
   const LeafTable& table_;
-  Sample* sample_;
+  SampleLeaves<Crossing>* sample_;
   RunContext& context_;
   const edge_kernels::Kernels& kernels_ = edge_kernels::chosen();
   std::vector<LiveLeaf> live_;
@@ -101,7 +123,7 @@ class Sampler {
 
 template <class Crossing>
 SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
-                               void (*sample_leaf)(const edge_kernels::LeafInput&, Crossing*), RunContext& context) {
+                               SampleLeaves<Crossing>* sample_leaves, RunContext& context) {
   SparseHermite<Crossing> result;
   result.placement = placement_of(*level_set.grid().grid);
   const LeafTable table = [&] {
@@ -109,7 +131,7 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
     return LeafTable(level_set, isovalue, context);
   }();
   Stage stage(context, "Hermite data from the level set");
-  Sampler<Crossing>(sampled_volume(table, level_set), sample_leaf, context).run(result);
+  Sampler<Crossing>(sampled_volume(table, level_set), sample_leaves, context).run(result);
   return result;
 }
 

@@ -1,4 +1,4 @@
-// The Hermite data of one 8³ leaf of a scalar volume, compiled for several levels of vector code; all give the same
+// The Hermite data of 8³ leaves of a scalar volume, compiled for several levels of vector code; all give the same
 // bytes. Light and free of the standard library's functions, because what two levels share the linker may take from
 // either. Bits are in the order of BlockMask, word x, bit 8y+z.
 #pragma once
@@ -40,13 +40,19 @@ struct LeafInput {
   const PlainCrossing* incomplete;
 };
 
-/// How many edges that start in the leaf are crossed: at most 1536.
+/// Leaves whose crossings are found together: a few hundred fill vectors, and caches hold what lies between.
+constexpr int kBatch = 8;
+constexpr int kMostCrossings = 3 * 512;  ///< of a leaf
+
+/// How many edges that start in the leaf are crossed.
 using Count = int(const UpperSigns& signs);
 /// The crossings of those edges, by axis, in that by sample. With t the offset, the gradient is that of both ends by
 /// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e).
-using Sample = void(const LeafInput& input, EdgeCrossing* out);
+///
+/// Of `count` leaves of one volume, at most kBatch: those of leaf i go to out[i], and nothing beyond them is written.
+using Sample = void(const LeafInput* leaves, int count, EdgeCrossing* const* out);
 /// The same as pack() has them, with tags of 0.
-using SamplePacked = void(const LeafInput& input, PackedCrossing* out);
+using SamplePacked = void(const LeafInput* leaves, int count, PackedCrossing* const* out);
 
 struct Kernels {
   Count* count;
