@@ -259,6 +259,32 @@ openvdb::FloatGrid::Ptr noise_with_tiles() {
 
 TEST_F(LevelSetSamplerTest, NoiseWithStencilsThatEndAnywhere) { expect_as_plain(noise_with_tiles(), 0.0, 40000); }
 
+/// Every edge is crossed, in more leaves in a row than the kernels take at once: what their lists have room for. Samples of
+/// the lowest layers are no data.
+openvdb::FloatGrid::Ptr checkerboard() {
+  const auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  std::mt19937 random(14);
+  std::uniform_real_distribution<float> size(0.2f, 0.9f);
+  for (int x = 0; x < 24; ++x)
+    for (int y = 0; y < 24; ++y)
+      for (int z = 0; z < 80; ++z) {
+        const float value = (x + y + z) % 2 == 0 ? size(random) : -size(random);
+        if (x > 1 && y > 1 && z > 1)
+          grid->tree().setValueOn(Coord(x, y, z), value);
+        else
+          grid->tree().setValueOff(Coord(x, y, z), std::copysign(1.0f, value));
+      }
+  return grid;
+}
+
+TEST_F(LevelSetSamplerTest, LeavesAllOfWhoseEdgesAreCrossed) {
+  const auto grid = checkerboard();
+  expect_as_plain(grid, 0.0, 3 * 23 * 23 * 79);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  expect_as_plain(grid, 0.0, 3 * 23 * 23 * 79);
+}
+
 /// That the data of a volume are the same bytes however they are made, packed in any code or not.
 void expect_same_bytes(const openvdb::FloatGrid::Ptr& grid) {
   const LevelSet volume = make_level_set(grid);
@@ -291,6 +317,7 @@ TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
   const auto fog = noise_with_tiles();  // no level set: what is not active is no data
   fog->setGridClass(openvdb::GRID_FOG_VOLUME);
   expect_same_bytes(fog);
+  expect_same_bytes(checkerboard());
 }
 
 TEST_F(LevelSetSamplerTest, CrossingsAreInAscendingOrderOfLeavesAndSignsFollowFromThem) {

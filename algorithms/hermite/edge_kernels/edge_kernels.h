@@ -40,7 +40,7 @@ struct LeafInput {
   const PlainCrossing* incomplete;
 };
 
-/// Leaves whose crossings are found together: a few hundred fill vectors, and caches hold what lies between.
+/// Leaves whose crossings are found together: a few hundred crossings, enough for long loops, and caches hold their ends.
 constexpr int kBatch = 8;
 constexpr int kMostCrossings = 3 * 512;  ///< of a leaf
 
@@ -49,7 +49,7 @@ using Count = int(const UpperSigns& signs);
 /// The crossings of those edges, by axis, in that by sample. With t the offset, the gradient is that of both ends by
 /// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e).
 ///
-/// Of `count` leaves of one volume, at most kBatch: those of leaf i go to out[i], and nothing beyond them is written.
+/// Of `count` leaves with the same isovalue and scale, at most kBatch: those of leaf i go to out[i], and nothing beyond them is written.
 using Sample = void(const LeafInput* leaves, int count, EdgeCrossing* const* out);
 /// The same as pack() has them, with tags of 0.
 using SamplePacked = void(const LeafInput* leaves, int count, PackedCrossing* const* out);
