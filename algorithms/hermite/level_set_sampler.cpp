@@ -19,15 +19,11 @@ struct LiveLeaf {
   std::uint32_t first;   ///< number of its first crossing
 };
 
-/// edge_kernels::Sample and SamplePacked.
-template <class Crossing>
-using SampleLeaves = void(const edge_kernels::LeafInput* leaves, int count, Crossing* const* out);
-
 /// Count, scan, fill.
 template <class Crossing>
 class Sampler {
  public:
-  Sampler(const SampledVolume& volume, SampleLeaves<Crossing>* sample, RunContext& context)
+  Sampler(const SampledVolume& volume, edge_kernels::Sample<Crossing>* sample, RunContext& context)
       : volume_(volume), table_(volume.table), sample_(sample), context_(context) {}
 
   void run(SparseHermite<Crossing>& result) {
@@ -115,7 +111,7 @@ class Sampler {
 
   const SampledVolume& volume_;
   const LeafTable& table_;
-  SampleLeaves<Crossing>* sample_;
+  edge_kernels::Sample<Crossing>* sample_;
   RunContext& context_;
   const edge_kernels::Kernels& kernels_ = edge_kernels::chosen();
   std::vector<LiveLeaf> live_;
@@ -123,7 +119,7 @@ class Sampler {
 
 template <class Crossing>
 SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
-                               SampleLeaves<Crossing>* sample_leaves, RunContext& context) {
+                               edge_kernels::Sample<Crossing>* sample_leaves, RunContext& context) {
   SparseHermite<Crossing> result;
   result.placement = placement_of(*level_set.grid().grid);
   const LeafTable table = [&] {

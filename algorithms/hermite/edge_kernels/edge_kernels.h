@@ -47,17 +47,17 @@ constexpr int kMostCrossings = 3 * 512;  ///< of a leaf
 /// How many edges that start in the leaf are crossed.
 using Count = int(const UpperSigns& signs);
 /// The crossings of those edges, by axis, in that by sample. With t the offset, the gradient is that of both ends by
-/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e).
+/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed ones are as pack() has them, with tags of 0.
 ///
-/// Of `count` leaves with the same isovalue and scale, at most kBatch: those of leaf i go to out[i], and nothing beyond them is written.
-using Sample = void(const LeafInput* leaves, int count, EdgeCrossing* const* out);
-/// The same as pack() has them, with tags of 0.
-using SamplePacked = void(const LeafInput* leaves, int count, PackedCrossing* const* out);
+/// Of `count` leaves with the same isovalue and scale, at most kBatch: those of leaf i go to out[i], and nothing beyond
+/// them is written.
+template <class Crossing>
+using Sample = void(const LeafInput* leaves, int count, Crossing* const* out);
 
 struct Kernels {
   Count* count;
-  Sample* sample;
-  SamplePacked* sample_packed[kNormalCodes.size()];  ///< by NormalCodeId
+  Sample<EdgeCrossing>* sample;
+  Sample<PackedCrossing>* sample_packed[kNormalCodes.size()];  ///< by NormalCodeId
 };
 
 /// For the level of vector code that is chosen, see simd_level.h.
