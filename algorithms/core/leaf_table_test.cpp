@@ -84,11 +84,17 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
     for (int slot = 0; slot < 27; ++slot)
       ASSERT_EQ(around[slot], leaves.neighbour(i, slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1)) << slot;
   }
-  const std::vector<std::uint32_t> order = leaves.in_order_of_place();
+  std::vector<std::uint32_t> order;
+  for (const LeafPlaces::Slab& slab : leaves.slabs()) {
+    const std::size_t before = order.size();
+    leaves.for_each_leaf(slab, [&](std::uint32_t leaf) { order.push_back(leaf); });
+    for (std::size_t i = before; i < order.size(); ++i)
+      ASSERT_EQ(leaves.lower(order[i]).x(), leaves.lower(order[before]).x());
+  }
   ASSERT_EQ(order.size(), leaves.size());
   for (std::size_t i = 1; i < order.size(); ++i) ASSERT_LT(leaves.lower(order[i - 1]), leaves.lower(order[i]));
   const auto empty = openvdb::FloatGrid::create(3.0f);
-  EXPECT_TRUE(table(empty).in_order_of_place().empty());
+  EXPECT_TRUE(table(empty).slabs().empty());
 }
 
 TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
@@ -163,6 +169,23 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
       grid->tree().touchLeaf(Coord(0))->setValueOn(i, i % 3 == 0 ? infinite : i % 3 == 1 ? -infinite : infinite - infinite);
       EXPECT_THROW(table(grid), Error) << i << " at " << name(level);
     }
+  }
+  unsetenv("HERMESH_SIMD");
+}
+
+TEST(SignReader, RowsAreThoseOfTheRuleAtAnyLevelOfVectorCode) {
+  std::mt19937 random(7);
+  std::array<float, 512> values;
+  for (float& value : values) value = float(int(random() % 5) - 2);  // the isovalue among them
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    const SignReader& reader = chosen_sign_reader();
+    for (const InsideRule rule : {InsideRule{1.0f, 1.0f}, InsideRule{-1.0f, -1.0f}})
+      for (const std::size_t stride : {8, 64}) {
+        const std::uint64_t rows = reader.rows(values.data(), stride, rule);
+        for (std::size_t i = 0; i < 64; ++i)
+          ASSERT_EQ((rows >> i & 1) != 0, rule(values[stride * (i / 8) + i % 8])) << name(level) << ' ' << i;
+      }
   }
   unsetenv("HERMESH_SIMD");
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "algorithms/core/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
@@ -17,7 +18,7 @@ namespace hermesh {
 
 /// A volume's samples, and which of them are data.
 struct SampledVolume {
-  const LeafTable& table;
+  const LeafPlaces& leaves;
   bool masked;       ///< samples that are not active are no data
   float data_below;  ///< samples of no less than this magnitude are no data
 };
@@ -25,27 +26,34 @@ struct SampledVolume {
 /// Near the surface at 0 of a level set all that is no data has the background's magnitude, and nothing else
 /// is asked. Where the band is narrower inside it has less there; at other isovalues the band may be wider on
 /// that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
-/// the active samples are data.
-inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
+/// the active samples are data. Nothing if tiles do not tell and the samples must be looked at.
+inline std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set) {
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
   const float background = std::fabs(grid.background());
-  if (grid.getGridClass() == openvdb::GRID_LEVEL_SET && table.rule().isovalue == 0.0f && background > 0.0f &&
-      !table.has_inactive_inside_nearer_than(background))
-    return {table, false, background};
-  return {table, true, std::numeric_limits<float>::max()};
+  const SampledVolume all{leaves, false, background}, active{leaves, true, std::numeric_limits<float>::max()};
+  if (grid.getGridClass() != openvdb::GRID_LEVEL_SET || leaves.rule().isovalue != 0.0f || background == 0.0f) return active;
+  const std::optional<float> nearest = leaves.nearest_tile_inside();
+  if (!nearest) return std::nullopt;
+  return *nearest > -background ? active : all;
+}
+inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
+  if (const auto volume = sampled_volume(static_cast<const LeafPlaces&>(table), level_set)) return *volume;
+  const float background = std::fabs(level_set.grid().grid->background());
+  if (table.has_inactive_inside_nearer_than(background)) return {table, true, std::numeric_limits<float>::max()};
+  return {table, false, background};
 }
 
 /// One edge: where a sample is no data, differences to one side, or none.
 class IncompleteStencil {
  public:
   IncompleteStencil(const SampledVolume& volume, std::size_t leaf)
-      : volume_(volume), table_(volume.table), leaf_(leaf) {}
+      : volume_(volume), leaves_(volume.leaves), leaf_(leaf) {}
 
   EdgeCrossing sample(int x, int y, int z, int axis) const {
     const std::array<int, 3> from{x, y, z};
     std::array<int, 3> to = from;
     ++to[axis];
-    const InsideRule& rule = table_.rule();
+    const InsideRule& rule = leaves_.rule();
     const double a = rule.signed_value(at(from).value), b = rule.signed_value(at(to).value);
     const double offset = a / (a - b);
     Eigen::Vector3d normal = (1.0 - offset) * gradient(from) + offset * gradient(to);
@@ -62,14 +70,14 @@ class IncompleteStencil {
     bool is_data;
   };
   Sample at(const std::array<int, 3>& p) const {
-    const std::int32_t there = table_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
+    const std::int32_t there = leaves_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
     const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
     if (there < 0) {
-      const openvdb::Coord place = table_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
-      return {table_.tree().getValue(place), table_.tree().isValueOn(place)};
+      const openvdb::Coord place = leaves_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
+      return {leaves_.tree().getValue(place), leaves_.tree().isValueOn(place)};
     }
-    const float value = table_.values(static_cast<std::size_t>(there))[sample];
-    const bool active = !volume_.masked || test(table_.active(static_cast<std::size_t>(there)), sample);
+    const float value = leaves_.values(there)[sample];
+    const bool active = !volume_.masked || test(leaves_.active(static_cast<std::size_t>(there)), sample);
     return {value, active && std::fabs(value) < volume_.data_below};
   }
 
@@ -88,13 +96,13 @@ class IncompleteStencil {
         difference = double(above.value) - here.value;
       else if (below.is_data && here.is_data)
         difference = double(here.value) - below.value;
-      result[axis] = table_.rule().scale * difference;
+      result[axis] = leaves_.rule().scale * difference;
     }
     return result;
   }
 
   const SampledVolume& volume_;
-  const LeafTable& table_;
+  const LeafPlaces& leaves_;
   const std::size_t leaf_;
 };
 

@@ -1,5 +1,11 @@
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/scalable_allocator.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <memory>
+#include <new>
 #include <optional>
 
 #include "algorithms/core/leaf_table.h"
@@ -12,39 +18,96 @@
 namespace hermesh {
 namespace {
 
-/// A leaf that owns crossings.
-struct LiveLeaf {
-  std::uint32_t leaf;
-  std::uint32_t number;  ///< in the result
-  std::uint32_t first;   ///< number of its first crossing
+/// Room for as many crossings as a thread finds; what was taken stays where it is.
+template <class Crossing>
+class CrossingStore {
+ public:
+  /// Room for `count` and a kernel's kOutRoom behind.
+  Crossing* room_for(std::size_t count) {
+    if (used_ + count + edge_kernels::kOutRoom > kBlock) {
+      // This allocator keeps what it is given back. Pages that the system has to clear each time cost as much as a fifth
+      // of the whole work.
+      blocks_.emplace_back(static_cast<Crossing*>(scalable_malloc(kBlock * sizeof(Crossing))));
+      if (!blocks_.back()) throw std::bad_alloc();
+      used_ = 0;
+    }
+    return blocks_.back().get() + used_;
+  }
+  void take(std::size_t count) { used_ += count; }
+
+ private:
+  static constexpr std::size_t kBlock = std::size_t{1} << 18;
+  static_assert(kBlock >= edge_kernels::kBatch * edge_kernels::kMostCrossings + edge_kernels::kOutRoom);
+  struct Free {
+    void operator()(Crossing* block) const { scalable_free(block); }
+  };
+  std::vector<std::unique_ptr<Crossing, Free>> blocks_;
+  std::size_t used_ = kBlock;
 };
 
-/// Count, scan, fill.
+/// Signs of leaves that are asked for in ascending order.
+class LeafSigns {
+ public:
+  explicit LeafSigns(const LeafPlaces& leaves) : leaves_(leaves) {}
+
+  /// Writes `inside` and `beyond`.
+  void read(std::size_t leaf, SignLeaf& signs) {
+    if (leaf_above_ == static_cast<std::int64_t>(leaf))
+      signs.inside = above_;
+    else
+      finite_ &= reader_.leaf(leaves_.values(leaf), leaves_.rule(), signs.inside);
+    signs.beyond[0] = first_rows(leaves_.neighbour(leaf, 1, 0, 0), 8);
+    signs.beyond[1] = first_rows(leaves_.neighbour(leaf, 0, 1, 0), 64);
+    const std::int32_t above = leaves_.neighbour(leaf, 0, 0, 1);
+    if (above >= 0) {
+      leaf_above_ = above;  // comes next, mostly
+      finite_ &= reader_.leaf(leaves_.values(above), leaves_.rule(), above_);
+      signs.beyond[2] = first_layer(above_, 2);
+    } else {
+      signs.beyond[2] = uniform(above);
+    }
+    for (int axis = 0; axis < 3; ++axis) complete_ &= !leaves_.differs_from_tile_below(leaf, signs.inside, axis);
+  }
+  /// Whether all samples of the leaves were finite, and all crossed edges that end in them start in leaves.
+  bool finite() const { return finite_; }
+  bool complete() const { return complete_; }
+
+ private:
+  static std::uint64_t uniform(std::int32_t tile) { return tile == kUniformInside ? ~std::uint64_t{0} : 0; }
+  /// Of eight rows that start so many samples apart.
+  std::uint64_t first_rows(std::int32_t there, std::size_t stride) const {
+    return there < 0 ? uniform(there) : reader_.rows(leaves_.values(there), stride, leaves_.rule());
+  }
+
+  const LeafPlaces& leaves_;
+  const SignReader& reader_ = chosen_sign_reader();
+  std::int64_t leaf_above_ = -1;
+  BlockMask above_;
+  bool finite_ = true, complete_ = true;
+};
+
+/// Every sample comes from memory once: a leaf's signs are read, its crossed edges found and their crossings
+/// made while caches hold it. Only then it is known how many crossings there are before a leaf's, and they
+/// are copied to their places.
 template <class Crossing>
 class Sampler {
  public:
   Sampler(const SampledVolume& volume, edge_kernels::Sample<Crossing>* sample, RunContext& context)
-      : volume_(volume), table_(volume.table), sample_(sample), context_(context) {}
+      : volume_(volume), leaves_(volume.leaves), sample_(sample), context_(context), signs_(leaves_.size()),
+        found_(leaves_.size()) {}
 
-  void run(SparseHermite<Crossing>& result) {
-    result.outermost_inside = table_.rule()(table_.tree().background());
-    result.crossings.resize(find_live_leaves());
-    result.leaves.resize(live_.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, live_.size(), 64), [&](const auto& range) {
+  /// Returns false if edges with a change of sign start in no leaf; then the result is of no use.
+  bool run(SparseHermite<Crossing>& result) {
+    if (leaves_.tiles_of_both_signs_meet(context_)) return false;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
       context_.check();
-      Batch batches[2];  // one's samples are on their way while the other is worked on
-      const auto prepare = [&](std::size_t first) {
-        Batch& batch = batches[first / kBatch & 1];
-        batch.count = static_cast<int>(std::min(kBatch, range.end() - first));
-        for (std::size_t i = 0; i < std::size_t(batch.count); ++i) add(live_[first + i], batch, i, result);
-      };
-      prepare(range.begin());
-      for (std::size_t first = range.begin(); first < range.end(); first += kBatch) {
-        if (first + kBatch < range.end()) prepare(first + kBatch);
-        const Batch& batch = batches[first / kBatch & 1];
-        sample_(batch.inputs.data(), batch.count, batch.out.data());
-      }
+      sample_leaves(range.begin(), range.end());
     });
+    if (not_finite_) throw_not_finite();
+    if (incomplete_) return false;
+    result.outermost_inside = leaves_.rule()(leaves_.tree().background());
+    copy(result);
+    return true;
   }
 
  private:
@@ -52,69 +115,106 @@ class Sampler {
   /// Leaves whose crossings are found together.
   struct Batch {
     std::array<std::optional<LeafStencils>, kBatch> stencils;
-    std::array<edge_kernels::LeafInput, kBatch> inputs;
-    std::array<Crossing*, kBatch> out;
-    int count;
+    std::array<edge_kernels::EdgeInput, kBatch> inputs;
+    std::array<std::size_t, kBatch> leaf;
+    std::size_t size = 0;
+  };
+  struct Found {
+    const Crossing* crossings;
+    std::uint32_t count;
   };
 
-  /// Returns how many crossings there are.
-  std::uint64_t find_live_leaves() {
-    LargeArray<std::uint16_t> counts(table_.size());
-    parallel_blocks(table_.size(), context_, [&](std::size_t leaf) {
-      counts[leaf] = static_cast<std::uint16_t>(kernels_.count(
-          upper_signs(leaf, table_.neighbour(leaf, 1, 0, 0), table_.neighbour(leaf, 0, 1, 0), table_.neighbour(leaf, 0, 0, 1))));
-    });
-    LargeArray<LiveLeaf> by_leaf(table_.size());
-    std::uint64_t crossings = 0;
-    std::uint32_t live = 0;
-    for (const std::uint32_t leaf : table_.in_order_of_place()) {
-      if (counts[leaf] == 0) continue;
-      by_leaf[leaf] = {leaf, live++, static_cast<std::uint32_t>(crossings)};
-      crossings += counts[leaf];
+  void sample_leaves(std::size_t first, std::size_t end) {
+    // By the time that a leaf's turn comes its samples have come from memory.
+    constexpr std::size_t kAhead = 6;
+    for (std::size_t leaf = first; leaf < std::min(first + kAhead, end); ++leaf) ask_for(leaf);
+    LeafSigns signs(leaves_);
+    Batch batch;
+    for (std::size_t leaf = first; leaf < end; ++leaf) {
+      if (leaf + kAhead < leaves_.size()) ask_for(leaf + kAhead);
+      SignLeaf& to = signs_[leaf];
+      signs.read(leaf, to);
+      edge_kernels::EdgeInput& input = batch.inputs[batch.size];
+      const int count = kernels_.crossed(to.inside.data(), to.beyond.data(), input.crossing);
+      found_[leaf].count = static_cast<std::uint32_t>(count);
+      if (count == 0) continue;
+      const openvdb::Coord lower = leaves_.lower(leaf);
+      to.lower = {lower.x(), lower.y(), lower.z()};
+      batch.stencils[batch.size].emplace(volume_, leaf).fill(input);
+      batch.leaf[batch.size++] = leaf;
+      if (batch.size == kBatch) finish(batch);
     }
-    check_indices(crossings, "edge crossings");
-    // The work goes in the order of the tree, which has neighbours closer together.
-    live_.reserve(live);
-    for (std::size_t leaf = 0; leaf < counts.size(); ++leaf)
-      if (counts[leaf] != 0) live_.push_back(by_leaf[leaf]);
-    return crossings;
+    if (batch.size > 0) finish(batch);
+    if (!signs.finite()) not_finite_ = true;
+    if (!signs.complete()) incomplete_ = true;
   }
 
-  /// x, y and z: numbers of the leaves above along each axis.
-  edge_kernels::UpperSigns upper_signs(std::size_t leaf, std::int32_t x, std::int32_t y, std::int32_t z) const {
-    edge_kernels::UpperSigns signs{};
-    signs.inside[0] = table_.inside(leaf).data();
-    signs.inside[1] = table_.signs(x).data();
-    signs.inside[2] = table_.signs(y).data();
-    signs.inside[4] = table_.signs(z).data();
-    return signs;
+  void finish(Batch& batch) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < batch.size; ++i) count += found_[batch.leaf[i]].count;
+    CrossingStore<Crossing>& store = stores_.local();
+    Crossing* out = store.room_for(count);
+    sample_(batch.inputs.data(), static_cast<int>(batch.size), out);
+    store.take(count);
+    for (std::size_t i = 0; i < batch.size; ++i) {
+      found_[batch.leaf[i]].crossings = out;
+      out += found_[batch.leaf[i]].count;
+    }
+    batch.size = 0;
   }
 
-  /// Writes all of the leaf but its crossings, and what these are made from to that place of the batch.
-  void add(const LiveLeaf& live, Batch& batch, std::size_t place, SparseHermite<Crossing>& result) const {
-    LeafStencils& stencils = batch.stencils[place].emplace(volume_, live.leaf);
-    stencils.prefetch();
-    const auto& around = stencils.around();
-    const std::int32_t above[3] = {around[neighbour_slot(1, 0, 0)], around[neighbour_slot(0, 1, 0)],
-                                   around[neighbour_slot(0, 0, 1)]};
-    edge_kernels::LeafInput& input = batch.inputs[place];
-    input.signs = upper_signs(live.leaf, above[0], above[1], above[2]);
-    stencils.fill(input);
-    batch.out[place] = result.crossings.data() + live.first;
-    SignLeaf& leaf = result.leaves[live.number];
-    const openvdb::Coord lower = table_.lower(live.leaf);
-    leaf.lower = {lower.x(), lower.y(), lower.z()};
-    leaf.first = live.first;
-    leaf.inside = table_.inside(live.leaf);
-    for (int axis = 0; axis < 3; ++axis) leaf.beyond[axis] = first_layer(table_.signs(above[axis]), axis);
+  /// Asks for what lies where no machine can guess, and waiting for it costs more than the arithmetic: the leaf's samples,
+  /// and those just above along x and y. What lies below was read before, and above along z lies the next leaf. (Inlined
+  /// always: g++ takes a function that does nothing else for one without an effect, and drops the calls.)
+  [[gnu::always_inline]] void ask_for(std::size_t leaf) const {
+    const float *own = leaves_.values(leaf), *x = leaves_.values(leaves_.neighbour(leaf, 1, 0, 0)),
+                *y = leaves_.values(leaves_.neighbour(leaf, 0, 1, 0));
+    constexpr int kLine = 16;  // samples
+    for (int i = 0; i < 32; ++i) __builtin_prefetch(own + kLine * i);
+    for (int i = 0; i < 8; ++i) __builtin_prefetch(x + kLine * i);
+    for (int i = 0; i < 8; ++i) __builtin_prefetch(y + 64 * i);
+  }
+
+  /// To their places in the result, which are in order of (x, y, z).
+  void copy(SparseHermite<Crossing>& result) {
+    const std::vector<LeafPlaces::Slab> slabs = leaves_.slabs();
+    std::vector<std::uint64_t> live(slabs.size()), crossings(slabs.size());
+    const auto each_slab = [&](auto&& f) {
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, slabs.size()), [&](const auto& range) {
+        context_.check();
+        for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
+      });
+    };
+    each_slab([&](std::size_t i) {
+      leaves_.for_each_leaf(slabs[i], [&](std::uint32_t leaf) {
+        live[i] += found_[leaf].count != 0;
+        crossings[i] += found_[leaf].count;
+      });
+    });
+    result.leaves.resize(exclusive_scan(live, "leaves"));
+    result.crossings.resize(exclusive_scan(crossings, "edge crossings"));
+    each_slab([&](std::size_t i) {
+      std::uint64_t number = live[i], first = crossings[i];
+      leaves_.for_each_leaf(slabs[i], [&](std::uint32_t leaf) {
+        const Found found = found_[leaf];
+        if (found.count == 0) return;
+        SignLeaf& to = result.leaves[number++] = signs_[leaf];
+        to.first = static_cast<std::uint32_t>(first);
+        std::copy_n(found.crossings, found.count, result.crossings.data() + first);
+        first += found.count;
+      });
+    });
   }
 
   const SampledVolume& volume_;
-  const LeafTable& table_;
+  const LeafPlaces& leaves_;
   edge_kernels::Sample<Crossing>* sample_;
   RunContext& context_;
   const edge_kernels::Kernels& kernels_ = edge_kernels::chosen();
-  std::vector<LiveLeaf> live_;
+  LargeArray<SignLeaf> signs_;  ///< by leaf; where no edge is crossed, without a place
+  LargeArray<Found> found_;     ///< by leaf
+  tbb::enumerable_thread_specific<CrossingStore<Crossing>> stores_;
+  std::atomic<bool> not_finite_{false}, incomplete_{false};
 };
 
 template <class Crossing>
@@ -122,12 +222,16 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
                                edge_kernels::Sample<Crossing>* sample_leaves, RunContext& context) {
   SparseHermite<Crossing> result;
   result.placement = placement_of(*level_set.grid().grid);
-  const LeafTable table = [&] {
-    Stage stage(context, "read signs");
-    return LeafTable(level_set, isovalue, context);
-  }();
-  Stage stage(context, "Hermite data from the level set");
-  Sampler<Crossing>(sampled_volume(table, level_set), sample_leaves, context).run(result);
+  const Stage stage(context, "Hermite data from the level set");
+  {
+    const LeafPlaces leaves(level_set, isovalue, context);
+    const std::optional<SampledVolume> volume = sampled_volume(leaves, level_set);
+    if (volume && Sampler<Crossing>(*volume, sample_leaves, context).run(result)) return result;
+  }
+  // Rare: signs must be known beforehand, to tell which samples are data, or to make leaves of tiles.
+  const LeafTable table(level_set, isovalue, context);
+  const SampledVolume volume = sampled_volume(table, level_set);
+  Sampler<Crossing>(volume, sample_leaves, context).run(result);
   return result;
 }
 
@@ -139,8 +243,8 @@ FloatHermite sample_level_set(const LevelSet& level_set, double isovalue, RunCon
 
 PackedHermite sample_level_set_packed(const LevelSet& level_set, double isovalue, NormalCodeId code,
                                       RunContext& context) {
-  PackedHermite result = sample<PackedCrossing>(
-      level_set, isovalue, edge_kernels::chosen().sample_packed[static_cast<int>(code)], context);
+  PackedHermite result = sample<PackedCrossing>(level_set, isovalue,
+                                                edge_kernels::chosen().sample_packed[static_cast<int>(code)], context);
   result.normal_code = code;
   return result;
 }

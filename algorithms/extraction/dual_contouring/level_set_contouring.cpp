@@ -64,9 +64,9 @@ class Plain final : public leaf_kernels::PlainCode {
 /// is kept beside these that can be found anew.
 class LevelSetContourer {
  public:
-  LevelSetContourer(const SampledVolume& volume, const IndexToWorld& placement, const DualContouringOptions& options,
-                    RunContext& context)
-      : volume_(volume), table_(volume.table), placement_(placement), options_(options), context_(context),
+  LevelSetContourer(const LeafTable& table, const SampledVolume& volume, const IndexToWorld& placement,
+                    const DualContouringOptions& options, RunContext& context)
+      : table_(table), volume_(volume), placement_(placement), options_(options), context_(context),
         cells_(table_.size()), upper_(table_.size()) {}
 
   /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree lacks
@@ -155,7 +155,7 @@ class LevelSetContourer {
   void prefetch_samples(std::size_t leaf) const {
     const auto lines = [&](std::int32_t there, int first, int stride, int count) {
       if (there < 0) return;
-      const float* values = table_.values(static_cast<std::size_t>(there)) + first;
+      const float* values = table_.values(there) + first;
       for (int i = 0; i < count; ++i) __builtin_prefetch(values + stride * i);
     };
     constexpr int kLine = 16;  // samples
@@ -181,7 +181,7 @@ class LevelSetContourer {
       const std::int32_t there = upper_[leaf][slot];
       if (there < 0) tiles[slot].fill(table_.tree().getValue(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)));
       input.values[neighbour_slot(dx, dy, dz)] =
-          there >= 0 ? table_.values(static_cast<std::size_t>(there)) : tiles[slot].data();
+          there >= 0 ? table_.values(there) : tiles[slot].data();
     }
   }
 
@@ -230,8 +230,8 @@ class LevelSetContourer {
       kernels_.place_average(input, output);
   }
 
-  const SampledVolume& volume_;
   const LeafTable& table_;
+  const SampledVolume& volume_;
   const IndexToWorld& placement_;
   const DualContouringOptions& options_;
   RunContext& context_;
@@ -266,7 +266,7 @@ PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const 
       return LeafTable(volume, isovalue, context);
     }();
     const SampledVolume sampled = sampled_volume(table, volume);
-    LevelSetContourer contourer(sampled, placement, options, context);
+    LevelSetContourer contourer(table, sampled, placement, options, context);
     const std::vector<Coord> missing = contourer.count();
     if (missing.empty()) return contourer.extract();
     // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf brings no

@@ -27,9 +27,8 @@ class PlainCrossing {
   ~PlainCrossing() = default;
 };
 
-/// What a leaf's crossings are made from.
+/// The samples that a leaf's crossings are made from.
 struct LeafInput {
-  UpperSigns signs;
   /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; where there is no leaf all must be infinite.
   const float* values[27];
   /// Stencils with samples of no less than data_below in magnitude are left to `incomplete`; where active[13] is not null,
@@ -39,23 +38,29 @@ struct LeafInput {
   float isovalue, scale;  ///< as in InsideRule
   const PlainCrossing* incomplete;
 };
+/// With its crossed edges.
+struct EdgeInput : LeafInput {
+  std::uint64_t crossing[3][8];  ///< as Crossed finds them
+};
 
 /// Leaves whose crossings are found together: a few hundred crossings, enough for long loops, and caches hold their ends.
 constexpr int kBatch = 8;
 constexpr int kMostCrossings = 3 * 512;  ///< of a leaf
 
-/// How many edges that start in the leaf are crossed.
-using Count = int(const UpperSigns& signs);
-/// The crossings of those edges, by axis, in that by sample. With t the offset, the gradient is that of both ends by
-/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed ones are as pack() has them, with tags of 0.
+/// The edges that start in the leaf and are crossed, by axis; `inside` and `beyond` as in SignLeaf. Returns how many.
+using Crossed = int(const std::uint64_t* inside, const std::uint64_t* beyond, std::uint64_t (*crossing)[8]);
+/// The crossings of those edges by leaf, in it by axis, in that by sample. With t the offset, the gradient is that of both
+/// ends by central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed ones are as pack() has them, with tags of
+/// 0.
 ///
-/// Of `count` leaves with the same isovalue and scale, at most kBatch: those of leaf i go to out[i], and nothing beyond
-/// them is written.
+/// Of `count` leaves with the same isovalue and scale, at most kBatch. Behind the last crossing `out` has room for kOutRoom
+/// more, and what they are is not said.
 template <class Crossing>
-using Sample = void(const LeafInput* leaves, int count, Crossing* const* out);
+using Sample = void(const EdgeInput* leaves, int count, Crossing* out);
+constexpr int kOutRoom = 128;
 
 struct Kernels {
-  Count* count;
+  Crossed* crossed;
   Sample<EdgeCrossing>* sample;
   Sample<PackedCrossing>* sample_packed[kNormalCodes.size()];  ///< by NormalCodeId
 };

@@ -60,6 +60,7 @@ struct PlaceRules {
 /// What a leaf's cells are placed from. Average placement reads the values of the leaf and its upper
 /// neighbours alone, and of what else a LeafInput has only the signs, the isovalue and the scale.
 struct PlaceInput : edge_kernels::LeafInput {
+  UpperSigns signs;
   const LeafCells* cells;
   double corner[3];  ///< where the leaf's first sample is in the mesh's coordinates
   const PlaceRules* rules;
