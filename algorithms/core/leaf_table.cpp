@@ -29,6 +29,9 @@ constexpr std::array<float, 512> make_no_samples() {
 }
 constexpr std::array<float, 512> kNoSamples = make_no_samples();
 
+/// To wait for one leaf after the other, and for the samples that it points to, would take longer than all the rest.
+constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
+
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
 }  // namespace
@@ -81,12 +84,15 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
   return all;
 }
 
+LeafPlaces::LeafPlaces(const LevelSet& level_set, double isovalue)
+    : tree_(level_set.grid().grid->constTreePtr()), rule_(inside_rule(*level_set.grid().grid, isovalue)) {}
+
 LeafPlaces::LeafPlaces(const LevelSet& level_set, double isovalue, RunContext& context)
-    : tree_(level_set.grid().grid->constTreePtr()), rule_(inside_rule(*level_set.grid().grid, isovalue)) {
-  number_leaves(context);
+    : LeafPlaces(level_set, isovalue) {
+  number_leaves(context, true);
 }
 
-void LeafPlaces::number_leaves(RunContext& context) {
+void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
   std::vector<const TreeNode*> sources;
   tree_->getNodes(sources);
   nodes_.assign(sources.size(), {});
@@ -123,7 +129,13 @@ void LeafPlaces::number_leaves(RunContext& context) {
       node.neighbours[slot] = found != index.end() ? found->second : uniform(rule_(access.getValue(there)));
     }
     find_tiles(node);
-    number(node, static_cast<std::uint32_t>(i));
+    const std::size_t first = node.first, end = number(node, static_cast<std::uint32_t>(i));
+    if (!with_values) return;
+    for (std::size_t leaf = first; leaf < std::min(first + kLeavesAhead, end); ++leaf) ask_for(leaf);
+    for (std::size_t leaf = first; leaf < end; ++leaf) {
+      if (leaf + kLeavesAhead < end) ask_for(leaf + kLeavesAhead);
+      find_values(leaf);
+    }
   });
   each_node([&](std::size_t i) { number_around(i); });
   nodes_in_order_.resize(sources.size());
@@ -145,8 +157,8 @@ void LeafPlaces::find_tiles(Node& node) const {
   }
 }
 
-/// Numbers the leaves, and finds their samples.
-void LeafPlaces::number(Node& node, std::uint32_t index) {
+/// Numbers the leaves, and returns the number behind the last.
+std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index) {
   Numbers& numbers = numbers_[index];
   std::uint32_t next = node.first;
   for (int row = 0; row < 256; ++row) {
@@ -162,13 +174,7 @@ void LeafPlaces::number(Node& node, std::uint32_t index) {
       leaves_[next++] = node.source->getTable()[16 * row + z].getChild();
     }
   }
-  // To wait for one leaf after the other would take longer than all the rest.
-  constexpr std::uint32_t kAhead = 16;
-  for (std::uint32_t leaf = node.first; leaf < std::min(node.first + kAhead, next); ++leaf) __builtin_prefetch(leaves_[leaf]);
-  for (std::uint32_t leaf = node.first; leaf < next; ++leaf) {
-    if (leaf + kAhead < next) __builtin_prefetch(leaves_[leaf + kAhead]);
-    values_[leaf + kUniforms] = leaves_[leaf]->buffer().data();
-  }
+  return next;
 }
 
 /// The numbers one step around the node, from those in its neighbours.
@@ -197,7 +203,8 @@ void LeafPlaces::number_around(std::size_t node) {
 }
 
 LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& context)
-    : LeafPlaces(level_set, isovalue, context) {
+    : LeafPlaces(level_set, isovalue) {
+  number_leaves(context, false);
   read_signs(context);
   if (is_complete(context)) return;
   // Rare: bands thinner than a voxel, tiles that were made by hand. A new leaf may meet further tiles of the other sign
@@ -206,7 +213,7 @@ LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& con
   do {
     for (const Coord& lower : missing_leaves(context)) copy->touchLeaf(lower);
     tree_ = copy;
-    number_leaves(context);
+    number_leaves(context, false);
     read_signs(context);
   } while (!is_complete(context));
 }
@@ -222,16 +229,16 @@ void LeafTable::read_signs(RunContext& context) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
     context.check();
     bool finite = true;
-    // To wait for the samples of one leaf after the other would take longer than all the rest.
-    constexpr std::size_t kAhead = 4, kLine = 16;
-    // (Inlined always: g++ takes a function that does nothing else for one without an effect, and drops the calls.)
-    const auto ask_for = [&](std::size_t i) __attribute__((always_inline)) {
-      for (std::size_t sample = 0; sample < 512; sample += kLine)
-        __builtin_prefetch(values(i) + sample);
+    constexpr std::size_t kLine = 16;
+    const auto find = [&](std::size_t i) {
+      find_values(i);
+      for (std::size_t sample = 0; sample < 512; sample += kLine) __builtin_prefetch(values(i) + sample);
     };
-    for (std::size_t i = range.begin(); i < std::min(range.begin() + kAhead, range.end()); ++i) ask_for(i);
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kLeavesAhead, range.end()); ++i) ask_for(i);
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kSamplesAhead, range.end()); ++i) find(i);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      if (i + kAhead < range.end()) ask_for(i + kAhead);
+      if (i + kLeavesAhead < range.end()) ask_for(i + kLeavesAhead);
+      if (i + kSamplesAhead < range.end()) find(i + kSamplesAhead);
       finite &= reader.leaf(values(i), rule_, inside_[i]);
     }
     if (!finite) not_finite = true;

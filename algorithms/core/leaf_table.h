@@ -90,7 +90,12 @@ class LeafPlaces {
   std::optional<float> nearest_tile_inside() const;
 
  protected:
-  void number_leaves(RunContext& context);
+  /// Without leaves: they must be numbered, and their samples found.
+  LeafPlaces(const LevelSet& level_set, double isovalue);
+  void number_leaves(RunContext& context, bool with_values);
+  /// The leaf lies where no cache has it: ask_for() it long before.
+  void find_values(std::size_t leaf) { values_[leaf + kUniforms] = leaves_[leaf]->buffer().data(); }
+  [[gnu::always_inline]] void ask_for(std::size_t leaf) const { __builtin_prefetch(leaves_[leaf]); }
 
   openvdb::FloatTree::ConstPtr tree_;
   InsideRule rule_;
@@ -125,7 +130,7 @@ class LeafPlaces {
   static bool is_first_layer(const BlockMask& signs, int axis, bool inside);
 
   void find_tiles(Node& node) const;
-  void number(Node& node, std::uint32_t index);
+  std::uint32_t number(Node& node, std::uint32_t index);
   void number_around(std::size_t node);
   bool tiles_meet(const Node& node) const;
   std::vector<openvdb::CoordBBox> large_tiles_unlike_background(RunContext& context) const;
