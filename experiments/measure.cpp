@@ -88,6 +88,18 @@ double process_cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
+namespace {
+
+/// Who runs at a place of a round of a race, see race(): 0, 1, n − 1, 2, n − 2, …, turned by one in every
+/// round; where n is odd every other round is mirrored.
+std::size_t runner(std::size_t place, std::size_t round, std::size_t n) {
+  if (n % 2 == 1 && round % 2 == 1) place = n - 1 - place;
+  const std::size_t step = (place + 1) / 2;
+  return (round + (place % 2 == 1 ? step : n - step)) % n;
+}
+
+}  // namespace
+
 void race(std::span<Contender> contenders) {
   const auto wants_more = [](const Contender& contender) {
     const double used = std::accumulate(contender.seconds.begin(), contender.seconds.end(), 0.0);
@@ -95,8 +107,8 @@ void race(std::span<Contender> contenders) {
                                          used < contender.budget_seconds);
   };
   for (std::size_t round = 0; std::any_of(contenders.begin(), contenders.end(), wants_more); ++round)
-    for (std::size_t i = 0; i < contenders.size(); ++i) {
-      Contender& contender = contenders[(round + i) % contenders.size()];
+    for (std::size_t place = 0; place < contenders.size(); ++place) {
+      Contender& contender = contenders[runner(place, round, contenders.size())];
       if (wants_more(contender)) contender.seconds.push_back(contender.run());
     }
 }

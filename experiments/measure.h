@@ -46,9 +46,12 @@ struct Contender {
   std::vector<double> seconds;  ///< out: one entry a repetition
 };
 
-/// Round robin, the order turned by one in every round, so that a slow minute of a shared machine hits all
-/// alike. Each contender runs at least once, then until it has `repetitions` or its own times have used up
-/// its budget. A contender that already holds as many seconds as its budget does not run again.
+/// In rounds, so that a slow minute of a shared machine hits all alike. The order changes from round to round
+/// so that over n rounds (2n if n is odd) each contender runs as often at each place and, within rounds, as
+/// often after each other one (Williams, Experimental Designs Balanced for the Estimation of Residual Effects
+/// of Treatments, 1949): what runs before matters, for memory that it gave back has to be fetched again. Each
+/// contender runs at least once, then until it has `repetitions` or its own times have used up its budget. A
+/// contender that already holds as many seconds as its budget does not run again.
 void race(std::span<Contender> contenders);
 
 }  // namespace hermesh

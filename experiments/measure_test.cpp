@@ -4,8 +4,12 @@
 
 #include <chrono>
 #include <fstream>
+#include <map>
 #include <numeric>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 namespace hermesh {
 namespace {
@@ -25,19 +29,44 @@ TEST(Median, StagesKeepTheirOrderAndAddUpWithinARepetition) {
   EXPECT_EQ(median_stages(repetitions), expected);
 }
 
-TEST(Race, RoundRobinWithTurningOrder) {
+/// Who ran, a letter each, in a race of so many rounds.
+std::string order_of_race(int contenders, int rounds) {
   std::string order;
-  std::vector<Contender> contenders(3);
-  for (int i = 0; i < 3; ++i) {
-    contenders[i].repetitions = 2;
-    contenders[i].run = [&order, i] {
+  std::vector<Contender> all(contenders);
+  for (int i = 0; i < contenders; ++i) {
+    all[i].repetitions = rounds;
+    all[i].run = [&order, i] {
       order += static_cast<char>('a' + i);
       return 0.1;
     };
   }
-  race(contenders);
-  EXPECT_EQ(order, "abcbca");
-  for (const Contender& contender : contenders) EXPECT_EQ(contender.seconds, (std::vector<double>{0.1, 0.1}));
+  race(all);
+  for (const Contender& contender : all) EXPECT_EQ(contender.seconds, std::vector<double>(rounds, 0.1));
+  return order;
+}
+
+TEST(Race, OrderOfFew) {
+  EXPECT_EQ(order_of_race(1, 3), "aaa");
+  EXPECT_EQ(order_of_race(2, 2), "abba");
+  EXPECT_EQ(order_of_race(3, 2), "abcacb");
+  EXPECT_EQ(order_of_race(4, 4), "abdcbcadcdbadacb");
+}
+
+TEST(Race, AllRunAsOftenAtEachPlaceAndAfterEachOther) {
+  for (int n = 2; n <= 9; ++n) {
+    const int rounds = n % 2 == 0 ? n : 2 * n;
+    const std::string order = order_of_race(n, rounds);
+    std::map<std::pair<char, int>, int> at_place;
+    std::map<std::pair<char, char>, int> after;
+    for (int i = 0; i < n * rounds; ++i) {
+      ++at_place[{order[i], i % n}];
+      if (i % n > 0) ++after[{order[i], order[i - 1]}];
+    }
+    EXPECT_EQ(at_place.size(), std::size_t(n * n));
+    EXPECT_EQ(after.size(), std::size_t(n * (n - 1)));
+    for (const auto& [who, times] : at_place) EXPECT_EQ(times, rounds / n) << n;
+    for (const auto& [who, times] : after) EXPECT_EQ(times, rounds / n) << n;
+  }
 }
 
 TEST(Race, StopsOnceTheOwnBudgetIsUsedUpButRunsAtLeastOnce) {
