@@ -9,12 +9,6 @@
 
 namespace hermesh::edge_kernels {
 
-/// Signs of the leaf and its upper neighbours, at dx + 2dy + 4dz: 8 words each. Crossing edges need those of one step
-/// along one axis alone.
-struct UpperSigns {
-  const std::uint64_t* inside[8];
-};
-
 /// The plain code for edges whose stencils have samples that are no data, or differences whose squares single precision
 /// has no room for, which the vector code does not do.
 class PlainCrossing {

@@ -13,7 +13,11 @@
 
 namespace hermesh::leaf_kernels {
 
-using edge_kernels::UpperSigns;
+/// Signs of the leaf and its upper neighbours, at dx + 2dy + 4dz: 8 words each. Crossing edges need those of one step
+/// along one axis alone.
+struct UpperSigns {
+  const std::uint64_t* inside[8];
+};
 
 /// Floats in the longest vectors.
 inline constexpr int kLargestVector = 8;
