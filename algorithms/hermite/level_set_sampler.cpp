@@ -134,14 +134,11 @@ class Sampler {
       if (leaf + kAhead < leaves_.size()) ask_for(leaf + kAhead);
       SignLeaf& to = signs_[leaf];
       signs.read(leaf, to);
-      edge_kernels::EdgeInput& input = batch.inputs[batch.size];
-      const int count = kernels_.crossed(to.inside.data(), to.beyond.data(), input.crossing);
+      const int count = kernels_.crossed(to.inside.data(), to.beyond.data(), batch.inputs[batch.size].crossing);
       found_[leaf].count = static_cast<std::uint32_t>(count);
-      if (count == 0) continue;
-      const openvdb::Coord lower = leaves_.lower(leaf);
-      to.lower = {lower.x(), lower.y(), lower.z()};
-      batch.stencils[batch.size].emplace(volume_, leaf).fill(input);
-      batch.leaf[batch.size++] = leaf;
+      // Without a branch: which leaves have crossings no processor guesses.
+      batch.leaf[batch.size] = leaf;
+      batch.size += count != 0;
       if (batch.size == kBatch) finish(batch);
     }
     if (batch.size > 0) finish(batch);
@@ -151,7 +148,13 @@ class Sampler {
 
   void finish(Batch& batch) {
     std::size_t count = 0;
-    for (std::size_t i = 0; i < batch.size; ++i) count += found_[batch.leaf[i]].count;
+    for (std::size_t i = 0; i < batch.size; ++i) {
+      const std::size_t leaf = batch.leaf[i];
+      const openvdb::Coord lower = leaves_.lower(leaf);
+      signs_[leaf].lower = {lower.x(), lower.y(), lower.z()};
+      batch.stencils[i].emplace(volume_, leaf).fill(batch.inputs[i]);
+      count += found_[leaf].count;
+    }
     CrossingStore<Crossing>& store = stores_.local();
     Crossing* out = store.room_for(count);
     sample_(batch.inputs.data(), static_cast<int>(batch.size), out);
