@@ -18,20 +18,25 @@
 namespace hermesh {
 namespace {
 
-/// Bytes a second of a[i] = b[i] + s c[i] over arrays that no cache holds, all threads: three streams.
+/// Bytes a second of a[i] = b[i] + s c[i] over arrays that no cache holds, all threads: three streams. A sweep before
+/// the one that is timed finds the pages again that a system has taken its tables of away since the last: it is the
+/// memory's speed that is asked for, not what a contender before left behind.
 class Triad {
  public:
   Triad() : a_(kSize), b_(kSize, 1.0f), c_(kSize, 2.0f) {}
   double run() {
-    return timed([&] {
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kSize, 1 << 16), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) a_[i] = b_[i] + 0.5f * c_[i];
-      });
-    });
+    sweep();
+    return timed([&] { sweep(); });
   }
   static constexpr double kBytes = 3.0 * sizeof(float) * (1 << 25);
 
  private:
+  void sweep() {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kSize, 1 << 16), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) a_[i] = b_[i] + 0.5f * c_[i];
+    });
+  }
+
   static constexpr std::size_t kSize = 1 << 25;
   std::vector<float> a_, b_, c_;
 };
@@ -198,7 +203,8 @@ Measurement hermite_speed_measurement() {
       {"ns", "ns/crossing", "median time an edge crossing of the input"},
       {"floor", "÷ bandwidth",
        "median time divided by that in which the triad's bandwidth would read the input and write the result once"},
-      {"floor_of_shortest", "of shortest", "the same with the shortest time of either: what a machine that nobody else uses would tell"},
+      {"floor_of_shortest", "of shortest",
+       "the same with the shortest time of either, which other work on the machine disturbs less"},
       {"ratio", "times as fast", "as the peer: volumeToMesh at adaptivity 0, the write floor, or the way over floats"}};
   return {.name = "hermite-speed",
           .summary = "time to make Hermite data from a level set and to unite them",
