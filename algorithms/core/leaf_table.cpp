@@ -119,7 +119,6 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
     Node& node = nodes_[i];
     node.source = sources[i];
     node.lower = node.source->origin();
-    node.first = static_cast<std::uint32_t>(counts[i]);
     Accessor access(*tree_);
     for (int slot = 0; slot < 27; ++slot) {
       constexpr int kWidth = TreeNode::DIM;
@@ -129,7 +128,8 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       node.neighbours[slot] = found != index.end() ? found->second : uniform(rule_(access.getValue(there)));
     }
     find_tiles(node);
-    const std::size_t first = node.first, end = number(node, static_cast<std::uint32_t>(i));
+    const auto first = static_cast<std::size_t>(counts[i]);
+    const std::size_t end = number(node, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(first));
     if (!with_values) return;
     for (std::size_t leaf = first; leaf < std::min(first + kLeavesAhead, end); ++leaf) ask_for(leaf);
     for (std::size_t leaf = first; leaf < end; ++leaf) {
@@ -157,11 +157,11 @@ void LeafPlaces::find_tiles(Node& node) const {
   }
 }
 
-/// Numbers the leaves, and returns the number behind the last.
-std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index) {
+/// Numbers the leaves from `next` on, and returns the number behind the last.
+std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   Numbers& numbers = numbers_[index];
-  std::uint32_t next = node.first;
   for (int row = 0; row < 256; ++row) {
+    if (row % 16 == 0) node.first_at[row / 16] = next;
     std::int32_t* to = &numbers[number_slot(row >> 4, row & 15, 0)];
     const int word = row >> 2, shift = 16 * (row & 3);
     const auto inside = static_cast<std::uint32_t>(node.tile_inside[word] >> shift & 0xffff);
@@ -174,6 +174,7 @@ std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index) {
       leaves_[next++] = node.source->getTable()[16 * row + z].getChild();
     }
   }
+  node.first_at[16] = next;
   return next;
 }
 

@@ -52,6 +52,11 @@ class LeafPlaces {
   std::int32_t neighbour(std::size_t leaf, int dx, int dy, int dz) const {
     return around_[leaf][kStepX * dx + kStepY * dy + dz];
   }
+  /// Asks for the numbers of the neighbours above along x and y, which may lie where no cache has them.
+  [[gnu::always_inline]] void ask_for_neighbours(std::size_t leaf) const {
+    __builtin_prefetch(around_[leaf] + kStepX);
+    __builtin_prefetch(around_[leaf] + kStepY);
+  }
   /// The leaf itself and its seven neighbours one step up (`side` 1) or down (−1) along each axis or not: at
   /// |dx| + 2|dy| + 4|dz|.
   std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const {
@@ -77,6 +82,11 @@ class LeafPlaces {
   /// Calls f(leaf) for every leaf of the slab, in ascending order of (y, z).
   template <class F>
   void for_each_leaf(const Slab& slab, F&& f) const;
+  /// Calls f(first, end) for ranges that together are the numbers of all leaves of the slab, in any order.
+  template <class F>
+  void for_each_range(const Slab& slab, F&& f) const {
+    for (const std::uint32_t node : slab.nodes) f(nodes_[node].first_at[slab.x], nodes_[node].first_at[slab.x + 1]);
+  }
 
   /// Whether a tile of one sign meets a tile of the other, so that edges change sign and start in no leaf.
   bool tiles_of_both_signs_meet(RunContext& context) const;
@@ -117,7 +127,7 @@ class LeafPlaces {
     openvdb::Coord lower;
     const TreeNode* source = nullptr;
     NodeMask child{}, tile_inside{};
-    std::uint32_t first = 0;                    ///< number of the first leaf
+    std::array<std::uint32_t, 17> first_at{};   ///< number of the first leaf at every x, and behind the last
     std::array<std::int32_t, 27> neighbours{};  ///< by neighbour_slot(); a node's number or kUniform…
     float nearest_inside = kNoTile;             ///< signed value of the inside tile that is nearest to the isovalue
   };
@@ -130,7 +140,7 @@ class LeafPlaces {
   static bool is_first_layer(const BlockMask& signs, int axis, bool inside);
 
   void find_tiles(Node& node) const;
-  std::uint32_t number(Node& node, std::uint32_t index);
+  std::uint32_t number(Node& node, std::uint32_t index, std::uint32_t next);
   void number_around(std::size_t node);
   bool tiles_meet(const Node& node) const;
   std::vector<openvdb::CoordBBox> large_tiles_unlike_background(RunContext& context) const;
@@ -148,18 +158,19 @@ class LeafPlaces {
 template <class F>
 void LeafPlaces::for_each_leaf(const Slab& slab, F&& f) const {
   const auto y_of = [&](std::size_t i) { return nodes_[slab.nodes[i]].lower.y(); };
+  std::vector<std::uint32_t> next;  // leaf of each node of a column; in a node their order is the same
   for (std::size_t column = 0, end; column < slab.nodes.size(); column = end) {
-    for (end = column + 1; end < slab.nodes.size() && y_of(end) == y_of(column); ++end) continue;
+    next.clear();
+    for (end = column; end < slab.nodes.size() && y_of(end) == y_of(column); ++end)
+      next.push_back(nodes_[slab.nodes[end]].first_at[slab.x]);
     for (int word = 4 * slab.x; word < 4 * slab.x + 4; ++word) {
       std::uint64_t any = 0;
       for (std::size_t i = column; i < end; ++i) any |= nodes_[slab.nodes[i]].child[word];
       if (any == 0) continue;
-      for (int row = 4 * word; row < 4 * word + 4; ++row)
+      for (int row = 0; row < 4; ++row)
         for (std::size_t i = column; i < end; ++i) {
-          const std::uint32_t node = slab.nodes[i];
-          const std::int32_t* number = &numbers_[node][number_slot(row >> 4, row & 15, 0)];
-          for (std::uint64_t left = nodes_[node].child[word] >> (16 * (row & 3)) & 0xffff; left != 0; left &= left - 1)
-            f(static_cast<std::uint32_t>(number[std::countr_zero(left)]));
+          const auto leaves = static_cast<std::uint16_t>(nodes_[slab.nodes[i]].child[word] >> (16 * row));
+          for (int left = std::popcount(leaves); left > 0; --left) f(next[i - column]++);
         }
     }
   }

@@ -90,6 +90,12 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
     leaves.for_each_leaf(slab, [&](std::uint32_t leaf) { order.push_back(leaf); });
     for (std::size_t i = before; i < order.size(); ++i)
       ASSERT_EQ(leaves.lower(order[i]).x(), leaves.lower(order[before]).x());
+    std::vector<std::uint32_t> in_order(order.begin() + static_cast<std::ptrdiff_t>(before), order.end()), in_ranges;
+    leaves.for_each_range(slab, [&](std::uint32_t first, std::uint32_t end) {
+      for (std::uint32_t leaf = first; leaf < end; ++leaf) in_ranges.push_back(leaf);
+    });
+    std::ranges::sort(in_order), std::ranges::sort(in_ranges);
+    ASSERT_EQ(in_ranges, in_order);
   }
   ASSERT_EQ(order.size(), leaves.size());
   for (std::size_t i = 1; i < order.size(); ++i) ASSERT_LT(leaves.lower(order[i - 1]), leaves.lower(order[i]));

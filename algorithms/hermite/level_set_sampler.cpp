@@ -1,5 +1,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/scalable_allocator.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <array>
@@ -92,19 +93,25 @@ class LeafSigns {
 template <class Crossing>
 class Sampler {
  public:
-  Sampler(const SampledVolume& volume, edge_kernels::Sample<Crossing>* sample, RunContext& context)
-      : volume_(volume), leaves_(volume.leaves), sample_(sample), context_(context), signs_(leaves_.size()),
-        found_(leaves_.size()) {}
+  Sampler(const LevelSet& level_set, const SampledVolume& volume, edge_kernels::Sample<Crossing>* sample,
+          RunContext& context)
+      : level_set_(level_set), volume_(volume), leaves_(volume.leaves), sample_(sample), context_(context),
+        signs_(leaves_.size()), found_(leaves_.size()) {}
 
   /// Returns false if edges with a change of sign start in no leaf; then the result is of no use.
   bool run(SparseHermite<Crossing>& result) {
-    if (leaves_.tiles_of_both_signs_meet(context_)) return false;
+    // What one thread alone can do, or nearly, others need not wait for.
+    bool tiles_meet = false;
+    tbb::task_group beside;
+    beside.run([&] { tiles_meet = leaves_.tiles_of_both_signs_meet(context_); });
+    beside.run([&] { result.placement = placement_of(*level_set_.grid().grid); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
       context_.check();
       sample_leaves(range.begin(), range.end());
     });
+    beside.wait();
     if (not_finite_) throw_not_finite();
-    if (incomplete_) return false;
+    if (incomplete_ || tiles_meet) return false;
     result.outermost_inside = leaves_.rule()(leaves_.tree().background());
     copy(result);
     return true;
@@ -125,12 +132,13 @@ class Sampler {
   };
 
   void sample_leaves(std::size_t first, std::size_t end) {
-    // By the time that a leaf's turn comes its samples have come from memory.
-    constexpr std::size_t kAhead = 6;
+    // By the time that a leaf's turn comes its samples have come from memory, and before them what tells where they are.
+    constexpr std::size_t kAhead = 6, kFurtherAhead = 18;
     for (std::size_t leaf = first; leaf < std::min(first + kAhead, end); ++leaf) ask_for(leaf);
     LeafSigns signs(leaves_);
     Batch batch;
     for (std::size_t leaf = first; leaf < end; ++leaf) {
+      if (leaf + kFurtherAhead < leaves_.size()) leaves_.ask_for_neighbours(leaf + kFurtherAhead);
       if (leaf + kAhead < leaves_.size()) ask_for(leaf + kAhead);
       SignLeaf& to = signs_[leaf];
       signs.read(leaf, to);
@@ -189,10 +197,14 @@ class Sampler {
       });
     };
     each_slab([&](std::size_t i) {
-      leaves_.for_each_leaf(slabs[i], [&](std::uint32_t leaf) {
-        live[i] += found_[leaf].count != 0;
-        crossings[i] += found_[leaf].count;
+      std::uint64_t leaves_with_any = 0, total = 0;  // sums of neighbouring slabs share a cache line
+      leaves_.for_each_range(slabs[i], [&](std::size_t first, std::size_t end) {
+        for (std::size_t leaf = first; leaf < end; ++leaf) {
+          leaves_with_any += found_[leaf].count != 0;
+          total += found_[leaf].count;
+        }
       });
+      live[i] = leaves_with_any, crossings[i] = total;
     });
     result.leaves.resize(exclusive_scan(live, "leaves"));
     result.crossings.resize(exclusive_scan(crossings, "edge crossings"));
@@ -209,6 +221,7 @@ class Sampler {
     });
   }
 
+  const LevelSet& level_set_;
   const SampledVolume& volume_;
   const LeafPlaces& leaves_;
   edge_kernels::Sample<Crossing>* sample_;
@@ -224,17 +237,16 @@ template <class Crossing>
 SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
                                edge_kernels::Sample<Crossing>* sample_leaves, RunContext& context) {
   SparseHermite<Crossing> result;
-  result.placement = placement_of(*level_set.grid().grid);
   const Stage stage(context, "Hermite data from the level set");
   {
     const LeafPlaces leaves(level_set, isovalue, context);
     const std::optional<SampledVolume> volume = sampled_volume(leaves, level_set);
-    if (volume && Sampler<Crossing>(*volume, sample_leaves, context).run(result)) return result;
+    if (volume && Sampler<Crossing>(level_set, *volume, sample_leaves, context).run(result)) return result;
   }
   // Rare: signs must be known beforehand, to tell which samples are data, or to make leaves of tiles.
   const LeafTable table(level_set, isovalue, context);
   const SampledVolume volume = sampled_volume(table, level_set);
-  Sampler<Crossing>(volume, sample_leaves, context).run(result);
+  Sampler<Crossing>(level_set, volume, sample_leaves, context).run(result);
   return result;
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -337,6 +338,28 @@ TEST_F(LevelSetSamplerTest, CrossingsAreInAscendingOrderOfLeavesAndSignsFollowFr
         missing_inside += inside;
       }
   EXPECT_GT(missing_inside, 100);
+}
+
+TEST_F(LevelSetSamplerTest, ErrorsOfWhatRunsBesideTheSamplingAndCancellationArriveWhole) {
+  const auto grid = [] {
+    return openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(40.0f, openvdb::Vec3f(0.0f, 0.0f, 0.0f), 1.0f);
+  };
+  for (const int threads : {1, 2, 7}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    RunContext context;
+    const auto perspective = grid();
+    perspective->setTransform(openvdb::math::Transform::createFrustumTransform(
+        openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(64)), 0.5, 10.0, 1.0));
+    try {
+      sample_level_set(make_level_set(perspective), 0.0, context);
+      ADD_FAILURE() << "perspective with " << threads << " threads";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("perspective"), std::string::npos) << error.what();
+    }
+    std::atomic<bool> cancel = true;
+    context.cancel = &cancel;
+    EXPECT_THROW(sample_level_set(make_level_set(grid()), 0.0, context), Cancelled) << threads;
+  }
 }
 
 }  // namespace
