@@ -1,6 +1,7 @@
 // How fast Hermite data are made and combined, beside OpenVDB's mesher on the same level set and the memory's own speed.
 #include <openvdb/tools/VolumeToMesh.h>
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -124,6 +125,50 @@ void append(std::vector<MeasuredRow>& rows, std::vector<MeasuredRow> more) {
   std::ranges::move(more, std::back_inserter(rows));
 }
 
+/// A conversion that moves so many bytes, and the memory, with 1, 2, 4, … threads: cores share the memory, so that what
+/// arithmetic bounds with few of them comes close to the memory's speed with many.
+std::vector<MeasuredRow> by_threads(const std::string& label, const std::function<double()>& conversion, double bytes,
+                                    int repetitions, Triad& triad) {
+  constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
+  std::vector<std::size_t> counts;
+  const std::size_t most = tbb::global_control::active_value(kThreads);
+  for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
+  counts.push_back(most);
+  std::vector<Contender> contenders;  // of each count the memory, then the conversion
+  for (const std::size_t count : counts)
+    for (const std::function<double()>& run : {std::function<double()>([&triad] { return triad.run(); }), conversion})
+      contenders.push_back({.run =
+                                [count, run] {
+                                  const tbb::global_control limit(kThreads, count);
+                                  return run();
+                                },
+                            .budget_seconds = 1e9,
+                            .repetitions = repetitions,
+                            .seconds = {}});
+  for (Contender& contender : contenders) contender.run();  // warms caches and pools
+  race(contenders);
+  std::vector<MeasuredRow> rows;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    const bool is_triad = i % 2 == 0;
+    const auto slower = [&](auto&& of) {  // than the memory would move the bytes
+      return of(contenders[i].seconds) / bytes * Triad::kBytes / of(contenders[i - 1].seconds);
+    };
+    const double seconds = median(contenders[i].seconds);
+    MeasuredRow row{"threads", is_triad ? "triad" : label};
+    row.values["threads"] = counts[i / 2];
+    row.values["seconds"] = seconds;
+    row.values["minimum"] = std::ranges::min(contenders[i].seconds);
+    if (!is_triad) {
+      row.values["floor"] = slower(median);
+      row.values["floor_of_shortest"] = slower([](const std::vector<double>& all) { return std::ranges::min(all); });
+    }
+    row.values["speedup"] = median(contenders[i % 2].seconds) / seconds;
+    rows.push_back(std::move(row));
+  }
+  std::ranges::stable_sort(rows, {}, [](const MeasuredRow& row) { return row.label != "triad"; });
+  return rows;
+}
+
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   RunContext& context = input.context;
   const int repetitions = int(input.parameters.number("repetitions"));
@@ -148,11 +193,12 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   rows.push_back({"memory", "dense 10-byte voxels, written", {{"mebibytes", dense_bytes / (1 << 20)}}});
 
   Race sampling("sampling", repetitions, triad);
+  const std::string packed = "level set → sparse, packed";
+  const std::function<double()> sample_packed = [&] {
+    return timed([&] { sample_level_set_packed(level_set, 0.0, kCode, context); });
+  };
   const int peer = sampling.add("openvdb volumeToMesh", [&] { return openvdb_mesh(level_set); }, crossings, 0, -1);
-  sampling.add(
-      "level set → sparse, packed",
-      [&] { return timed([&] { sample_level_set_packed(level_set, 0.0, kCode, context); }); }, crossings, read + written,
-      peer);
+  sampling.add(packed, sample_packed, crossings, read + written, peer);
   sampling.add(
       "level set → sparse, float", [&] { return timed([&] { sample_level_set(level_set, 0.0, context); }); }, crossings,
       read + 4 * written, peer);
@@ -163,6 +209,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
       "sparse → dense 10-byte voxels", [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings,
       dense_bytes, floor);
   append(rows, sampling.run());
+  append(rows, by_threads(packed, sample_packed, read + written, repetitions, triad));
 
   Race unions("union", repetitions, triad);
   const int unpacked = unions.add(
@@ -197,14 +244,19 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
 }  // namespace
 
 Measurement hermite_speed_measurement() {
+  const MeasuredColumn seconds{"seconds", "time [s]", "median"}, minimum{"minimum", "min [s]", "shortest"};
+  const MeasuredColumn floor{
+      "floor", "÷ bandwidth",
+      "median time divided by that in which the triad's bandwidth would read the input and write the result once"};
+  const MeasuredColumn floor_of_shortest{
+      "floor_of_shortest", "of shortest",
+      "the same with the shortest time of either, which other work on the machine disturbs less"};
   const std::vector<MeasuredColumn> columns = {
-      {"seconds", "time [s]", "median"},
-      {"minimum", "min [s]", "shortest"},
+      seconds,
+      minimum,
       {"ns", "ns/crossing", "median time an edge crossing of the input"},
-      {"floor", "÷ bandwidth",
-       "median time divided by that in which the triad's bandwidth would read the input and write the result once"},
-      {"floor_of_shortest", "of shortest",
-       "the same with the shortest time of either, which other work on the machine disturbs less"},
+      floor,
+      floor_of_shortest,
       {"ratio", "times as fast", "as the peer: volumeToMesh at adaptivity 0, the write floor, or the way over floats"}};
   return {.name = "hermite-speed",
           .summary = "time to make Hermite data from a level set and to unite them",
@@ -217,6 +269,15 @@ Measurement hermite_speed_measurement() {
                       {{"gigabytes", "GB/s", "bandwidth of a triad a = b + s c with all threads, in turns with the table's contenders, median"},
                        {"mebibytes", "MiB", "bytes"}}},
                      {"sampling", "level set to Hermite data", "contender", columns},
+                     {"threads",
+                      "the conversion and the memory by number of threads",
+                      "contender",
+                      {{"threads", "threads", "how many; the triad's bandwidth is that of as many"},
+                       seconds,
+                       minimum,
+                       floor,
+                       floor_of_shortest,
+                       {"speedup", "speedup", "times as fast as with one thread, by medians"}}},
                      {"union", "union of the model with itself moved by a tenth of its length", "contender", columns}},
           .measure = measure};
 }
