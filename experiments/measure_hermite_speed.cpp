@@ -186,6 +186,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   const auto crossings = double(a.crossings.size());
   const double read = 2048.0 * double(level_set.grid().grid->tree().leafCount());
   const auto written = double(a.memory_bytes());
+  const double more_as_floats = crossings * (sizeof(EdgeCrossing) - sizeof(PackedCrossing));
   const double dense_bytes = double(dense_a.memory_bytes());
 
   std::vector<MeasuredRow> rows = {{"memory", "level set, read", {{"mebibytes", read / (1 << 20)}}}};
@@ -201,7 +202,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   sampling.add(packed, sample_packed, crossings, read + written, peer);
   sampling.add(
       "level set → sparse, float", [&] { return timed([&] { sample_level_set(level_set, 0.0, context); }); }, crossings,
-      read + 4 * written, peer);
+      read + written + more_as_floats, peer);
   const int floor = sampling.add(
       "dense 10-byte voxels, write floor",
       [&] { return write_floor(dense_a.leaves(), FixedDense::bytes_per_leaf()); }, crossings, dense_bytes, peer);
