@@ -71,6 +71,16 @@ PackedHermite shifted(PackedHermite hermite) {
   return hermite;
 }
 
+/// Notes how long a contender took, and, if it moves bytes, how many times as long as the triad's bandwidth would take.
+void note_times(MeasuredRow& row, const std::vector<double>& seconds, double bytes, const std::vector<double>& triad) {
+  const double middle = median(seconds), shortest = std::ranges::min(seconds);
+  row.values["seconds"] = middle;
+  row.values["minimum"] = shortest;
+  if (bytes == 0) return;
+  row.values["floor"] = middle / median(triad) * Triad::kBytes / bytes;
+  row.values["floor_of_shortest"] = shortest / std::ranges::min(triad) * Triad::kBytes / bytes;
+}
+
 /// Contenders of one race, with what their rows say besides. The memory's own speed runs along, for it changes with what
 /// else the machine does.
 class Race {
@@ -88,20 +98,15 @@ class Race {
   std::vector<MeasuredRow> run() {
     for (Contender& contender : contenders_) contender.run();  // warms caches and pools
     race(contenders_);
-    const double bytes_a_second = Triad::kBytes / median(contenders_[0].seconds);
-    const double most_a_second = Triad::kBytes / std::ranges::min(contenders_[0].seconds);
+    const std::vector<double>& triad = contenders_[0].seconds;
+    const double bytes_a_second = Triad::kBytes / median(triad);
     std::vector<MeasuredRow> rows = {{"memory", "triad, beside " + table_, {{"gigabytes", bytes_a_second / 1e9}}}};
     for (std::size_t i = 0; i < labels_.size(); ++i) {
       const Entry& entry = labels_[i];
-      const double seconds = median(contenders_[i].seconds), shortest = std::ranges::min(contenders_[i].seconds);
+      const double seconds = median(contenders_[i].seconds);
       MeasuredRow row{table_, entry.label};
-      row.values["seconds"] = seconds;
-      row.values["minimum"] = shortest;
+      note_times(row, contenders_[i].seconds, entry.bytes, triad);
       if (entry.items > 0) row.values["ns"] = 1e9 * seconds / entry.items;
-      if (entry.bytes > 0) {
-        row.values["floor"] = seconds * bytes_a_second / entry.bytes;
-        row.values["floor_of_shortest"] = shortest * most_a_second / entry.bytes;
-      }
       if (entry.compared_with >= 0)
         row.values["ratio"] = median(contenders_[std::size_t(entry.compared_with)].seconds) / seconds;
       rows.push_back(std::move(row));
@@ -134,38 +139,26 @@ std::vector<MeasuredRow> by_threads(const std::string& label, const std::functio
   const std::size_t most = tbb::global_control::active_value(kThreads);
   for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
   counts.push_back(most);
-  std::vector<Contender> contenders;  // of each count the memory, then the conversion
-  for (const std::size_t count : counts)
-    for (const std::function<double()>& run : {std::function<double()>([&triad] { return triad.run(); }), conversion})
-      contenders.push_back({.run =
-                                [count, run] {
-                                  const tbb::global_control limit(kThreads, count);
-                                  return run();
-                                },
-                            .budget_seconds = 1e9,
-                            .repetitions = repetitions,
-                            .seconds = {}});
+  std::vector<Contender> contenders;  // the memory by count, then the conversion
+  for (const std::function<double()>& run : {std::function<double()>([&triad] { return triad.run(); }), conversion})
+    for (const std::size_t count : counts) {
+      const auto limited = [count, run] {
+        const tbb::global_control limit(kThreads, count);
+        return run();
+      };
+      contenders.push_back({.run = limited, .budget_seconds = 1e9, .repetitions = repetitions, .seconds = {}});
+    }
   for (Contender& contender : contenders) contender.run();  // warms caches and pools
   race(contenders);
   std::vector<MeasuredRow> rows;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const bool is_triad = i % 2 == 0;
-    const auto slower = [&](auto&& of) {  // than the memory would move the bytes
-      return of(contenders[i].seconds) / bytes * Triad::kBytes / of(contenders[i - 1].seconds);
-    };
-    const double seconds = median(contenders[i].seconds);
-    MeasuredRow row{"threads", is_triad ? "triad" : label};
-    row.values["threads"] = counts[i / 2];
-    row.values["seconds"] = seconds;
-    row.values["minimum"] = std::ranges::min(contenders[i].seconds);
-    if (!is_triad) {
-      row.values["floor"] = slower(median);
-      row.values["floor_of_shortest"] = slower([](const std::vector<double>& all) { return std::ranges::min(all); });
-    }
-    row.values["speedup"] = median(contenders[i % 2].seconds) / seconds;
+    const std::size_t n = counts.size(), count = i % n;
+    MeasuredRow row{"threads", i < n ? "triad" : label};
+    row.values["threads"] = counts[count];
+    note_times(row, contenders[i].seconds, i < n ? 0 : bytes, contenders[count].seconds);
+    row.values["speedup"] = median(contenders[i - count].seconds) / median(contenders[i].seconds);
     rows.push_back(std::move(row));
   }
-  std::ranges::stable_sort(rows, {}, [](const MeasuredRow& row) { return row.label != "triad"; });
   return rows;
 }
 

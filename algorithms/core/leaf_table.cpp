@@ -128,9 +128,9 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       node.neighbours[slot] = found != index.end() ? found->second : uniform(rule_(access.getValue(there)));
     }
     find_tiles(node);
-    const auto first = static_cast<std::size_t>(counts[i]);
-    const std::size_t end = number(node, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(first));
+    number(node, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(counts[i]));
     if (!with_values) return;
+    const std::size_t first = node.first_at.front(), end = node.first_at.back();
     for (std::size_t leaf = first; leaf < std::min(first + kLeavesAhead, end); ++leaf) ask_for(leaf);
     for (std::size_t leaf = first; leaf < end; ++leaf) {
       if (leaf + kLeavesAhead < end) ask_for(leaf + kLeavesAhead);
@@ -157,8 +157,8 @@ void LeafPlaces::find_tiles(Node& node) const {
   }
 }
 
-/// Numbers the leaves from `next` on, and returns the number behind the last.
-std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
+/// Numbers the leaves from `next` on.
+void LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   Numbers& numbers = numbers_[index];
   for (int row = 0; row < 256; ++row) {
     if (row % 16 == 0) node.first_at[row / 16] = next;
@@ -175,7 +175,6 @@ std::uint32_t LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t 
     }
   }
   node.first_at[16] = next;
-  return next;
 }
 
 /// The numbers one step around the node, from those in its neighbours.

@@ -140,7 +140,7 @@ class LeafPlaces {
   static bool is_first_layer(const BlockMask& signs, int axis, bool inside);
 
   void find_tiles(Node& node) const;
-  std::uint32_t number(Node& node, std::uint32_t index, std::uint32_t next);
+  void number(Node& node, std::uint32_t index, std::uint32_t next);
   void number_around(std::size_t node);
   bool tiles_meet(const Node& node) const;
   std::vector<openvdb::CoordBBox> large_tiles_unlike_background(RunContext& context) const;
