@@ -248,6 +248,7 @@ std::vector<std::array<int, 3>> DistanceOracle::blocks_within(double band, const
 namespace {
 
 constexpr std::array<int, 3> kStrides = {64, 8, 1};  // of x, y and z
+constexpr double kSure = 1e-5;                       // more than twice block_side_place()'s step, in voxels
 
 /// Gives every sample that provably lies on the same side as `seed` the seed's sign.
 void spread(const std::array<double, kBlockVoxels>& distance, int seed, bool sign,
@@ -262,9 +263,10 @@ void spread(const std::array<double, kBlockVoxels>& distance, int seed, bool sig
       for (const int step : {-1, 1}) {
         const int along = (i / stride) % 8 + step;
         const int j = i + step * stride;
-        // Two balls free of surface that overlap cover the edge between their centres.
+        // Two balls free of surface that overlap cover the edge between their centres, and that between the places of
+        // their sides.
         if (along < 0 || along > 7 || known[std::size_t(j)] ||
-            distance[std::size_t(i)] + distance[std::size_t(j)] <= 1.0 + 1e-9)
+            distance[std::size_t(i)] + distance[std::size_t(j)] <= 1.0 + kSure)
           continue;
         known.set(std::size_t(j));
         stack.push_back(j);
@@ -288,8 +290,13 @@ std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
   return result;
 }
 
-std::bitset<kBlockVoxels> block_inside(const DistanceOracle& oracle, const std::array<int, 3>& origin,
-                                       const std::array<double, kBlockVoxels>& distances) {
+Vector3d block_side_place(const std::array<int, 3>& origin, int i) {
+  return block_position(origin, i) + Vector3d(3.3e-6, 2.1e-6, 1.1e-6);
+}
+
+std::bitset<kBlockVoxels> block_inside(const std::array<int, 3>& origin,
+                                       const std::array<double, kBlockVoxels>& distances,
+                                       const std::function<bool(const Vector3d&)>& is_inside) {
   // Farthest first: the farther from the surface, the less a ray's start matters.
   std::array<int, kBlockVoxels> order;
   for (int i = 0; i < kBlockVoxels; ++i) order[std::size_t(i)] = i;
@@ -298,7 +305,7 @@ std::bitset<kBlockVoxels> block_inside(const DistanceOracle& oracle, const std::
   std::bitset<kBlockVoxels> known, inside;
   for (const int i : order)
     if (!known[std::size_t(i)])
-      spread(distances, i, oracle.parity(block_position(origin, i)).inside(), known, inside);
+      spread(distances, i, is_inside(block_side_place(origin, i)), known, inside);
   return inside;
 }
 

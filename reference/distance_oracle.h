@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <bitset>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -77,10 +78,15 @@ inline Eigen::Vector3d block_position(const std::array<int, 3>& origin, int i) {
 std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
                                                  const std::array<int, 3>& origin, double reach);
 
-/// Samples that lie inside by parity. The sign can change only across the surface, so rays are cast for one
-/// sample of every set that provably lies on one side: two neighbours whose distances add up to more than the
-/// voxel between them.
-std::bitset<kBlockVoxels> block_inside(const DistanceOracle& oracle, const std::array<int, 3>& origin,
-                                       const std::array<double, kBlockVoxels>& distances);
+/// The place whose side sample i has: a few millionths of a voxel up from it on every axis, most on x and least on z, so
+/// that a sample on a polygon belongs to the solid on that side of it.
+Eigen::Vector3d block_side_place(const std::array<int, 3>& origin, int i);
+
+/// Samples that lie inside: is_inside is asked about block_side_place(). The sign can change only across the surface, so
+/// it is asked for one sample of every set that provably lies on one side: two neighbours whose distances add up to more
+/// than the voxel between them.
+std::bitset<kBlockVoxels> block_inside(const std::array<int, 3>& origin,
+                                       const std::array<double, kBlockVoxels>& distances,
+                                       const std::function<bool(const Eigen::Vector3d&)>& is_inside);
 
 }  // namespace hermesh

@@ -79,7 +79,11 @@ std::span<const Voxelizer> reference_voxelizers() {
        .voxelize = openvdb_mesh_to_volume},
       {.name = "exact",
        .summary = "brute-force distances with a CGAL tree and signs by rays: the oracle for small grids",
-       .options = {},
+       .options = {{.name = "signs",
+                    .fallback = "parity",
+                    .help = "inside is where rays cross the polygons an odd number of times, for closed surfaces that do "
+                            "not meet; or what the polygons wind around, for parts that overlap or touch",
+                    .choices = {"parity", "winding-number"}}},
        .voxelize = exact_voxelizer},
   }};
   return kTable;

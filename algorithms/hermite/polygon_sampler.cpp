@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
@@ -15,6 +16,8 @@ namespace {
 /// A point this close to a triangle's border or to an edge's end, in voxels, counts as on it, so that no line
 /// slips through between two triangles and no hit between two edges.
 constexpr double kTolerance = 1e-7;
+/// How far off the grid lines triangles are looked at, in voxels: farther than the places of sides are.
+constexpr double kReach = 1e-5;
 
 struct IndexTriangle {
   Eigen::Vector3d corner[3];  ///< index coordinates relative to the placement's base
@@ -163,31 +166,49 @@ class LeafHits {
       for_each_bit(edges_[axis], [&](int sample) { crossing_[axis][sample] = next++; });
   }
 
+  /// Where an edge is looked for: between the places that its ends' sides are taken from, which no polygon through a
+  /// sample holds; or, where the signs are those of a voxelizer that knows no such places, at the samples themselves.
+  enum class EdgePlace { of_sides, of_samples };
+
   /// Intersects one triangle with the block's edges along one axis.
-  void add(const IndexTriangle& triangle, int axis) {
+  void add(const IndexTriangle& triangle, int axis, EdgePlace place) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto& c = triangle.corner;
     const auto range = [&](int a, int limit) {
-      const double low = std::min({c[0][a], c[1][a], c[2][a]}) - lower_[a] - kTolerance;
-      const double high = std::max({c[0][a], c[1][a], c[2][a]}) - lower_[a] + kTolerance;
+      const double low = std::min({c[0][a], c[1][a], c[2][a]}) - lower_[a] - kReach;
+      const double high = std::max({c[0][a], c[1][a], c[2][a]}) - lower_[a] + kReach;
       return std::array<int, 2>{static_cast<int>(std::ceil(std::clamp(low, 0.0, 100.0))),
                                 static_cast<int>(std::floor(std::clamp(high, -1.0, double(limit))))};
     };
     const auto [u0, u1] = range(u, 7);
     const auto [v0, v1] = range(v, 7);
-    const auto side = [&](int i, int j, double pu, double pv) {
-      return (c[i][u] - pu) * (c[j][v] - pv) - (c[i][v] - pv) * (c[j][u] - pu);
+    const double shift = place == EdgePlace::of_sides ? 1.0 : 0.0;
+    const auto weights = [&](double x, double y) {
+      const auto side = [&](int i, int j) { return (c[i][u] - x) * (c[j][v] - y) - (c[i][v] - y) * (c[j][u] - x); };
+      return Eigen::Vector3d(side(1, 2), side(2, 0), side(0, 1));
     };
+    const Eigen::Vector3d along(c[0][axis], c[1][axis], c[2][axis]);
     for (int pu = u0; pu <= u1; ++pu)
       for (int pv = v0; pv <= v1; ++pv) {
         const double x = lower_[u] + pu, y = lower_[v] + pv;
-        const double w[3] = {side(1, 2, x, y), side(2, 0, x, y), side(0, 1, x, y)};
-        const double area = w[0] + w[1] + w[2];
-        if (area == 0) continue;
-        if (std::min({w[0] / area, w[1] / area, w[2] / area}) < -kTolerance) continue;
-        const double hit = (w[0] * c[0][axis] + w[1] * c[1][axis] + w[2] * c[2][axis]) / area - lower_[axis];
-        offer(axis, u, v, pu, pv, hit, triangle.normal);
+        const Eigen::Vector3d w = weights(x + shift * kSideShift[std::size_t(u)], y + shift * kSideShift[std::size_t(v)]);
+        const double area = w.sum();
+        if (area == 0 || (w / area).minCoeff() < -kTolerance) continue;
+        // Whether the edge is met is decided there, and where it is, on the edge between the samples.
+        const double met = w.dot(along) / area - lower_[axis] - shift * kSideShift[std::size_t(axis)];
+        const double hit = weights(x, y).dot(along) / area - lower_[axis];
+        offer(axis, u, v, pu, pv, met, hit, triangle.normal, place);
       }
+  }
+
+  /// Whether some crossing edge was met by no polygon.
+  bool misses_some() const {
+    for (int axis = 0; axis < 3; ++axis) {
+      bool missed = false;
+      for_each_bit(edges_[axis], [&](int sample) { missed = missed || best_[axis][sample].hits == 0; });
+      if (missed) return true;
+    }
+    return false;
   }
 
   /// Writes the chosen hits; `nearby` are the numbers of the triangles that came near the block.
@@ -214,6 +235,7 @@ class LeafHits {
     double offset = 0.0, away = 0.0;
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     bool consistent = false;
+    bool of_samples = false;
     int hits = 0;  ///< at different places
   };
 
@@ -241,23 +263,26 @@ class LeafHits {
     return true;
   }
 
-  void offer(int axis, int u, int v, int pu, int pv, double hit, const Eigen::Vector3d& normal) {
-    if (!(hit >= -kTolerance && hit <= 8.0 + kTolerance)) return;
-    const int middle = static_cast<int>(std::floor(hit));
+  /// `met`: where the edge is met as `place` has it, from the leaf's lower end; `hit`: the same between the samples.
+  void offer(int axis, int u, int v, int pu, int pv, double met, double hit, const Eigen::Vector3d& normal,
+             EdgePlace place) {
+    if (!(met >= -kTolerance && met <= 8.0 + kTolerance)) return;
+    const int middle = static_cast<int>(std::floor(met));
     for (int k = std::max(0, middle - 1); k <= std::min(7, middle + 1); ++k) {
-      const double offset = hit - k;
-      if (offset < -kTolerance || offset > 1.0 + kTolerance) continue;
+      if (met - k < -kTolerance || met - k > 1.0 + kTolerance) continue;
+      const double offset = std::clamp(hit - k, 0.0, 1.0);
       int local[3];
       local[axis] = k, local[u] = pu, local[v] = pv;
       const int sample = sample_index(local[0], local[1], local[2]);
       if (!test(edges_[axis], sample)) continue;
       Best& best = best_[axis][sample];
+      if (place == EdgePlace::of_samples && best.hits > 0 && !best.of_samples) continue;
       const bool consistent = (normal[axis] > 0) == test(leaf_.inside, sample);
       const double away = std::abs(offset - crossing_[axis][sample]->offset);
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
       const bool better = consistent != best.consistent ? consistent : away < best.away;
-      if (first || better) best = {std::clamp(offset, 0.0, 1.0), away, normal, consistent, best.hits};
+      if (first || better) best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
     }
   }
 
@@ -283,8 +308,12 @@ FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const P
         result.leaves[b], std::span(result.crossings).subspan(result.leaves[b].first, size), result.placement.base);
     const std::span<const std::uint32_t> nearby(bins.list.data() + bins.first[b],
                                                 bins.first[b + 1] - bins.first[b]);
-    for (const std::uint32_t t : nearby)
-      for (int axis = 0; axis < 3; ++axis) hits->add(triangles[t], axis);
+    const auto add_all = [&](LeafHits::EdgePlace place) {
+      for (const std::uint32_t t : nearby)
+        for (int axis = 0; axis < 3; ++axis) hits->add(triangles[t], axis, place);
+    };
+    add_all(LeafHits::EdgePlace::of_sides);
+    if (hits->misses_some()) add_all(LeafHits::EdgePlace::of_samples);
     hits->write(triangles, nearby, counts[b]);
   });
   if (sampling) {

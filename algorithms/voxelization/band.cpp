@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 
 namespace hermesh {
 namespace {
@@ -51,6 +52,8 @@ class LeafWork {
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
            kernels::EdgeBits& crossed) {
     frame_ = {soup_.scale(), {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0}};
+    side_frame_ = frame_;
+    for (std::size_t a = 0; a < 3; ++a) side_frame_.origin[a] += kSideShift[a];
     for (float& d : distances_.squared) d = float(reach_ * reach_) * 2.0f;
     if (ids_) std::memset(distances_.id, 0xff, sizeof distances_.id);
     crossed = {};
@@ -136,7 +139,7 @@ class LeafWork {
   void flush_crossing() {
     if (crossing_.count == 0) return;
     crossing_.fill();
-    kernels_.to_leaf(crossing_.corners, frame_, corners_);
+    kernels_.to_leaf(crossing_.corners, side_frame_, corners_);
     kernels_.cross(corners_, crossing_.count, *crossed_);
     crossing_.count = 0;
   }
@@ -197,7 +200,7 @@ class LeafWork {
   bool meets_edges(const VoxelBox& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double low = box.low[a] - frame_.origin[a] - 1e-6, high = box.high[a] - frame_.origin[a] + 1e-6;
+      const double low = box.low[a] - frame_.origin[a] - 1e-5, high = box.high[a] - frame_.origin[a] + 1e-5;
       if (high < 0.0 || low > 8.0) return false;
       across += std::floor(high) >= std::ceil(low) ? 1 : 0;
     }
@@ -210,7 +213,7 @@ class LeafWork {
   bool ids_;
   const std::vector<std::uint32_t>* without_;
   const Kernels& kernels_;
-  kernels::LeafFrame frame_{};
+  kernels::LeafFrame frame_{}, side_frame_{};  ///< of the samples, and of the places of their sides
   std::vector<TriangleBins::Cluster> clusters_;
   std::size_t triangles_ = 0;  ///< in the clusters
   kernels::Distances distances_;

@@ -24,7 +24,7 @@ struct Band {
   /// Distance of each voxel in world units, at most the reach; the active voxels are those below it. Null
   /// where no voxel is.
   std::vector<std::unique_ptr<FloatLeaf>> leaves;
-  std::vector<kernels::EdgeBits> crossed;               ///< grid edges that some triangle crosses
+  std::vector<kernels::EdgeBits> crossed;               ///< grid edges that some triangle crosses, as sample_side.h places their ends
   std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless asked for
 };
 

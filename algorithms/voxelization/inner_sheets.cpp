@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/segment.h"
 #include "algorithms/voxelization/surface_probe.h"
@@ -21,6 +22,8 @@ using Eigen::Vector3d;
 /// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that
 /// four places can stand for.
 constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
+/// How far off an edge's samples its triangles are looked for, in voxels: farther than the places of their sides are.
+constexpr double kNearby = 1e-5;
 
 struct Piece : Facet {
   using Facet::Facet;
@@ -294,13 +297,11 @@ class Finder {
       for (int a = 0; a < 3; ++a) {
         const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
         const double from = voxel[std::size_t(a)];
-        if (low > from + (a == axis ? 1.0 : 0.0) + 1e-6 || high < from - 1e-6) return;
+        if (low > from + (a == axis ? 1.0 : 0.0) + kNearby || high < from - kNearby) return;
       }
-      const Vector3d from(voxel[0], voxel[1], voxel[2]);
+      const Vector3d from = side_place(voxel);
       const double along = meeting(from, from + Vector3d::Unit(axis), piece);
-      // At an end the surface goes through the voxel, as faces along the grid do, and is beside the edge, not
-      // across.
-      if (along > 1e-6 && along < 1.0 - 1e-6) hits.push_back(along);
+      if (along >= 0.0) hits.push_back(along);
     }
   };
 
@@ -319,7 +320,7 @@ class Finder {
     };
     bins_.for_each_cluster(band_.blocks[block], box, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.low[a] > box.high[a] + 1e-6 || cluster.box.high[a] < box.low[a] - 1e-6) return;
+        if (cluster.box.low[a] > box.high[a] + kNearby || cluster.box.high[a] < box.low[a] - kNearby) return;
       for (const std::uint32_t t : cluster.triangles) meet(t);
     });
     for (const std::uint32_t t : bins_.large(block)) meet(t);

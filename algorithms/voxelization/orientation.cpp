@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -84,6 +85,7 @@ class Orienter {
   struct Patch {
     std::size_t begin = 0, end = 0;  ///< in queue_
     bool consistent = true, orientable = true, closed = true;
+    bool has_rim = false;                        ///< an edge that no other face has
     double given = 0.0, turned = 0.0;  ///< area that keeps the given winding, and that does not
     double volume = 0.0;               ///< after the turns, about centre_
     Eigen::Vector3d vector = Eigen::Vector3d::Zero();  ///< sum of the area vectors; zero if it is closed
@@ -137,13 +139,20 @@ class Orienter {
     }
     tbb::parallel_sort(edges.begin(), edges.end());
     neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
+    on_rim_.assign(triangles_.size(), 0);
     for_groups(
         std::span<const Edge>(edges),
         [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
         [&](std::span<const Edge> same) {
-          if (same.size() == 1) ++result_.boundary_edges;
+          if (same.size() == 1) {
+            ++result_.boundary_edges;
+            on_rim_[same[0].face_and_way >> 1] = 1;
+          }
           if (same.size() > 2) ++result_.non_manifold_edges;
-          if (same.size() != 2) return;
+          if (same.size() != 2) {
+            if (same.size() > 2) shared_edges_.insert(shared_edges_.end(), same.begin(), same.end());
+            return;
+          }
           ++two_face_edges_;
           link(same[0].face_and_way, same[1].face_and_way);
         });
@@ -185,7 +194,68 @@ class Orienter {
       if (!patch.orientable) one_sided_area_ += patch.given + patch.turned;
     }
     result_.patches = patches.size();
+    leave_out_walls(patches, turns);
     for (const std::uint32_t face : queue_) result_.turns[face] = turns[face];
+  }
+
+  /// How often the faces of one patch, or all, run along an edge of more than two faces from its low point to its high
+  /// one more than the other way.
+  struct Flow {
+    std::uint32_t patch;
+    std::size_t edge;
+    int own;
+  };
+
+  /// Sorts by patch and edge, and adds up what is of the same.
+  static void merge_by_patch(std::vector<Flow>& flows) {
+    const auto key = [](const Flow& f) { return std::tie(f.patch, f.edge); };
+    tbb::parallel_sort(flows.begin(), flows.end(), [&](const Flow& a, const Flow& b) { return key(a) < key(b); });
+    std::size_t count = 0;
+    for (const Flow& flow : flows)
+      if (count > 0 && key(flows[count - 1]) == key(flow))
+        flows[count - 1].own += flow.own;
+      else
+        flows[count++] = flow;
+    flows.resize(count);
+  }
+
+  /// Leaves out each patch of which the others are independent: at every edge of its border two or more others meet, and
+  /// without it these run along the edge as often one way as the other. So it is a wall within the solid or a fin of no
+  /// thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall would make a solid, too; the
+  /// least area comes first, and no surface within the wall's border has less than a plane one.
+  void leave_out_walls(const std::vector<Patch>& patches, std::vector<std::int8_t>& turns) {
+    if (shared_edges_.empty() || result_.non_manifold_edges > two_face_edges_) return;
+    std::vector<std::uint32_t> patch_of(triangles_.size(), kNone);
+    for (std::uint32_t p = 0; p < patches.size(); ++p)
+      for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) patch_of[queue_[i]] = p;
+    std::vector<int> total;
+    std::vector<Flow> flows;
+    for_groups(
+        std::span<const Edge>(shared_edges_),
+        [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
+        [&](std::span<const Edge> same) {
+          total.push_back(0);
+          for (const Edge& edge : same) {
+            const std::uint32_t face = edge.face_and_way >> 1;
+            flows.push_back({patch_of[face], total.size() - 1, (edge.face_and_way & 1) ? -turns[face] : turns[face]});
+            total.back() += flows.back().own;
+          }
+        });
+    merge_by_patch(flows);
+    std::vector<std::uint32_t> order(patches.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return patches[a].given + patches[a].turned < patches[b].given + patches[b].turned;
+    });
+    for (const std::uint32_t p : order) {
+      // An edge of one face is the border of a hole, and the patch may be what is left of a solid.
+      if (patches[p].has_rim || !patches[p].orientable) continue;
+      const auto [begin, end] = std::ranges::equal_range(flows, p, {}, &Flow::patch);
+      const bool others_are_closed = std::all_of(begin, end, [&](const Flow& f) { return f.own == total[f.edge]; });
+      if (!others_are_closed || std::all_of(begin, end, [](const Flow& f) { return f.own == 0; })) continue;
+      for (auto f = begin; f != end; ++f) total[f->edge] -= f->own;
+      for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) turns[queue_[i]] = 0;
+    }
   }
 
   /// The volume of an open surface, which is that of the cone to it, depends on where the cone's apex is: it
@@ -210,6 +280,7 @@ class Orienter {
       (turns[face] > 0 ? patch.given : patch.turned) += n.norm();
       patch.volume += turns[face] * n.dot(corner(face, 0) - centre_) / 3;
       patch.vector += turns[face] * n;
+      patch.has_rim |= on_rim_[face] != 0;
       for (const std::uint32_t entry : neighbours_[face]) {
         if (entry == kNone) {
           patch.closed = false;
@@ -243,6 +314,8 @@ class Orienter {
   std::vector<Triangle> triangles_;  ///< of merged points
   /// Per face its neighbours over edges of two faces: twice the number, plus kDisagrees.
   std::vector<std::array<std::uint32_t, 3>> neighbours_;
+  std::vector<char> on_rim_;          ///< faces with an edge that no other has
+  std::vector<Edge> shared_edges_;    ///< of more than two faces, one after the other
   std::vector<std::uint32_t> queue_;  ///< faces patch by patch
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   Bounds box_;

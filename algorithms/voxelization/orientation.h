@@ -43,6 +43,9 @@ struct Orientation {
 /// more edges have three faces or more than two, there is no surface along which to agree, and every face
 /// keeps its winding relative to the others.
 ///
+/// A patch is left out, too, if all of its border meets others that would be closed along it without the patch: a wall
+/// within a solid, or a fin of no thickness.
+///
 /// The same for every number of threads. Takes O(n log n) time, and about 70 bytes a face while it runs.
 /// Fewer than 2^31 faces.
 Orientation orient_faces(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/voxelization/cell_obstacles.h"
 #include "algorithms/voxelization/wall_walk.h"
 
@@ -34,7 +35,6 @@ struct Pocket {
   std::vector<std::uint32_t> blocks;  ///< numbers of those that hold them
 };
 
-Vector3d position(const Voxel& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
 
 class PocketOpener {
  public:
@@ -145,7 +145,7 @@ class PocketOpener {
   /// Whether the triangles around the first voxel face it more often than not. What is inside of a thin wall is many
   /// pockets, and to follow all ways within it would take longer than all the rest.
   bool may_be_outside(const Pocket& pocket, CellObstacles& obstacles) const {
-    const Vector3d from = position(pocket.voxels.front());
+    const Vector3d from = side_place(pocket.voxels.front());
     int facing = 0;
     for (int axis = 0; axis < 3; ++axis)
       for (const double step : {-1.0, 1.0}) {
@@ -168,7 +168,7 @@ class PocketOpener {
     const auto begin_at_walls = [&](const Pocket& of) {
       for (const Voxel& voxel : of.voxels)
         for (int axis = 0; axis < 3; ++axis)
-          for (const double step : {-1.0, 1.0}) walk.begin(position(voxel), step * Vector3d::Unit(axis));
+          for (const double step : {-1.0, 1.0}) walk.begin(side_place(voxel), step * Vector3d::Unit(axis));
     };
     begin_at_walls(pocket);
     while (obstacles.work() < kMostWork) {
@@ -180,7 +180,7 @@ class PocketOpener {
         const Voxel voxel{cell[0] + (corner & 1), cell[1] + (corner >> 1 & 1), cell[2] + (corner >> 2)};
         const std::uint32_t region = region_of(voxel);
         if (region == BlockTable::kNone || std::ranges::count(ways.regions, region) > 0) continue;
-        if (!is_free(*at, position(voxel), obstacles)) continue;
+        if (!is_free(*at, side_place(voxel), obstacles)) continue;
         if (goals_[region] || pocket_of_[region] == BlockTable::kNone) {
           ways.lead_out = goals_[region];
           return ways;
@@ -237,7 +237,7 @@ class PocketOpener {
   }
 
   bool sees_goal(const Voxel& voxel, CellObstacles& obstacles) const {
-    const Vector3d from = position(voxel);
+    const Vector3d from = side_place(voxel);
     // Near ones first.
     for (std::int32_t far = 1; far <= far_; ++far)
       for (std::int32_t x = -far; x <= far; ++x)
@@ -245,7 +245,7 @@ class PocketOpener {
           for (std::int32_t z = -far; z <= far; ++z) {
             if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
             const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (is_goal(other) && is_free(from, position(other), obstacles)) return true;
+            if (is_goal(other) && is_free(from, side_place(other), obstacles)) return true;
           }
     return false;
   }

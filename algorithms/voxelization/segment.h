@@ -73,7 +73,7 @@ class Obstacle {
   bool faces(const Eigen::Vector3d& p) const { return normal_.dot(p) > offset_; }
 
  private:
-  static constexpr double kMargin = 1e-6;
+  static constexpr double kMargin = 5e-6;  ///< above kSideShift, by which ways leave the cells that they are in
   Facet facet_;
   Eigen::Vector3d low_, high_;
   Eigen::Vector3d normal_;  ///< not of unit length

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/pockets.h"
 #include "algorithms/voxelization/winding_signs.h"
@@ -46,7 +47,8 @@ CrossedEdges crossed_edges(const Band& band, std::size_t block, const VoxelBits&
       if (open && result.open == 0) {
         const int place = __builtin_ctzll(open);
         const BlockAt& at = band.blocks[block];
-        Eigen::Vector3d lower(at[0] * 8.0 + double(x), at[1] * 8.0 + place / 8, at[2] * 8.0 + place % 8);
+        Eigen::Vector3d lower =
+            side_place(at[0] * 8.0 + double(x), at[1] * 8.0 + place / 8, at[2] * 8.0 + place % 8);
         result.example.end[0] = lower;
         lower[axis] += 1.0;
         result.example.end[1] = lower;

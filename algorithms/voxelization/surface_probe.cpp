@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "algorithms/core/sample_side.h"
 
 namespace hermesh {
 namespace {
@@ -80,7 +81,7 @@ Side SurfaceProbe::seen_from(const Vector3d& p) {
   const auto sees_one = [&](unsigned corners) {
     for (; corners != 0; corners &= corners - 1) {
       const Voxel voxel = corner(cell_, unsigned(std::countr_zero(corners)));
-      if (obstacles_.is_free_in(cell_, p, Vector3d(voxel[0], voxel[1], voxel[2]))) return true;
+      if (obstacles_.is_free_in(cell_, p, side_place(voxel))) return true;
     }
     return false;
   };

@@ -12,6 +12,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/memory_estimate.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/core/vdb_archive.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
@@ -65,11 +66,13 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   const Stage stage(context, "fog");
   const float inner = float(options.interior_band * options.voxel_size);
   const float outer = exterior ? float(options.exterior_band * options.voxel_size) : 0.0f;
+  const float on_surface = float(kLeastDepth * options.voxel_size);
   const openvdb::FloatGrid::Ptr grid = sdf.deepCopy();
   map_values(
       grid->tree(), context,
       [=](float distance) {
         if (distance <= -inner) return 1.0f;
+        if (distance < 0.0f && distance >= -on_surface) distance = 0.0f;  // a sample on the surface, which is no depth
         return std::clamp((outer - distance) / (outer + inner), 0.0f, 1.0f);
       },
       [](float density, bool) { return density > 0.0f; });

@@ -5,6 +5,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/memory_estimate.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 #include "algorithms/voxelization/band.h"
 #include "algorithms/voxelization/inner_sheets.h"
 #include "algorithms/voxelization/signs.h"
@@ -21,12 +22,18 @@ constexpr double kWide = 16.0, kNear = 6.0;
 /// Widths of the band in world units.
 struct Widths {
   float exterior, interior;
+  float least;  ///< distance of a voxel inside that lies on the surface
+
+  Widths(const BandWidths& band, double voxel_size)
+      : exterior(float(band.exterior * voxel_size)),
+        interior(float(band.interior * voxel_size)),
+        least(float(kLeastDepth * voxel_size)) {}
 };
 
 void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths,
                const kernels::Kernels& kernels) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
-  kernels.apply_signs(inside.data(), widths.exterior, widths.interior, leaf.buffer().data(),
+  kernels.apply_signs(inside.data(), widths.exterior, widths.interior, widths.least, leaf.buffer().data(),
                       &mask.getWord<openvdb::Index64>(0));
   leaf.setValueMask(mask);
 }
@@ -228,17 +235,15 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   }
   Boundary boundary;
   if (options.signs != SignRule::none) {
-    const Widths widths{float(near.exterior * options.voxel_size), float(near.interior * options.voxel_size)};
-    boundary = sign(soup, options.signs, work, *bins, widths, band, context);
+    boundary = sign(soup, options.signs, work, *bins, Widths(near, options.voxel_size), band, context);
   }
   bins.reset();
   Voxelization result;
   result.is_signed = boundary.is_signed;
   {
     const Stage stage(context, "tree");
-    const Widths widths{float(wide.exterior * options.voxel_size), float(wide.interior * options.voxel_size)};
     if (options.nearest) result.nearest = assemble_nearest(band);
-    result.distance = assemble_distance(band, widths, result.is_signed);
+    result.distance = assemble_distance(band, Widths(wide, options.voxel_size), result.is_signed);
   }
   if (result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior)) {
     const Stage stage(context, "wide band");

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/sample_side.h"
 
 namespace hermesh {
 namespace {
@@ -25,8 +26,8 @@ unsigned first_voxel(const VoxelBits& bits) {
 }
 
 Eigen::Vector3d voxel_at(const BlockAt& block, unsigned place) {
-  return {block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7),
-          block[2] * 8.0 + double(place & 7)};
+  return side_place(block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7),
+                    block[2] * 8.0 + double(place & 7));
 }
 
 /// A block that is asked voxel by voxel.
@@ -75,6 +76,9 @@ class WindingSigns {
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
         points.push_back(voxel_at(band_.blocks[i], representative(i, regions_.components[c].voxels)));
       winding_.at(points, std::span(value_.data() + regions_.first[i], points.size()));
+      for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
+        if (on_surface(band_.blocks[i], representative(i, regions_.components[c].voxels)))
+          value_[c] = float(winding_.at(points[c - regions_.first[i]]));
     });
   }
 
@@ -128,6 +132,8 @@ class WindingSigns {
   }
 
   void ask_again(const BlockAt& block, Samples& values) const {
+    for (unsigned place = 0; place < 512; ++place)
+      if (on_surface(block, place)) values[place] = float(winding_.at(voxel_at(block, place)));
     std::vector<Eigen::Vector3d> points;
     std::vector<unsigned> places;
     for (unsigned place = 0; place < 512; ++place)
@@ -218,7 +224,8 @@ class WindingSigns {
   };
   using Cells = std::map<std::array<std::int32_t, 3>, Cell>;
 
-  /// Whether a voxel lies on a triangle, where the number is that of either side.
+  /// Whether a voxel is so close to a triangle that only a question of its own, which is answered in double precision,
+  /// tells its side.
   bool on_surface(const BlockAt& block, unsigned place) const {
     constexpr double kOn = 1e-3;
     const std::uint32_t i = table_.find(block);

@@ -105,9 +105,9 @@ struct Kernels {
   /// Distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels below
   /// it as bits. False when there is none.
   bool (*finish)(const Distances&, float reach, float scale, float* values, std::uint64_t* active);
-  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit and limits them on either
-  /// side; leaves in `active` the bits of those below their limit.
-  void (*apply_signs)(const std::uint64_t* inside, float exterior, float interior, float* values,
+  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit, to −`least` or less, and limits
+  /// them on either side; leaves in `active` the bits of those below their limit.
+  void (*apply_signs)(const std::uint64_t* inside, float exterior, float interior, float least, float* values,
                       std::uint64_t* active);
 };
 
