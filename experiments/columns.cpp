@@ -86,6 +86,8 @@ std::span<const Column> all_columns() {
       {"active_voxels", "active voxels", "active voxels of the level set", "/voxelization/active_voxels"},
       {"grid_mib", "grid [MiB]", "memory of the level set's tree", "/voxelization/memory_bytes",
        Unit::kMebibyte},
+      {"lost_surface", "lost area", "share of the bounding polygons' area that has no surface within a voxel",
+       "/voxelization/lost_surface/share"},
       {"dimensions", "voxels", "dimensions of the active voxels' box", "/voxelization/dimensions_text"},
       {"voxel", "voxel", "voxel size, in the units of the case's entry", "/nominal_voxel_size"},
       {"swept", "value", "value of the parameter that the table's title names", "/sweep/value"},

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/voxelization/lost_surface.h"
 #include "experiments/cell.h"
 #include "experiments/provenance.h"
 #include "validation/distance.h"
@@ -123,6 +124,9 @@ class Group {
     voxelization_["stage_seconds"] = stages_json(timing.stages);
     voxelization_["active_voxels"] = level_set_.active_voxels();
     voxelization_["memory_bytes"] = level_set_.memory_bytes();
+    const LostSurface lost =
+        find_lost_surface(in_.input.mesh, level_set_, leaves_out_inner_polygons(voxelizer_), context_);
+    voxelization_["lost_surface"] = {{"share", lost.share()}, {"thickness", lost.thickness}};
   }
 
   PolygonMesh extract(const Cell& cell, RunContext& child) const {

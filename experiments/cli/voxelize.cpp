@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/core/vdb_file.h"
 #include "algorithms/voxelization/grid_frame.h"
@@ -71,6 +72,9 @@ void write_outputs(const Arguments& arguments, const VolumeRequest& request, con
   if (voxelizing.like) out_of_frame(outputs.grids, frame, first);
   session.context.check();
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
+  for (const openvdb::GridBase::Ptr& grid : outputs.grids)
+    if (grid->getName() == "sdf")
+      note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), chosen, session);
   write_volume_outputs(paths.out, outputs, session.context);
   print_summary(session, "wrote " + paths.out + ": " + names_of(outputs.grids));
   if (outputs.hermite)

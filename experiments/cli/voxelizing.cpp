@@ -7,6 +7,7 @@
 #include <map>
 
 #include "algorithms/core/memory_estimate.h"
+#include "algorithms/voxelization/lost_surface.h"
 #include "algorithms/voxelization/quad_diagonals.h"
 #include "experiments/cli/format.h"
 #include "experiments/harness.h"
@@ -119,7 +120,16 @@ LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const Voxeli
   LevelSet level_set = chosen.voxelizer.voxelize(input);
   session.context.check();
   print_voxelized(session, file, input, level_set.active_voxels(), chosen.voxelizer.name, watch.seconds());
+  note_lost_surface(mesh, level_set, chosen, session);
   return level_set;
+}
+
+void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const ChosenVoxelizer& chosen,
+                       Session& session) {
+  const LostSurface lost =
+      find_lost_surface(mesh, level_set, leaves_out_inner_polygons(chosen.voxelizer), session.context);
+  const std::string note = lost_surface_note(lost, level_set.voxel_size());
+  if (!note.empty()) session.context.note(note);
 }
 
 void print_summary(const Session& session, const std::string& line) {

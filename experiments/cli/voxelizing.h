@@ -54,6 +54,10 @@ VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string&
 LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session);
 
+/// Notes what of the polygons passes between the samples.
+void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const ChosenVoxelizer& chosen,
+                       Session& session);
+
 class Stopwatch {
  public:
   double seconds() const {

@@ -1,0 +1,43 @@
+// What of the polygons a level set cannot show: walls, fins and gaps that pass between its samples.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/variant.h"
+
+namespace hermesh {
+
+struct LostSurface {
+  double area = 0.0;       ///< of the polygons that bound the solid, world units²
+  double lost_area = 0.0;  ///< of that, what has no change of sign within a voxel
+  /// The thinnest lost place that was found, and the distance there to the opposite wall, world units; 0
+  /// where no lost place has an opposite wall within two voxels.
+  Eigen::Vector3d thinnest_at = Eigen::Vector3d::Zero();
+  double thickness = 0.0;
+
+  double share() const { return area > 0.0 ? lost_area / area : 0.0; }
+};
+
+/// Looks at places spread evenly over the polygons, one a voxel² of area or a triangle, or some two hundred
+/// thousand where that is fewer, and asks for each whether any of the samples within a voxel differ in sign.
+/// A place where all of them are outside is lost. One where all are inside is lost only if
+/// `distances_are_to_the_boundary` and their distances are those to the polygon: else the polygon lies within
+/// the solid and bounds nothing, and does not count. The same result at any thread count. A level set without
+/// signs loses nothing.
+/// @param distances_are_to_the_boundary whether the level set's distances leave out the polygons inside, as
+/// those of voxelize() do
+/// @throws Cancelled
+LostSurface find_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set,
+                              bool distances_are_to_the_boundary, const RunContext& context);
+
+/// Whether a voxelizer's distances leave the polygons inside the solid out.
+bool leaves_out_inner_polygons(const Voxelizer& voxelizer);
+
+/// One sentence for the user: the share, the thinnest place and the voxel size that would keep it. Empty
+/// where nothing is lost.
+std::string lost_surface_note(const LostSurface& lost, double voxel_size);
+
+}  // namespace hermesh
