@@ -1,6 +1,7 @@
 #include "algorithms/voxelization/winding_signs.h"
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <memory>
 
@@ -14,6 +15,15 @@ namespace {
 constexpr float kDoubt = 0.25f;
 /// Voxels whose number is this near ½, twice its error, are asked once more.
 constexpr float kError = 0.02f;
+
+/// Samples this near to a triangle, in voxels, are asked about one by one.
+constexpr double kOnSurface = 1e-4;
+/// 0 to 511.
+constexpr std::array<unsigned, 512> kAllPlaces = [] {
+  std::array<unsigned, 512> places{};
+  for (unsigned i = 0; i < 512; ++i) places[i] = i;
+  return places;
+}();
 
 using Samples = std::array<float, 512>;  ///< winding numbers of a block, in OpenVDB's order
 
@@ -73,12 +83,14 @@ class WindingSigns {
     value_.resize(regions_.components.size());
     parallel_blocks(band_.blocks.size(), context_, [&](std::size_t i) {
       std::vector<Eigen::Vector3d> points;
-      for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-        points.push_back(voxel_at(band_.blocks[i], representative(i, regions_.components[c].voxels)));
-      winding_.at(points, std::span(value_.data() + regions_.first[i], points.size()));
-      for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-        if (on_surface(band_.blocks[i], representative(i, regions_.components[c].voxels)))
-          value_[c] = float(winding_.at(points[c - regions_.first[i]]));
+      std::vector<unsigned> places;
+      for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
+        places.push_back(representative(i, regions_.components[c].voxels));
+        points.push_back(voxel_at(band_.blocks[i], places.back()));
+      }
+      const std::span<float> values(value_.data() + regions_.first[i], points.size());
+      winding_.at(points, values);
+      ask_singly(distances_of(std::uint32_t(i)), places, points, values);
     });
   }
 
@@ -131,9 +143,22 @@ class WindingSigns {
     return false;
   }
 
+  /// Asks once more about each sample that is so close to a triangle that the single precision of many points together
+  /// does not tell its side.
+  void ask_singly(const float* distances, std::span<const unsigned> places, std::span<const Eigen::Vector3d> points,
+                  std::span<float> values) const {
+    if (!distances) return;
+    const float near = float(kOnSurface * band_.voxel_size);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (distances[places[i]] < near) values[i] = float(winding_.at(points[i]));
+  }
+
+  /// The distances of a block's samples, or null where none is near the surface.
+  const float* distances_of(std::uint32_t block) const {
+    return block != BlockTable::kNone && band_.leaves[block] ? band_.leaves[block]->buffer().data() : nullptr;
+  }
+
   void ask_again(const BlockAt& block, Samples& values) const {
-    for (unsigned place = 0; place < 512; ++place)
-      if (on_surface(block, place)) values[place] = float(winding_.at(voxel_at(block, place)));
     std::vector<Eigen::Vector3d> points;
     std::vector<unsigned> places;
     for (unsigned place = 0; place < 512; ++place)
@@ -154,6 +179,7 @@ class WindingSigns {
       for (unsigned place = 0; place < 512; ++place) points[place] = voxel_at(blocks[i], place);
       found[i].winding = std::make_unique<Samples>();
       winding_.at(points, *found[i].winding);
+      ask_singly(distances_of(table_.find(blocks[i])), kAllPlaces, points, *found[i].winding);
       ask_again(blocks[i], *found[i].winding);
       for (unsigned place = 0; place < 512; ++place)
         found[i].inside[place >> 6] |= std::uint64_t((*found[i].winding)[place] > 0.5f) << (place & 63);
@@ -224,13 +250,11 @@ class WindingSigns {
   };
   using Cells = std::map<std::array<std::int32_t, 3>, Cell>;
 
-  /// Whether a voxel is so close to a triangle that only a question of its own, which is answered in double precision,
-  /// tells its side.
+  /// Whether a voxel lies on a triangle, whose border a hole may begin at.
   bool on_surface(const BlockAt& block, unsigned place) const {
     constexpr double kOn = 1e-3;
-    const std::uint32_t i = table_.find(block);
-    return i != BlockTable::kNone && band_.leaves[i] &&
-           band_.leaves[i]->buffer().data()[place] < kOn * band_.voxel_size;
+    const float* distances = distances_of(table_.find(block));
+    return distances && distances[place] < kOn * band_.voxel_size;
   }
 
   void build_caps(std::vector<TriangleCorners>& caps) const {
