@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/variants.h"
 #include "experiments/harness.h"
@@ -279,6 +280,31 @@ TEST(LatticeSolids, ThinSlabsStay) {
   fin.add_box({10, 1, 4}, {27, 9, 5});
   const Amounts right{1, 1000.0 + 17 * 8, 600.0 + 2 * (17 * 8 + 17) + 8 - 8};
   check({"fin", fin, right, right, true}, all[0], 0, 10.0, true);
+}
+
+/// The walls of the overlap lie in planes of samples, too. Inside of both cubes the surface is nearest where one is left by
+/// a side that the other has been left by already.
+TEST(LatticeSolids, DistancesPassOverWallsWithin) {
+  Soup soup;
+  soup.add_box({0, 0, 0}, {2, 2, 2});
+  soup.add_box({1, 1, 1}, {3, 3, 3});
+  const PolygonMesh mesh = to_mesh(soup, {}, 0, 0.5f);
+  for (const Rule& rule : kRules) {
+    if (rule.signs == "parity") continue;
+    SCOPED_TRACE(rule.voxelizer + " " + rule.signs);
+    RunContext context;
+    const Voxelizer voxelizer = find_variant(all_voxelizers(), rule.voxelizer);
+    const LevelSet level_set = voxelizer.voxelize(
+        {mesh, 0.05, 8.0, 8.0, context, Options(voxelizer.name, voxelizer.options, {{"signs", rule.signs}})});
+    const auto at = [&](int x, int y, int z) { return level_set.grid().grid->tree().getValue(openvdb::Coord(x, y, z)); };
+    EXPECT_NEAR(at(12, 15, 15), -std::hypot(0.1, 0.25), 2e-3);  // (0.6, 0.75, 0.75)
+    EXPECT_NEAR(at(10, 15, 15), -0.25, 2e-3);                   // on a wall: straight up out of the lower cube
+    EXPECT_NEAR(at(20, 15, 15), -0.25, 2e-3);
+    EXPECT_LT(at(10, 10, 10), 0.0f);
+    EXPECT_NEAR(at(5, 5, 0), 0.0, 1e-6);
+    EXPECT_LT(at(5, 5, 0), 0.0f);   // the solid is above
+    EXPECT_GE(at(5, 20, 5), 0.0f);  // and here below
+  }
 }
 
 // ---- Random unions beside a lattice of cells.

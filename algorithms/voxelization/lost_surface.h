@@ -25,7 +25,8 @@ struct LostSurface {
 /// thousand where that is fewer, and asks for each whether any of the samples within a voxel differ in sign.
 /// A place where all of them are outside is lost. One where all are inside is lost only if
 /// `distances_are_to_the_boundary` and their distances are those to the polygon: else the polygon lies within
-/// the solid and bounds nothing, and does not count. The same result at any thread count. A level set without
+/// the solid and bounds nothing, and does not count, but for what of it
+/// is within a voxel of the solid's surface. The same result at any thread count. A level set without
 /// signs loses nothing.
 /// @param distances_are_to_the_boundary whether the level set's distances leave out the polygons inside, as
 /// those of voxelize() do

@@ -182,6 +182,30 @@ TEST(Orientation, LeavesOutTheWallBetweenTwoParts) {
   EXPECT_EQ(found.verdict, Verdict::usable);
 }
 
+/// One solid of two rooms: without the wall the rest is closed, as either room would be with it.
+TEST(Orientation, LeavesOutASingleWallWithinASolid) {
+  Soup soup;
+  for (const float z : {0.0f, 2.0f, 5.0f})
+    for (const auto& [x, y] : {std::pair(0.0f, 0.0f), std::pair(1.0f, 0.0f), std::pair(1.0f, 1.0f), std::pair(0.0f, 1.0f)})
+      soup.points.emplace_back(x, y, z);
+  soup.triangles = {{0, 3, 2}, {0, 2, 1}, {8, 9, 10}, {8, 10, 11}};
+  for (std::uint32_t low : {0u, 4u})
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const std::uint32_t a = low + i, b = low + (i + 1) % 4;
+      soup.triangles.push_back({a, b, b + 4});
+      soup.triangles.push_back({a, b + 4, a + 4});
+    }
+  for (const bool upside_down : {false, true}) {
+    Soup walled = soup;
+    walled.triangles.push_back({4, 5, 6});
+    walled.triangles.push_back({4, 6, 7});
+    if (upside_down) walled.flip(walled.triangles.size() - 1), walled.flip(walled.triangles.size() - 2);
+    const Orientation found = walled.orient();
+    for (std::size_t face = 0; face < walled.triangles.size(); ++face)
+      EXPECT_EQ(found.turns[face], face < soup.triangles.size() ? 1 : 0) << face;
+  }
+}
+
 TEST(Orientation, WallsDoNotCancelTheSurface) {
   // 144 walls between 64 cubes, and 96 outer sides.
   Soup boxes;
