@@ -27,7 +27,7 @@ struct Band {
 /// A voxel inside that lies on the surface is this deep, in voxels, so that its value has a sign.
 constexpr double kLeastDepth = 0x1p-24;
 /// Pieces by which the solid's boundary is told from the sheets within it, in voxels.
-constexpr double kLargest = 2.0, kFinest = 0.02;
+constexpr double kLargest = 0.7, kFinest = 0.02;
 
 /// The surface that distances are taken to, and who says what is inside.
 struct Solid {
