@@ -142,8 +142,6 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
 }
 
 void MeshBuilder::cut_concave_polygons() {
-  // Larger ones, which no modeller makes, could take minutes.
-  constexpr std::size_t kMostCorners = 1 << 13;
   std::size_t left = 0;
   std::vector<std::uint32_t> numbers;
   std::vector<Eigen::Vector3d> corners;
@@ -155,8 +153,7 @@ void MeshBuilder::cut_concave_polygons() {
     corners.clear();
     for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
     if (is_fan(corners)) continue;
-    std::vector<Triangle> cut;
-    if (corners.size() <= kMostCorners) cut = clip_ears(corners);
+    std::vector<Triangle> cut = clip_ears(corners, context_);
     left += cut.empty();
     for (std::size_t i = 0; i < cut.size(); ++i)
       triangles[i] = {numbers[cut[i][0]], numbers[cut[i][1]], numbers[cut[i][2]]};
@@ -164,8 +161,7 @@ void MeshBuilder::cut_concave_polygons() {
   }
   if (left > 0)
     context_.note(in_quotes(file_) + ": " + std::to_string(left) +
-                  " concave polygons cross themselves or have more than " + std::to_string(kMostCorners) +
-                  " corners; they were cut into fans, which may cover more than they do");
+                  " concave polygons cross themselves; they were cut into fans, which may cover more than they do");
 }
 
 void MeshBuilder::add_comment(std::string_view text) {

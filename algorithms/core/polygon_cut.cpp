@@ -2,7 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
 
 namespace hermesh {
 namespace {
@@ -24,19 +28,124 @@ double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
+/// Some of the places of a polygon's corners, by a tree of boxes that halves them again and again (Bentley 1975).
+class PlaceTree {
+ public:
+  /// Keeps a reference.
+  explicit PlaceTree(const std::vector<Vector2d>& places)
+      : places_(places), order_(places.size()), slot_(places.size()), chosen_(places.size(), 0) {
+    std::iota(order_.begin(), order_.end(), 0u);
+    nodes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
+    build(1, 0, places.size());
+    for (std::uint32_t i = 0; i < order_.size(); ++i) slot_[order_[i]] = i;
+  }
+
+  /// Puts a corner's place in or takes it out.
+  void choose(std::uint32_t corner, bool is_chosen) {
+    if (bool(chosen_[corner]) == is_chosen) return;
+    chosen_[corner] = is_chosen;
+    std::size_t node = 1, begin = 0, end = order_.size();
+    while (true) {
+      nodes_[node].chosen += is_chosen ? 1 : -1;
+      if (end - begin <= kLeaf) return;
+      const std::size_t middle = begin + (end - begin) / 2;
+      const bool upper = slot_[corner] >= middle;
+      (upper ? begin : end) = middle;
+      node = 2 * node + upper;
+    }
+  }
+
+  /// Whether f(corner) holds for one of those in the triangle abc, which is counter-clockwise, its border included.
+  template <class F>
+  bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
+    return any_in(1, 0, order_.size(), a, b, c, f);
+  }
+
+ private:
+  static constexpr std::size_t kLeaf = 8;
+  struct Node {
+    Eigen::AlignedBox2d box;
+    std::int64_t chosen = 0;
+  };
+
+  void build(std::size_t node, std::size_t begin, std::size_t end) {
+    Eigen::AlignedBox2d& box = nodes_[node].box;
+    for (std::size_t i = begin; i < end; ++i) box.extend(places_[order_[i]]);
+    if (end - begin <= kLeaf) return;
+    const int axis = box.sizes().x() >= box.sizes().y() ? 0 : 1;
+    const std::size_t middle = begin + (end - begin) / 2;
+    std::nth_element(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(middle),
+                     order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i, std::uint32_t j) {
+                       return std::pair(places_[i][axis], i) < std::pair(places_[j][axis], j);
+                     });
+    build(2 * node, begin, middle);
+    build(2 * node + 1, middle, end);
+  }
+
+  template <class F>
+  bool any_in(std::size_t node, std::size_t begin, std::size_t end, const Vector2d& a, const Vector2d& b,
+              const Vector2d& c, F&& f) const {
+    const Node& here = nodes_[node];
+    if (here.chosen == 0 || is_right_of(a, b, here.box) || is_right_of(b, c, here.box) ||
+        is_right_of(c, a, here.box))
+      return false;
+    if (end - begin <= kLeaf)
+      return std::any_of(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end),
+                         [&](std::uint32_t i) {
+                           const Vector2d& p = places_[i];
+                           return chosen_[i] && area(a, b, p) >= 0 && area(b, c, p) >= 0 &&
+                                  area(c, a, p) >= 0 && f(i);
+                         });
+    const std::size_t middle = begin + (end - begin) / 2;
+    return any_in(2 * node, begin, middle, a, b, c, f) || any_in(2 * node + 1, middle, end, a, b, c, f);
+  }
+
+  /// Whether all of a box is. Rounding keeps order, so that no place in the box is found elsewhere by itself.
+  static bool is_right_of(const Vector2d& from, const Vector2d& to, const Eigen::AlignedBox2d& box) {
+    const Vector2d way = to - from;
+    const Vector2d most(way.y() > 0 ? box.min().x() : box.max().x(), way.x() > 0 ? box.max().y() : box.min().y());
+    return area(from, to, most) < 0;
+  }
+
+  const std::vector<Vector2d>& places_;
+  std::vector<std::uint32_t> order_, slot_;  ///< corners as the leaves have them, and where each is
+  std::vector<char> chosen_;
+  std::vector<Node> nodes_;  ///< children of i: 2i and 2i + 1
+};
+
+/// Corners that are left to be looked at, in the order of the ring.
+class Candidates {
+ public:
+  explicit Candidates(std::size_t corners) : words_((corners + 63) / 64, 0) {}
+
+  void add(std::uint32_t i) { words_[i / 64] |= std::uint64_t(1) << i % 64; }
+  void remove(std::uint32_t i) { words_[i / 64] &= ~(std::uint64_t(1) << i % 64); }
+  /// The first one from i on, around the ring; nothing if there is none.
+  std::optional<std::uint32_t> from(std::uint32_t i) const {
+    const std::size_t start = i / 64;
+    const std::uint64_t upper = ~std::uint64_t(0) << i % 64;
+    for (std::size_t k = 0; k <= words_.size(); ++k) {
+      const std::size_t w = (start + k) % words_.size();
+      const std::uint64_t bits = words_[w] & (k == 0 ? upper : k == words_.size() ? ~upper : ~std::uint64_t(0));
+      if (bits) return std::uint32_t(64 * w + std::size_t(std::countr_zero(bits)));
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::vector<std::uint64_t> words_;
+};
+
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
-      : places_(corners.size()), next_(corners.size()), before_(corners.size()) {
-    // Along the axis that the polygon faces most, counter-clockwise: nothing but signs of areas matters
-    // below.
-    const Vector3d normal = newell(corners);
-    int axis;
-    normal.cwiseAbs().maxCoeff(&axis);
-    const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+      : places_(placed(corners)),
+        next_(corners.size()),
+        before_(corners.size()),
+        reflex_(places_),
+        perhaps_ears_(corners.size()),
+        perhaps_flat_(corners.size()) {
     for (std::uint32_t i = 0; i < corners.size(); ++i) {
-      const Vector3d from = corners[i] - corners[0];
-      places_[i] = normal[axis] < 0 ? Vector2d(from[y], from[x]) : Vector2d(from[x], from[y]);
       next_[i] = i + 1 == corners.size() ? 0 : i + 1;
       before_[next_[i]] = i;
     }
@@ -44,30 +153,23 @@ class Ring {
     for (const Vector2d& p : places_) extent = std::max(extent, p.cwiseAbs().maxCoeff());
     constexpr double kRounding = 1e-13;
     flat_ = kRounding * extent * extent;
-    for (std::uint32_t i = 0; i < corners.size(); ++i)
-      if (area_at(i) <= 0) reflex_.push_back(i);
+    for (std::uint32_t i = 0; i < corners.size(); ++i) look_at(i);
   }
 
-  std::vector<Triangle> clip() {
+  std::vector<Triangle> clip(const RunContext& context) {
     std::vector<Triangle> triangles;
+    triangles.reserve(places_.size() - 2);
     std::uint32_t at = 0;
-    std::size_t left = places_.size(), failed = 0;
-    bool flat_ones = false;  // corners in a straight line may go, for there is no ear
-    while (left > 3) {
-      if (flat_ones ? std::abs(area_at(at)) <= flat_ : is_ear(at)) {
-        triangles.push_back({before_[at], at, next_[at]});
-        // Not the neighbour next, which would make a fan of slivers.
-        at = next_[cut(at)];
-        --left;
-        failed = 0;
-        flat_ones = false;
-        continue;
+    while (left() > 3) {
+      if (cut_off_ % 1024 == 1023) {
+        context.check();
+        context.progress("concave polygons", double(cut_off_) / double(places_.size()));
       }
-      at = next_[at];
-      if (++failed < left) continue;
-      if (flat_ones) return {};
-      flat_ones = true;
-      failed = 0;
+      const std::optional<std::uint32_t> corner = next_to_cut(at, context);
+      if (!corner) return {};
+      triangles.push_back({before_[*corner], *corner, next_[*corner]});
+      // Not the neighbour next, which would make a fan of slivers.
+      at = next_[cut(*corner)];
     }
     if (area_at(at) < -flat_) return {};
     triangles.push_back({before_[at], at, next_[at]});
@@ -75,18 +177,69 @@ class Ring {
   }
 
  private:
+  /// Along the axis that the polygon faces most, counter-clockwise: nothing but signs of areas matters.
+  static std::vector<Vector2d> placed(std::span<const Vector3d> corners) {
+    const Vector3d normal = newell(corners);
+    int axis;
+    normal.cwiseAbs().maxCoeff(&axis);
+    const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+    std::vector<Vector2d> places;
+    for (const Vector3d& corner : corners) {
+      const Vector3d from = corner - corners[0];
+      places.push_back(normal[axis] < 0 ? Vector2d(from[y], from[x]) : Vector2d(from[x], from[y]));
+    }
+    return places;
+  }
+
+  std::size_t left() const { return places_.size() - cut_off_; }
   double area_at(std::uint32_t i) const { return area(places_[before_[i]], places_[i], places_[next_[i]]); }
+
+  /// The first ear from a corner on; if there is none, the first corner in a straight line.
+  std::optional<std::uint32_t> next_to_cut(std::uint32_t at, const RunContext& context) {
+    if (const std::optional<std::uint32_t> ear = first(perhaps_ears_, at, context, [&](std::uint32_t i) {
+          return is_ear(i);
+        }))
+      return ear;
+    // A corner that was no ear becomes one when a neighbour goes. Where the border touches itself it may do so as
+    // well when another corner goes, so all are asked again, but not for every corner of a straight line.
+    const auto flat_one = [&] {
+      return first(perhaps_flat_, at, context,
+                   [&](std::uint32_t i) { return std::abs(area_at(i)) <= flat_; });
+    };
+    if (cut_off_ < all_asked_at_ + left() / 64)
+      if (const std::optional<std::uint32_t> flat = flat_one()) return flat;
+    if (cut_off_ > all_asked_at_) {
+      all_asked_at_ = cut_off_;
+      std::uint32_t i = at;
+      do perhaps_ears_.add(i);
+      while ((i = next_[i]) != at);
+      return next_to_cut(at, context);
+    }
+    return flat_one();
+  }
+
+  /// Forgets the candidates that are none.
+  template <class Is>
+  static std::optional<std::uint32_t> first(Candidates& candidates, std::uint32_t at, const RunContext& context,
+                                            Is&& is) {
+    for (std::size_t asked = 1;; ++asked) {
+      const std::optional<std::uint32_t> corner = candidates.from(at);
+      if (!corner || is(*corner)) return corner;
+      candidates.remove(*corner);
+      if (asked % 1024 == 0) context.check();
+    }
+  }
 
   bool is_ear(std::uint32_t at) const {
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
-    return std::ranges::none_of(reflex_, [&](std::uint32_t i) {
+    return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {
       const Vector2d& p = places_[i];
       if (i == before_[at] || i == next_[at]) return false;
       // Where the border comes back to the tip it may enter between the sides; from the two other corners it
       // could not get far without a corner inside.
       if (p == b) return is_between(a, b, c, places_[before_[i]]) || is_between(a, b, c, places_[next_[i]]);
-      return p != a && p != c && area(a, b, p) >= 0 && area(b, c, p) >= 0 && area(c, a, p) >= 0;
+      return p != a && p != c;
     });
   }
 
@@ -99,17 +252,29 @@ class Ring {
     const std::uint32_t before = before_[at], next = next_[at];
     next_[before] = next;
     before_[next] = before;
-    // Corners become convex as ears go, and stay so but for rounding.
-    std::erase_if(reflex_, [&](std::uint32_t i) { return i == at || i == before || i == next; });
-    for (const std::uint32_t i : {before, next})
-      if (area_at(i) <= 0) reflex_.push_back(i);
+    ++cut_off_;
+    reflex_.choose(at, false);
+    perhaps_ears_.remove(at);
+    perhaps_flat_.remove(at);
+    look_at(before);
+    look_at(next);
     return next;
+  }
+
+  /// Whose neighbours have changed.
+  void look_at(std::uint32_t corner) {
+    reflex_.choose(corner, area_at(corner) <= 0);
+    perhaps_ears_.add(corner);
+    perhaps_flat_.add(corner);
   }
 
   std::vector<Vector2d> places_;
   std::vector<std::uint32_t> next_, before_;
-  std::vector<std::uint32_t> reflex_;  ///< corners that are no convex ones, straight ones among them
-  double flat_;                        ///< an area that is none
+  std::size_t cut_off_ = 0;       ///< corners
+  std::size_t all_asked_at_ = 0;  ///< how many were cut off then
+  PlaceTree reflex_;              ///< corners that are no convex ones, straight ones among them
+  Candidates perhaps_ears_, perhaps_flat_;
+  double flat_;  ///< an area that is none
 };
 
 }  // namespace
@@ -125,6 +290,8 @@ bool is_fan(std::span<const Vector3d> corners) {
   return true;
 }
 
-std::vector<Triangle> clip_ears(std::span<const Vector3d> corners) { return Ring(corners).clip(); }
+std::vector<Triangle> clip_ears(std::span<const Vector3d> corners, const RunContext& context) {
+  return Ring(corners).clip(context);
+}
 
 }  // namespace hermesh

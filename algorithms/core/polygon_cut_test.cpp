@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -31,7 +32,7 @@ Vector3d area(const Polygon& p, const Triangle& t) {
 /// Where all areas along the normal are positive and their sum is that of the polygon, nothing is covered
 /// twice and nothing beyond it; and sides are those of the polygon or shared by two triangles.
 void expect_cover(const Polygon& polygon, const Vector3d& whole) {
-  const std::vector<Triangle> triangles = clip_ears(polygon);
+  const std::vector<Triangle> triangles = clip_ears(polygon, RunContext());
   ASSERT_EQ(triangles.size(), polygon.size() - 2);
   Vector3d sum = Vector3d::Zero();
   double absolute = 0;
@@ -114,7 +115,7 @@ TEST(ClipEars, ABridgeToAHole) {
 }
 
 TEST(ClipEars, NoneOfABorderThatCrossesItself) {
-  EXPECT_TRUE(clip_ears(flat({{0, 0}, {4, 0}, {0, 4}, {4, 4}, {1, -2}, {3, 9}})).empty());
+  EXPECT_TRUE(clip_ears(flat({{0, 0}, {4, 0}, {0, 4}, {4, 4}, {1, -2}, {3, 9}}), RunContext()).empty());
 }
 
 /// Seen as a whole from a point inside, so that the area is a sum.
@@ -142,20 +143,60 @@ TEST(ClipEars, RandomStarsInRandomPlanes) {
     }
 }
 
-/// Nearly every corner of its inner wall hides the ears of the others.
-TEST(ClipEars, ASpiral) {
-  Polygon spiral;
-  constexpr int kSteps = 1000;
+/// Two walls about the origin, `turns` times around; nearly every corner of its inner wall hides the ears of the others.
+Polygon spiral(int corners, double turns) {
+  Polygon polygon;
+  const int steps = corners / 2;
   const auto add = [&](int i, double width) {
-    const double angle = 0.05 * i, radius = 1 + 0.02 * i + width;
-    spiral.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0);
+    const double turned = turns * i / steps, radius = 1 + 2 * turned + width;
+    polygon.emplace_back(radius * std::cos(2 * std::numbers::pi * turned),
+                         radius * std::sin(2 * std::numbers::pi * turned), 0);
   };
-  for (int i = 0; i < kSteps; ++i) add(i, 1.0);
-  for (int i = kSteps; i-- > 0;) add(i, 0.0);
+  for (int i = 0; i < steps; ++i) add(i, 1.0);
+  for (int i = steps; i-- > 0;) add(i, 0.0);
+  return polygon;
+}
+
+Vector3d enclosed(const Polygon& polygon) {
   Vector3d whole = Vector3d::Zero();
-  for (std::size_t i = 0; i < spiral.size(); ++i)
-    whole += 0.5 * spiral[i].cross(spiral[(i + 1) % spiral.size()]);
-  expect_cover(spiral, whole);
+  for (std::size_t i = 0; i < polygon.size(); ++i)
+    whole += 0.5 * polygon[i].cross(polygon[(i + 1) % polygon.size()]);
+  return whole;
+}
+
+TEST(ClipEars, ASpiral) {
+  const Polygon polygon = spiral(2000, 8);
+  expect_cover(polygon, enclosed(polygon));
+}
+
+TEST(ClipEars, AHundredThousandCorners) {
+  for (const double turns : {0.9, 40.0, 1000.0}) {
+    const Polygon polygon = spiral(100'000, turns);
+    expect_cover(polygon, enclosed(polygon));
+  }
+  // A comb: its teeth hide one another's roots.
+  Polygon comb;
+  for (int i = 0; i < 25'000; ++i)
+    for (const auto& [x, y] : {std::pair(0, 0), std::pair(1, 1000 + i % 7), std::pair(2, 1000), std::pair(3, i % 5)})
+      comb.emplace_back(4 * i + x, y, 0);
+  comb.emplace_back(100'000, -1, 0);
+  comb.emplace_back(0, -1, 0);
+  std::reverse(comb.begin(), comb.end());
+  expect_cover(comb, enclosed(comb));
+  // A box with all corners but four in a straight line, 24,999 of which are left when the others have become ears.
+  Polygon box;
+  for (int i = 0; i < 25'000; ++i) box.emplace_back(i, 0, 0);
+  for (int i = 0; i < 25'000; ++i) box.emplace_back(25'000, i, 0);
+  for (int i = 25'000; i > 0; --i) box.emplace_back(i, 25'000, 0);
+  for (int i = 25'000; i > 0; --i) box.emplace_back(0, i, 0);
+  expect_cover(box, enclosed(box));
+}
+
+TEST(ClipEars, CancelEndsIt) {
+  const std::atomic<bool> cancelled = true;
+  RunContext context;
+  context.cancel = &cancelled;
+  EXPECT_THROW(clip_ears(spiral(10'000, 8), context), Cancelled);
 }
 
 }  // namespace

@@ -5,45 +5,34 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdio>
 #include <numeric>
+#include <span>
+#include <utility>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/core/sample_side.h"
 #include "algorithms/voxelization/oriented_winding.h"
 #include "algorithms/voxelization/segment.h"
 #include "algorithms/voxelization/surface_probe.h"
+#include "algorithms/voxelization/triangle_faces.h"
+#include "algorithms/voxelization/triangle_tree.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// Sizes of pieces, in voxels: along a seam, next to places of which nothing is certain, and of those that
-/// four places can stand for.
-constexpr double kFine = 0.1, kMiddle = 0.5, kCoarse = 2.0;
 /// How far off an edge's samples its triangles are looked for, in voxels: farther than the places of their sides are.
 constexpr double kNearby = 1e-5;
-
-struct Piece : Facet {
-  using Facet::Facet;
-  Vector3d centroid() const { return (corner[0] + corner[1] + corner[2]) / 3.0; }
-  double size() const {
-    return std::max(
-        {(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
-  }
-  double area() const { return 0.5 * normal().norm(); }
-  /// Halves of the longest side.
-  std::array<Piece, 2> halves() const {
-    int longest = 0;
-    const auto length = [&](int i) { return (corner[(i + 1) % 3] - corner[i]).squaredNorm(); };
-    for (int i = 1; i < 3; ++i)
-      if (length(i) > length(longest)) longest = i;
-    const Vector3d &a = corner[longest], &b = corner[(longest + 1) % 3], &c = corner[(longest + 2) % 3];
-    const Vector3d middle = 0.5 * (a + b);
-    return {Piece(a, middle, c), Piece(middle, b, c)};
-  }
-};
+/// How far off a sheet the ways to voxels start, in voxels: beyond rounding and beyond doubled faces, but in a narrow
+/// face nearer than its border.
+constexpr double kOff = 1e-3, kLeastOff = 1e-5;
+/// Of a face that is no larger, in voxels, one place tells as much as several.
+constexpr double kSmall = 0.5;
+/// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
+/// microseconds each.
+constexpr std::size_t kMostFaces = 1 << 18, kFacesPerSample = 4, kFacesPerTriangle = 64;
 
 using Voxel = std::array<std::int32_t, 3>;
 
@@ -68,17 +57,19 @@ class Suspicion {
   Suspicion(const Suspects& suspects, const Band& band, const BlockTable& blocks)
       : suspects_(suspects), band_(band), finder_(blocks) {}
 
-  /// Whether a suspicious voxel is in or next to the piece's box.
-  bool touches(const Piece& piece) {
+  /// Whether a suspicious voxel is in or next to the box of these corners.
+  bool touches(std::span<const Vector3d> corners) {
     Voxel from, to;
     BlockAt low, high;
     double blocks = 1;
+    Vector3d least = corners[0], most = corners[0];
+    for (const Vector3d& corner : corners) {
+      least = least.cwiseMin(corner);
+      most = most.cwiseMax(corner);
+    }
     for (std::size_t a = 0; a < 3; ++a) {
-      const int axis = static_cast<int>(a);
-      const auto [least, most] =
-          std::minmax({piece.corner[0][axis], piece.corner[1][axis], piece.corner[2][axis]});
-      from[a] = std::int32_t(std::floor(least)), low[a] = from[a] >> 3;
-      to[a] = std::int32_t(std::floor(most)), high[a] = to[a] >> 3;
+      from[a] = std::int32_t(std::floor(least[int(a)])), low[a] = from[a] >> 3;
+      to[a] = std::int32_t(std::floor(most[int(a)])), high[a] = to[a] >> 3;
       blocks *= high[a] - low[a] + 1;
     }
     // A large triangle has more blocks in its box than there are with suspicious voxels.
@@ -114,80 +105,122 @@ class Suspicion {
   BlockFinder finder_;
 };
 
-/// What a thread asks about pieces.
+/// What a thread asks about faces.
 class Prober {
  public:
   Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const std::vector<VoxelBits>& inside, const Suspects& suspects, bool thorough,
-         const WindingNumber* winding)
-      : probe_(soup, bins, inside, thorough, winding), suspicion_(suspects, band, bins.blocks()) {}
+         const std::vector<VoxelBits>& inside, const Suspects& suspects, const WindingNumber* winding)
+      : probe_(soup, bins, inside, winding), suspicion_(suspects, band, bins.blocks()) {}
 
-  Side side(const Vector3d& q, const Vector3d& normal) { return probe_.side(q, normal); }
-  bool suspicious(const Piece& piece) { return suspicion_.touches(piece); }
+  /// All places of a whole face have the same around them, so that one that sees something tells. It is outer where one
+  /// of its sides is; of a face that is not whole, all places have to agree that it is inner.
+  Side side(const TriangleFace& face, const Vector3d& normal) {
+    if (!suspicion_.touches(face.corners)) return Side::outer;
+    const Vector3d middle = face.middle();
+    const double off = off_at(face, middle);
+    Side sides[2] = {Side::unknown, Side::unknown};
+    const auto look_from = [&](const Vector3d& q) {
+      bool sees_both = true;
+      for (int i = 0; i < 2; ++i) {
+        const Side seen = probe_.seen_from(q + (i == 0 ? off : -off) * normal);
+        if (seen == Side::outer) return Side::outer;
+        if (seen == Side::inner) sides[i] = seen;
+        sees_both &= seen == Side::inner;
+      }
+      return sees_both ? Side::inner : Side::unknown;
+    };
+    const Side seen = look_from(middle);
+    if (seen == Side::outer || (face.whole && face.size() <= kSmall)) return seen;
+    bool agree = seen == Side::inner;
+    for (const Vector3d& corner : face.corners) {
+      const Side there = look_from(0.8 * corner + 0.2 * middle);
+      if (there == Side::outer) return Side::outer;
+      agree &= there == Side::inner;
+    }
+    const bool inner = sides[0] == Side::inner && sides[1] == Side::inner;
+    return (face.whole ? inner : agree) ? Side::inner : Side::unknown;
+  }
+
+  /// The same with all means, from the face's middle.
+  Side searched_side(const TriangleFace& face, const Vector3d& normal, bool follow_spaces) {
+    const Vector3d middle = face.middle();
+    const double off = off_at(face, middle);
+    for (const double step : {off, -off}) {
+      const Vector3d p = middle + step * normal;
+      Side side = probe_.seen_from(p);
+      if (side == Side::unknown) side = probe_.searched_from(p, normal, follow_spaces);
+      if (side != Side::inner) return side;
+    }
+    return Side::inner;
+  }
 
  private:
+  static double off_at(const TriangleFace& face, const Vector3d& place) {
+    return std::clamp(0.05 * face.room_at(place), kLeastOff, kOff);
+  }
+
   SurfaceProbe probe_;
   Suspicion suspicion_;
 };
 
-/// What of a triangle is left.
-struct Remains {
-  bool seen_inner = false, some_inner = false;
-  double inner_area = 0, doubtful_area = 0;
-  std::vector<Piece> outer;
-  std::vector<Piece> doubtful;  ///< of which something is unknown
-};
-
-/// Cuts a piece up until each part is inner or outer as a whole, as far as four places tell. `last`: nothing
-/// may stay doubtful, and what is unknown stays.
-void cut(const Piece& piece, const Vector3d& normal, Prober& prober, bool last, Remains& remains) {
-  const double size = piece.size();
-  const Vector3d centroid = piece.centroid();
-  if (!prober.suspicious(piece)) {
-    remains.outer.push_back(piece);
-    return;
-  }
-  if (size > kCoarse) {
-    for (const Piece& half : piece.halves()) cut(half, normal, prober, last, remains);
-    return;
-  }
-  std::array<int, 3> places{};  // by Side
-  ++places[std::size_t(prober.side(centroid, normal))];
-  if (size > kFine)
-    for (const Vector3d& corner : piece.corner)
-      ++places[std::size_t(prober.side(0.98 * corner + 0.02 * centroid, normal))];
-  const auto [outer, inner, unknown] = places;
-  remains.seen_inner |= inner > 0;
-  const bool seam = inner > 0 && (outer > 0 || (unknown > 0 && size > kMiddle));
-  if (seam && size > kFine)
-    for (const Piece& half : piece.halves()) cut(half, normal, prober, last, remains);
-  else if (unknown > 0 && !last) {
-    remains.doubtful.push_back(piece);
-    remains.doubtful_area += piece.area();
-  } else if (inner > unknown) {
-    remains.some_inner = true;
-    remains.inner_area += piece.area();
-  } else {
-    remains.outer.push_back(piece);
+/// Calls f(triangle) for those of the tree whose box is within a margin of a triangle's.
+template <class F>
+void for_each_beside(const TriangleTree& tree, const Facet& facet, double margin, F&& f) {
+  if (tree.packs().empty()) return;
+  const Vector3d low = facet.low().array() - margin, high = facet.high().array() + margin;
+  std::vector<TriangleTree::BoxRef> packs;  // by the number of one of its boxes
+  const auto push = [&](std::size_t pack, std::uint32_t level) {
+    packs.push_back({std::uint32_t(pack), level});
+  };
+  push(tree.packs().size() - 1, std::uint32_t(tree.level_count() - 1));
+  while (!packs.empty()) {
+    const auto [number, level] = packs.back();
+    packs.pop_back();
+    const TriangleTree::BoxPack& pack = tree.packs()[number];
+    for (std::size_t k = 0; k < TriangleTree::kFan; ++k) {
+      bool meets = true;
+      for (int a = 0; a < 3; ++a)
+        meets &= pack.lower[a][k] * tree.scale() <= high[a] && pack.upper[a][k] * tree.scale() >= low[a];
+      if (!meets) continue;
+      const TriangleTree::BoxRef box{std::uint32_t(number * TriangleTree::kFan + k), level};
+      if (level > 0)
+        push(tree.child_pack(box), level - 1);
+      else
+        for (const std::uint32_t t : tree.leaf(box.box)) f(t);
+    }
   }
 }
+
+/// A face of a triangle, and what is known about it.
+struct Sheet {
+  std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
+  std::uint32_t face = 0;
+  Side side = Side::unknown;
+};
 
 class Finder {
  public:
   Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const std::vector<VoxelBits>& inside, const RunContext& context)
-      : soup_(soup), bins_(bins), band_(band), inside_(inside), context_(context) {}
+         const Signs& signs, RunContext& context)
+      : soup_(soup), bins_(bins), band_(band), inside_(signs.inside), caps_(signs.caps), context_(context) {}
 
   InnerSheets run(double reach, double voxel_size) {
     find_suspects();
+    triangles_ = find_triangles();
+    cut_triangles();
+    find_sides();
+    settle_doubts();
     InnerSheets sheets;
-    const std::vector<std::uint32_t> triangles = find_triangles();
-    std::vector<Remains> remains = cut_all(triangles);
-    settle_doubts(triangles, remains);
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      if (!remains[i].some_inner) continue;
-      sheets.triangles.push_back(triangles[i]);
-      for (const Piece& piece : remains[i].outer) add_piece(piece, voxel_size, triangles[i], sheets);
+    std::size_t next = 0;
+    for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+      const std::size_t first = next;
+      bool some_inner = false;
+      for (; next < sheets_.size() && sheets_[next].triangle == i; ++next)
+        some_inner |= sheets_[next].side == Side::inner;
+      if (!some_inner) continue;
+      sheets.triangles.push_back(triangles_[i]);
+      for (std::size_t k = first; k < next; ++k)
+        if (sheets_[k].side != Side::inner) add_pieces(face(sheets_[k]), voxel_size, triangles_[i], sheets);
     }
     find_blocks(reach, sheets);
     return sheets;
@@ -293,14 +326,14 @@ class Finder {
       for (std::size_t i = 0; i < hits.size(); ++i) count += i == 0 || hits[i] - hits[i - 1] > 1e-6 ? 1 : 0;
       return count;
     }
-    void meet(const Piece& piece) {
+    void meet(const Facet& facet) {
       for (int a = 0; a < 3; ++a) {
-        const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
+        const auto [low, high] = std::minmax({facet.corner[0][a], facet.corner[1][a], facet.corner[2][a]});
         const double from = voxel[std::size_t(a)];
         if (low > from + (a == axis ? 1.0 : 0.0) + kNearby || high < from - kNearby) return;
       }
       const Vector3d from = side_place(voxel);
-      const double along = meeting(from, from + Vector3d::Unit(axis), piece);
+      const double along = meeting(from, from + Vector3d::Unit(axis), facet);
       if (along >= 0.0) hits.push_back(along);
     }
   };
@@ -315,8 +348,8 @@ class Finder {
       }
     }
     const auto meet = [&](std::uint32_t t) {
-      const Piece piece = Piece(soup_.corners(t));
-      for (InnerEdge& edge : edges) edge.meet(piece);
+      const Facet facet(soup_.corners(t));
+      for (InnerEdge& edge : edges) edge.meet(facet);
     };
     bins_.for_each_cluster(band_.blocks[block], box, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
@@ -363,7 +396,7 @@ class Finder {
     std::vector<std::vector<std::uint32_t>> small(suspects_.blocks.size());
     const auto keep_those_that_touch = [&](std::vector<std::uint32_t>& triangles) {
       Suspicion suspicion(suspects_, band_, bins_.blocks());
-      std::erase_if(triangles, [&](std::uint32_t t) { return !suspicion.touches(Piece(soup_.corners(t))); });
+      std::erase_if(triangles, [&](std::uint32_t t) { return !suspicion.touches(Facet(soup_.corners(t)).corner); });
     };
     parallel_blocks(small.size(), context_, [&](std::size_t i) {
       add_small_triangles(suspects_.blocks[i], small[i]);
@@ -395,15 +428,112 @@ class Finder {
     });
   }
 
-  std::vector<Remains> cut_all(const std::vector<std::uint32_t>& triangles) const {
-    std::vector<std::uint32_t> all(triangles.size());
+  /// Calls f(i) for each i below n, in parallel, and reports between parts of them how far from `done` to `to` the
+  /// signs are.
+  template <class F>
+  void in_parts(std::size_t n, double done, double to, F&& f) const {
+    constexpr std::size_t kParts = 16;
+    for (std::size_t part = 0; part < kParts; ++part) {
+      context_.progress("signs", done + (to - done) * double(part) / kParts);
+      const tbb::blocked_range<std::size_t> range(n * part / kParts, n * (part + 1) / kParts);
+      tbb::parallel_for(range, [&](const auto& some) {
+        context_.check();
+        for (std::size_t i = some.begin(); i != some.end(); ++i) f(i);
+      });
+    }
+  }
+
+  /// All that crosses one of them near a suspicious voxel is one of them, or a cap.
+  void cut_triangles() {
+    std::vector<Triangle> corners;
+    for (const std::uint32_t t : triangles_) corners.push_back(soup_.triangle(t));
+    const TriangleTree tree(soup_.mesh().points, corners, soup_.scale());
+    PolygonMesh caps;
+    for (const TriangleCorners& cap : caps_) {
+      const auto n = std::uint32_t(caps.points.size());
+      for (const Vector3d& corner : Facet(cap).corner) caps.points.push_back(corner.cast<float>());
+      caps.triangles.push_back({n, n + 1, n + 2});
+    }
+    const TriangleTree cap_tree(caps.points, caps.triangles, 1.0);
+    double area = 0;
+    for (const std::uint32_t t : triangles_) area += Facet(soup_.corners(t)).normal().norm();
+    const double most = double(kMostFaces + kFacesPerSample * 512 * suspects_.blocks.size());
+    faces_.assign(triangles_.size(), {});
+    tbb::enumerable_thread_specific<Suspicion> suspicions(
+        [&] { return Suspicion(suspects_, band_, bins_.blocks()); });
+    in_parts(triangles_.size(), 0.4, 0.6, [&](std::size_t i) {
+      const Facet facet(soup_.corners(triangles_[i]));
+      const double own_area = facet.normal().norm();
+      if (!(own_area > 0)) return;
+      constexpr double kMargin = 0.01;  // beyond what is near enough to part the space next to it
+      TriangleCutter cutter(facet);
+      for_each_beside(tree, facet, kMargin, [&](std::uint32_t other) {
+        if (other != i) cutter.add(Facet(soup_.corners(triangles_[other])));
+      });
+      for_each_beside(cap_tree, facet, kMargin, [&](std::uint32_t cap) { cutter.add(Facet(caps_[cap])); });
+      if (!cutter.has_cuts()) return;
+      Suspicion& suspicion = suspicions.local();
+      faces_[i] = cutter.faces(kFacesPerTriangle + std::size_t(most * (own_area / area)),
+                               [&](const TriangleFace& face) { return suspicion.touches(face.corners); });
+    });
+    for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+      if (!(Facet(soup_.corners(triangles_[i])).normal().norm() > 0)) continue;
+      const std::size_t n = std::max<std::size_t>(1, faces_[i].size());
+      for (std::uint32_t k = 0; k < n; ++k) sheets_.push_back({i, k, Side::unknown});
+    }
+  }
+
+  /// The whole triangle where nothing crosses it.
+  TriangleFace face(const Sheet& sheet) const {
+    if (!faces_[sheet.triangle].empty()) return faces_[sheet.triangle][sheet.face];
+    const Facet facet(soup_.corners(triangles_[sheet.triangle]));
+    return {{facet.corner[0], facet.corner[1], facet.corner[2]}, true};
+  }
+  Vector3d unit_normal(const Sheet& sheet) const {
+    return Facet(soup_.corners(triangles_[sheet.triangle])).normal().normalized();
+  }
+
+  /// Calls f(sheet, prober) for some of the sheets, given by number, in parallel.
+  template <class F>
+  void for_each_sheet(const std::vector<std::uint32_t>& some, const WindingNumber* winding, double done,
+                      double to, F&& f) {
+    // Block by block, so that a neighbourhood is looked up once.
+    std::vector<std::pair<BlockAt, std::uint32_t>> order(some.size());
+    parallel_blocks(some.size(), context_, [&](std::size_t i) {
+      const Vector3d middle = face(sheets_[some[i]]).middle();
+      for (int a = 0; a < 3; ++a) order[i].first[std::size_t(a)] = std::int32_t(std::floor(middle[a])) >> 3;
+      order[i].second = some[i];
+    });
+    std::sort(order.begin(), order.end());
+    tbb::enumerable_thread_specific<Prober> probers(
+        [&] { return Prober(soup_, bins_, band_, inside_, suspects_, winding); });
+    in_parts(order.size(), done, to,
+             [&](std::size_t i) { f(sheets_[order[i].second], probers.local()); });
+  }
+
+  void find_sides() {
+    std::vector<std::uint32_t> all(sheets_.size());
     std::iota(all.begin(), all.end(), 0u);
-    std::vector<Remains> remains(triangles.size());
-    for_each_triangle(triangles, all, false, nullptr,
-                      [&](const Piece& piece, const Vector3d& normal, std::uint32_t i, Prober& prober) {
-                        cut(piece, normal, prober, false, remains[i]);
-                      });
-    return remains;
+    for_each_sheet(all, nullptr, 0.6, 0.8, [&](Sheet& sheet, Prober& prober) {
+      sheet.side = prober.side(face(sheet), unit_normal(sheet));
+    });
+    std::size_t crowded = 0;
+    double largest = 0;
+    for (const Sheet& sheet : sheets_) {
+      if (faces_[sheet.triangle].empty() || faces_[sheet.triangle][sheet.face].whole) continue;
+      if (sheet.side == Side::outer) continue;
+      ++crowded;
+      largest = std::max(largest, faces_[sheet.triangle][sheet.face].size());
+    }
+    if (crowded > 0) note_crowded(crowded, largest);
+  }
+
+  void note_crowded(std::size_t faces, double largest) {
+    char size[32];
+    std::snprintf(size, sizeof size, "%.2g", largest);
+    context_.note("The polygons cross one another more often than there are samples to show it: " +
+                  std::to_string(faces) + " parts of them, of up to " + size +
+                  " voxels, were not cut to the end, and distances inside are uncertain by as much near them.");
   }
 
   /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
@@ -412,84 +542,54 @@ class Finder {
   /// doubtful as is inner, these are the folds and crevices of a scan, of which nothing goes far; their walls
   /// stay. For winding numbers and the search for ways along a crevice take longer than all the rest of the
   /// signs; of a small model they are asked as well where little is doubtful.
-  void settle_doubts(const std::vector<std::uint32_t>& triangles, std::vector<Remains>& remains) const {
+  void settle_doubts() {
     std::vector<std::uint32_t> doubtful;
-    std::size_t seen_inner = 0, pieces = 0;
+    std::size_t doubtful_triangles = 0, inner_triangles = 0;
     double inner_area = 0, doubtful_area = 0;
-    for (std::uint32_t i = 0; i < remains.size(); ++i) {
-      if (!remains[i].doubtful.empty()) doubtful.push_back(i);
-      seen_inner += remains[i].seen_inner ? 1 : 0;
-      pieces += remains[i].doubtful.size();
-      inner_area += remains[i].inner_area;
-      doubtful_area += remains[i].doubtful_area;
+    std::uint32_t last_doubtful = BlockTable::kNone, last_inner = BlockTable::kNone;
+    for (std::uint32_t i = 0; i < sheets_.size(); ++i) {
+      const Sheet& sheet = sheets_[i];
+      if (sheet.side == Side::outer) continue;
+      const bool inner = sheet.side == Side::inner;
+      (inner ? inner_area : doubtful_area) += face(sheet).area();
+      if (std::exchange(inner ? last_inner : last_doubtful, sheet.triangle) != sheet.triangle)
+        ++(inner ? inner_triangles : doubtful_triangles);
+      if (!inner) doubtful.push_back(i);
     }
-    if (doubtful.empty() || seen_inner == 0) return leave_doubts(doubtful, remains);
+    if (doubtful.empty() || inner_triangles == 0) return;
     constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one, or inner area to doubtful area
-    constexpr std::size_t kFewPieces = 5000, kSmallModel = 50'000;  // some tenths of a second
+    constexpr std::size_t kFew = 5000, kSmallModel = 50'000;  // some tenths of a second
     // Of large triangles nearly all have doubtful places, along the edges of parts, however little these are.
-    const bool little_doubt = pieces <= kFewPieces || inner_area >= double(kTheRule) * doubtful_area;
+    const bool little_doubt = doubtful.size() <= kFew || inner_area >= double(kTheRule) * doubtful_area;
     const bool quick = little_doubt && soup_.size() <= kSmallModel;
-    if (!quick && seen_inner < kTheRule * doubtful.size()) return leave_doubts(doubtful, remains);
+    if (!quick && inner_triangles < kTheRule * doubtful_triangles) return;
     const OrientedWinding winding(soup_);
-    if (!winding.usable()) return leave_doubts(doubtful, remains);
-    for_each_triangle(triangles, doubtful, true, &winding.number(),
-                      [&](const Piece&, const Vector3d& normal, std::uint32_t i, Prober& prober) {
-                        for (const Piece& piece : remains[i].doubtful)
-                          cut(piece, normal, prober, true, remains[i]);
-                      });
-  }
-
-  static void leave_doubts(const std::vector<std::uint32_t>& doubtful, std::vector<Remains>& remains) {
-    for (const std::uint32_t i : doubtful)
-      remains[i].outer.insert(remains[i].outer.end(), remains[i].doubtful.begin(), remains[i].doubtful.end());
-  }
-
-  /// Calls f(triangle, its unit normal, number, prober) for some of the triangles, given by number, in
-  /// parallel.
-  template <class F>
-  void for_each_triangle(const std::vector<std::uint32_t>& triangles, const std::vector<std::uint32_t>& some,
-                         bool thorough, const WindingNumber* winding, F&& f) const {
-    // Block by block, so that a neighbourhood is looked up once.
-    std::vector<std::pair<BlockAt, std::uint32_t>> order(some.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) {
-      const Vector3d centre = Piece(soup_.corners(triangles[some[i]])).centroid();
-      for (int a = 0; a < 3; ++a) order[i].first[std::size_t(a)] = std::int32_t(std::floor(centre[a])) >> 3;
-      order[i].second = some[i];
-    }
-    std::sort(order.begin(), order.end());
-    tbb::enumerable_thread_specific<Prober> probers(
-        [&] { return Prober(soup_, bins_, band_, inside_, suspects_, thorough, winding); });
-    // One at a time where there are few: a large triangle may take as long as thousands of small ones.
-    const std::size_t together = std::clamp<std::size_t>(order.size() / 1024, 1, 64);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), together), [&](const auto& range) {
-      Prober& prober = probers.local();
-      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        context_.check();
-        const Piece piece = Piece(soup_.corners(triangles[order[i].second]));
-        const Vector3d normal = piece.normal();
-        if (normal.norm() > 0) f(piece, normal.normalized(), order[i].second, prober);
-      }
+    if (!winding.usable()) return;
+    for_each_sheet(doubtful, &winding.number(), 0.8, 1.0, [&](Sheet& sheet, Prober& prober) {
+      sheet.side = prober.searched_side(face(sheet), unit_normal(sheet), doubtful.size() <= kFew);
     });
   }
 
-  static void add_piece(const Piece& piece, double voxel_size, std::uint32_t parent, InnerSheets& sheets) {
+  static void add_pieces(const TriangleFace& face, double voxel_size, std::uint32_t parent,
+                         InnerSheets& sheets) {
     const std::uint32_t n = std::uint32_t(sheets.pieces.points.size());
-    for (const Vector3d& corner : piece.corner)
+    for (const Vector3d& corner : face.corners)
       sheets.pieces.points.push_back((corner * voxel_size).cast<float>());
-    sheets.pieces.triangles.push_back({n, n + 1, n + 2});
-    sheets.parents.push_back(parent);
+    for (std::uint32_t i = 2; i < face.corners.size(); ++i) {
+      sheets.pieces.triangles.push_back({n, n + i - 1, n + i});
+      sheets.parents.push_back(parent);
+    }
   }
 
   void find_blocks(double reach, InnerSheets& sheets) const {
     std::vector<char> near(band_.blocks.size(), 0);
     BlockFinder finder(bins_.blocks());
     for (const std::uint32_t t : sheets.triangles) {
-      const Piece piece = Piece(soup_.corners(t));
+      const Facet facet(soup_.corners(t));
       std::int32_t from[3], to[3];
       for (int a = 0; a < 3; ++a) {
-        const auto [low, high] = std::minmax({piece.corner[0][a], piece.corner[1][a], piece.corner[2][a]});
-        from[a] = std::int32_t(std::floor(low - reach)) >> 3;
-        to[a] = std::int32_t(std::floor(high + reach)) >> 3;
+        from[a] = std::int32_t(std::floor(facet.low()[a] - reach)) >> 3;
+        to[a] = std::int32_t(std::floor(facet.high()[a] + reach)) >> 3;
       }
       for (std::int32_t x = from[0]; x <= to[0]; ++x)
         for (std::int32_t y = from[1]; y <= to[1]; ++y)
@@ -504,16 +604,19 @@ class Finder {
   const TriangleBins& bins_;
   const Band& band_;
   const std::vector<VoxelBits>& inside_;
-  const RunContext& context_;
+  const std::vector<TriangleCorners>& caps_;
+  RunContext& context_;
   Suspects suspects_;
+  std::vector<std::uint32_t> triangles_;         ///< those that touch suspicious voxels, by number
+  std::vector<std::vector<TriangleFace>> faces_;  ///< of each; none where nothing crosses it
+  std::vector<Sheet> sheets_;                    ///< triangle by triangle
 };
 
 }  // namespace
 
 InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-                              const std::vector<VoxelBits>& inside, double reach, double voxel_size,
-                              RunContext& context) {
-  return Finder(soup, bins, band, inside, context).run(reach, voxel_size);
+                              const Signs& signs, double reach, double voxel_size, RunContext& context) {
+  return Finder(soup, bins, band, signs, context).run(reach, voxel_size);
 }
 
 }  // namespace hermesh

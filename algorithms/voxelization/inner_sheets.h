@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "algorithms/voxelization/band.h"
-#include "algorithms/voxelization/regions.h"
+#include "algorithms/voxelization/signs.h"
 
 namespace hermesh {
 
@@ -20,12 +20,13 @@ struct InnerSheets {
   std::vector<std::uint32_t> blocks;
 };
 
-/// A piece of a triangle counts as inner only where that is certain: from just off either of its sides a
-/// straight way leads to a voxel inside without meeting a triangle. Everything else stays. Triangles that are
-/// inner in part are cut into pieces of at most a tenth of a voxel along the seam. `inside` are the voxels
-/// inside each block, and `reach` is how far distances matter, in voxels. @throws Cancelled.
+/// Triangles near places where some may be inner are cut along the lines in which others, or caps, cross them. What is
+/// left between these lines counts as inner only where that is certain: from just off either of its sides a straight way
+/// leads to a voxel inside without meeting a triangle. Everything else stays. The work grows with the number of samples
+/// and triangles: where triangles cross one another more densely than four times a sample, not all are cut along every
+/// line, what may be on both sides of one stays, and a note says so. `reach` is how far distances matter, in voxels.
+/// @throws Cancelled.
 InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-                              const std::vector<VoxelBits>& inside, double reach, double voxel_size,
-                              RunContext& context);
+                              const Signs& signs, double reach, double voxel_size, RunContext& context);
 
 }  // namespace hermesh

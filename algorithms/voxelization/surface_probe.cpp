@@ -12,13 +12,18 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// How far off a side the way to a voxel starts, in voxels: beyond rounding and beyond doubled faces.
-constexpr double kOff = 1e-3;
 /// Blocks whose triangles are kept: as many as meet at a corner, since places next to each other are asked for in turn.
 constexpr std::size_t kKept = 8;
 /// Steps of at most a voxel that a crevice is followed.
 constexpr int kSteps = 8;
 constexpr int kWays = 8;  ///< directions along a sheet
+/// Nowhere is a way to be found through a cell with more triangles, and to look for it takes long.
+constexpr std::size_t kCrowded = 64;
+
+CellObstacles::Voxel cell_of(const Vector3d& p) {
+  const auto cell = [&](int axis) { return static_cast<std::int32_t>(std::floor(p[axis])); };
+  return {cell(0), cell(1), cell(2)};
+}
 
 /// The corner of a cell that is up from it along x if bit 2 is set, along y if bit 1 is and along z if bit 0
 /// is.
@@ -29,29 +34,17 @@ CellObstacles::Voxel corner(const CellObstacles::Voxel& cell, unsigned i) {
 }  // namespace
 
 SurfaceProbe::SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins,
-                           const std::vector<VoxelBits>& inside, bool thorough, const WindingNumber* winding)
+                           const std::vector<VoxelBits>& inside, const WindingNumber* winding)
     : inside_(inside),
-      thorough_(thorough),
       winding_(winding),
       finder_(bins.blocks()),
       obstacles_(soup, bins, kKept) {}
 
-Side SurfaceProbe::side(const Vector3d& q, const Vector3d& normal) {
-  const Vector3d places[2] = {q + kOff * normal, q - kOff * normal};
-  Side sides[2];
-  for (int i = 0; i < 2; ++i) {
-    sides[i] = seen_from(places[i]);
-    if (sides[i] == Side::outer) return Side::outer;
-  }
-  for (int i = 0; i < 2; ++i) {
-    if (sides[i] == Side::inner) continue;
-    if (!thorough_) return Side::unknown;
-    const Side found = follow(places[i], normal);
-    if (found == Side::unknown && is_wound_about(places[i])) continue;
-    if (found == Side::unknown && winding_) return Side::outer;
-    if (found != Side::inner) return found;
-  }
-  return Side::inner;
+Side SurfaceProbe::searched_from(const Vector3d& p, const Vector3d& normal, bool follow_space) {
+  if (follow_space && obstacles_.triangles_in(cell_of(p)).size() <= kCrowded)
+    if (const Side found = follow(p, normal); found != Side::unknown) return found;
+  if (!winding_) return Side::unknown;
+  return is_wound_about(p) ? Side::inner : Side::outer;
 }
 
 /// 0 or 1, or 2 where there is no block.
@@ -74,10 +67,8 @@ void SurfaceProbe::enter(const Voxel& cell) {
   }
 }
 
-/// By straight ways to the corners of the cell that p is in.
 Side SurfaceProbe::seen_from(const Vector3d& p) {
-  const auto cell = [&](int axis) { return static_cast<std::int32_t>(std::floor(p[axis])); };
-  enter({cell(0), cell(1), cell(2)});
+  enter(cell_of(p));
   const auto sees_one = [&](unsigned corners) {
     for (; corners != 0; corners &= corners - 1) {
       const Voxel voxel = corner(cell_, unsigned(std::countr_zero(corners)));
@@ -126,7 +117,7 @@ Side SurfaceProbe::follow(Vector3d p, const Vector3d& normal) {
 
 /// Outside of all that is closed the number is 0, whatever the orientation of each.
 bool SurfaceProbe::is_wound_about(const Vector3d& p) const {
-  return winding_ && std::abs(winding_->at(p)) > 0.5;
+  return std::abs(winding_->at(p)) > 0.5;
 }
 
 }  // namespace hermesh

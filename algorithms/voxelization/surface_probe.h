@@ -16,26 +16,26 @@ enum class Side { outer, inner, unknown };
 /// Looks around among the triangles; each thread has its own, since it keeps what it looked up.
 class SurfaceProbe {
  public:
-  /// Keeps references. `inside`: the voxels inside each block of the bins. A thorough probe follows narrow
-  /// spaces to where they are wider, and asks `winding`, unless that is null, about those that do not widen.
+  /// Keeps references. `inside`: the voxels inside each block of the bins. `winding` may be null.
   SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
-               bool thorough, const WindingNumber* winding);
+               const WindingNumber* winding);
 
-  /// Whether the solid is on both sides of the surface at q with this unit normal.
-  Side side(const Eigen::Vector3d& q, const Eigen::Vector3d& normal);
+  /// What is around a place off the surface, by straight ways to the corners of the cell that it is in.
+  Side seen_from(const Eigen::Vector3d& p);
+  /// The same of a place next to a sheet with this unit normal from which nothing is seen: follows the narrow space to
+  /// where it is wider, if it is to, and asks the winding numbers about one that does not widen.
+  Side searched_from(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, bool follow_space);
 
  private:
   using Voxel = CellObstacles::Voxel;
 
   int inside_at(const Voxel& voxel);
   void enter(const Voxel& cell);
-  Side seen_from(const Eigen::Vector3d& p);
   double centre(Eigen::Vector3d& p, const Eigen::Vector3d& normal);
   Side follow(Eigen::Vector3d p, const Eigen::Vector3d& normal);
   bool is_wound_about(const Eigen::Vector3d& p) const;
 
   const std::vector<VoxelBits>& inside_;
-  bool thorough_;
   const WindingNumber* winding_;
   BlockFinder finder_;
   CellObstacles obstacles_;

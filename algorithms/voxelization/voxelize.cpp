@@ -104,7 +104,7 @@ void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& in
 InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
                                    BandWork work, Band& band, RunContext& context) {
   InnerSheets sheets =
-      find_inner_sheets(soup, bins, band, signs.inside, work.reach, work.voxel_size, context);
+      find_inner_sheets(soup, bins, band, signs, work.reach, work.voxel_size, context);
   if (sheets.triangles.empty()) return sheets;
   work.blocks = &sheets.blocks;
   work.without = &sheets.triangles;
