@@ -26,6 +26,8 @@ constexpr double kOff = 1e-4;                ///< voxels: where the way to it be
 constexpr double kSameDistance =
     1e-3;  ///< voxels: up to here a sample's distance is that to the place's polygon
 
+constexpr double kTouching = 1e-3;  ///< voxels: what is thinner is no wall to be kept
+
 struct LostPlace {
   Vector3d at, normal;  ///< voxels; of unit length
 };
@@ -227,12 +229,15 @@ std::string lost_surface_note(const LostSurface& lost, double voxel_size) {
                      " % of the area of the polygons that bound the solid has no surface within a voxel of " +
                      short_text(voxel_size) + ": walls or gaps that are thinner";
   if (!(lost.thickness > 0.0)) return note;
+  note += "; the thinnest place found is " + short_text(lost.thickness) + " thick, at (" +
+          short_text(lost.thinnest_at.x()) + ", " + short_text(lost.thinnest_at.y()) + ", " +
+          short_text(lost.thinnest_at.z()) + ")";
+  // Where polygons all but touch, as at the tips of needles, no size that anybody would use keeps them apart.
+  if (lost.thickness < kTouching * voxel_size) return note;
   // Rounded down, for a wall exactly a voxel thick is the thinnest that is kept.
   const double digit = std::pow(10.0, std::floor(std::log10(lost.thickness)) - 2.0);
-  return note + "; the thinnest place found is " + short_text(lost.thickness) + " thick, at (" +
-         short_text(lost.thinnest_at.x()) + ", " + short_text(lost.thinnest_at.y()) + ", " +
-         short_text(lost.thinnest_at.z()) + "), and voxels of " +
-         short_text(std::floor(lost.thickness / digit) * digit) + " would keep it";
+  return note + ", and voxels of " + short_text(std::floor(lost.thickness / digit) * digit) +
+         " would keep it";
 }
 
 }  // namespace hermesh
