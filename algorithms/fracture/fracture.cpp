@@ -155,6 +155,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
   if (solid.samples == 0)
     throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
   LabelledFracture result;
+  if (options.split || options.least_samples > 0) find_joined_faces(solid, object, cutters, context);
   label_by_codes(solid, cutters, context);
   // Every further round has more joints of one sheet, so they end; hardly ever is there a second one.
   do {

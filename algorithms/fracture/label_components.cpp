@@ -7,6 +7,7 @@
 
 #include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/fracture/label_repair.h"
 
 namespace hermesh {
 namespace {
@@ -18,6 +19,8 @@ class Components {
   Components(LabelledSolid& solid, RunContext& context) : solid_(solid), context_(context) {
     find_in_blocks();
     join_blocks();
+    for (const auto& [a, b] : samples_of_joined_faces())
+      if (solid_.label(a) == solid_.label(b)) sets_.join(component(a), component(b));
   }
 
   void join_equal_labels() {
@@ -40,7 +43,7 @@ class Components {
   }
 
   void merge_small(std::uint64_t least, ComponentReport& report) {
-    std::map<std::uint32_t, Shared> shared = shared_edges(least);
+    std::map<std::uint32_t, Shared> shared = shared_contacts(least);
     std::set<std::pair<std::uint64_t, std::uint32_t>> small;  // by size
     for (const auto& [root, ignored] : shared) small.emplace(total_[root], root);
     while (!small.empty()) {
@@ -58,7 +61,7 @@ class Components {
       const std::uint32_t label = label_[into];
       small.erase({total_[into], into});
       Shared others = shared.contains(into) ? std::move(shared[into]) : Shared{};
-      for (const auto& [other, edges] : sums) others[other] += edges;
+      for (const auto& [other, contacts] : sums) others[other] += contacts;
       const std::uint64_t sum = total_[root] + total_[into];
       const std::uint32_t joined = sets_.join(root, into);
       total_[joined] = sum;
@@ -94,8 +97,7 @@ class Components {
   }
 
  private:
-  using Shared =
-      std::map<std::uint32_t, std::uint64_t>;  ///< lattice edges by the component on the other side
+  using Shared = std::map<std::uint32_t, std::uint64_t>;  ///< contacts by the component on the other side
   using Locals = std::array<std::uint16_t, 512>;
 
   std::uint32_t code_of(std::uint32_t component) const { return solid_.code_of[label_[component]]; }
@@ -108,6 +110,16 @@ class Components {
   std::uint32_t component(const LabelledSolid::Place& at) const {
     return first_[static_cast<std::size_t>(at.block)] +
            local_of(static_cast<std::size_t>(at.block), at.sample);
+  }
+
+  /// Of those that the joint mesh joins, too, if the two samples are of one piece: not those of joints.
+  std::vector<std::array<LabelledSolid::Place, 2>> samples_of_joined_faces() const {
+    std::vector<std::array<LabelledSolid::Place, 2>> result;
+    for (const auto& [samples, cells] : solid_.joined_faces)
+      if (std::ranges::none_of(
+              cells, [&](const LabelledSolid::Place& cell) { return has_cut(corner_labels(solid_, cell)); }))
+        result.push_back(samples);
+    return result;
   }
 
   struct InBlock {
@@ -187,8 +199,8 @@ class Components {
     }
   }
 
-  /// Of the sets smaller than `least`, with those that they have no edge in common with anybody.
-  std::map<std::uint32_t, Shared> shared_edges(std::uint64_t least) {
+  /// Of the sets smaller than `least`, with those that hang together with nobody.
+  std::map<std::uint32_t, Shared> shared_contacts(std::uint64_t least) {
     std::map<std::uint32_t, Shared> result;
     std::vector<char> concerned(solid_.blocks.size());
     for (std::size_t b = 0, c = 0; b < solid_.blocks.size(); ++b)
@@ -213,13 +225,19 @@ class Components {
         }
       }
     }
+    for (const auto& [a, b] : samples_of_joined_faces()) {
+      const std::uint32_t one = sets_.find(component(a)), other = sets_.find(component(b));
+      if (one == other) continue;
+      if (total_[one] < least) ++result[one][other];
+      if (total_[other] < least) ++result[other][one];
+    }
     return result;
   }
 
   Shared by_root(const Shared& shared, std::uint32_t self) {
     Shared sums;
-    for (const auto& [component, edges] : shared)
-      if (const std::uint32_t root = sets_.find(component); root != sets_.find(self)) sums[root] += edges;
+    for (const auto& [component, contacts] : shared)
+      if (const std::uint32_t root = sets_.find(component); root != sets_.find(self)) sums[root] += contacts;
     return sums;
   }
 

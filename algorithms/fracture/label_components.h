@@ -10,10 +10,12 @@
 namespace hermesh {
 
 struct ComponentOptions {
-  /// Samples of one piece that hang together by no lattice edge become several pieces; else a piece may have
-  /// several closed surfaces.
+  /// Samples of one piece that do not hang together become several pieces; else a piece may have several
+  /// closed surfaces. Two samples hang together by a *contact*: a lattice edge, or an ambiguous face across
+  /// which the whole's surface joins them (LabelledSolid::joined_faces) and which no joint shares, for what
+  /// is thin and aslant in the lattice has many of these and few edges.
   bool split = true;
-  /// In voxels, that is samples: whatever is smaller joins the neighbour that it shares most lattice edges
+  /// In voxels, that is samples: whatever is smaller joins the neighbour that it has most contacts
   /// with (the lowest of equals), the smallest first. 0 keeps everything.
   std::uint64_t least_samples = 0;
 };
@@ -35,7 +37,7 @@ struct ComponentReport {
 ///
 /// What is simple (label_repair.h) stays so where pieces only get other numbers. Splitting and merging may
 /// leave cells that are not: corners of one piece that hang together across an ambiguous face only may come
-/// to lie in two. So the labels are to be repaired after it.
+/// to lie in two pieces. So the labels are to be repaired after it.
 ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& options, RunContext& context);
 
 }  // namespace hermesh

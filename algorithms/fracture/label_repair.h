@@ -1,21 +1,42 @@
 // Changes few labels so that the joint mesh of all pieces is manifold piece by piece.
 //
 // A lattice edge whose ends are in two different pieces is a *cut*; a cell with a cut is a *joint* and gets a
-// point for each of its sheets (label_sheets.h). A cell is **simple** if it has no cut (then the sheets of
-// cell_sheets.h serve it), or if
+// point for each of its sheets (label_sheets.h). A cell is **simple** if it has no cut, or if
 //   - each sheet bounds each label, the outside included, in a single loop;
 //   - it shares no face with another joint that is pinched in both, that is, ambiguous with both segments
 //     in one sheet on either side;
 //   - it has one sheet, if that is asked of it (LabelledSolid::one_sheet).
 //
-// **Why this makes each piece closed and manifold.** A piece is bounded by the polygons of the lattice edges
-// of which one end is in it. Two of its polygons share the segment between the points of two cells if they
-// belong to two such edges of the cells' common face. A face has none, two or four of them. If four, the face
-// is ambiguous, and its two segments end in different points of one of the two cells, or the polygons are
-// held to them (uniform_mesh.h, sheet_trials.h): one of the two cells has no cut then. So every segment has
-// two polygons of the piece. The polygons around a joint's point are those of the piece's loop in that sheet,
-// of which there is one: a single fan. Those around another point belong to the one loop of its sheet, all of
-// whose inside corners hang together by edges of the cell, and so are of one piece.
+// **What labels and sheets must fulfil.** A piece is bounded by the polygons of the lattice edges of which
+// one end is in it. It is closed and manifold if all of this holds:
+//   1. The two cells beside a face draw the same lines on it. Of the face's edges that bound the piece none,
+//   two
+//      or four do. Two hang together by the lines, four are paired by two segments.
+//   2. Where four do, the segments end in different sheets of one of the two cells, or the polygons are held
+//   to
+//      them (uniform_mesh.h, sheet_trials.h).
+//   3. Each sheet of a cell bounds the piece in one loop at most.
+// Two polygons of the piece share the segment between the points of two cells if they belong to two edges
+// that bound it in the cells' common face, so by 1 and 2 each such segment has two of them: the piece is
+// closed. By 3 those around a point are one fan. A polygon between two pieces is of both, once either way
+// round; any other faces the outside and is of one. So in the sum over all pieces the seams cancel: areas of
+// contact agree, the rest is closed as the pieces are, and their volumes add up to that within it. That no
+// two polygons meet asks nothing of what lies on their sides (uniform_mesh.h).
+//
+// **Why simple cells do.** 1: A face with a cut lies between two joints, which draw what label_sheets.h says
+// of the face's labels. One without is drawn as in Hermite data; an ambiguous one of a joint has its inside
+// corners cut off on either side.
+//   Joints: 2 and 3 are what makes them simple; where the other cell is none, it can be held.
+//   A cell without a cut has the loops of cell_sheets.h. What hangs together of its inside corners by edges
+//   is of
+// one piece. But a loop goes around what hangs together by edges *and across ambiguous faces whose inside is
+// joined*, as normals may have it. The two corners of such a face may well be of two pieces without a cut
+// anywhere near: a thin plate aslant in the lattice holds samples that are neighbours across faces only. One
+// loop would bound both pieces then, and each of them would be open. So only faces whose inside corners are
+// of one piece are joined (CellGrid::is_of_one_piece), and pieces come apart at the others, with a gap of
+// less than a voxel in place of a seam. Now each loop bounds one piece, which is 3; and of 2 there is nothing
+// to ask at a face between two pieces, for its segments are of two loops. At other faces without a joint
+// cell_blocks.h sees to it.
 //
 // A wall that meets the original surface at a small angle passes, beside it, through cells that the surface
 // passes through, too, without meeting it there. Such a cell has two sheets, and no label needs to change.

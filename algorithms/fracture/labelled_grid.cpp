@@ -1,6 +1,7 @@
 #include "algorithms/fracture/labelled_grid.h"
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/fracture/label_repair.h"
 
 namespace hermesh {
 
@@ -105,6 +106,13 @@ EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) co
   return crossings_[number];
 }
 
+bool LabelledGrid::is_of_one_piece(std::int32_t block, int cell, int face) const {
+  const CornerLabels labels = corner_labels(solid_, {block, cell});
+  const std::array<int, 4> corners = face_corners(face);
+  const int inside = labels[corners[0]] > 0 ? 0 : 1;
+  return labels[corners[inside]] == labels[corners[inside + 2]];
+}
+
 std::size_t LabelledGrid::memory_bytes() const {
   std::size_t sheets = joint_sheets_.capacity() * sizeof(joint_sheets_[0]);
   for (const SheetsOfBlock& block : joint_sheets_) sheets += block.capacity() * sizeof(block[0]);
@@ -112,6 +120,37 @@ std::size_t LabelledGrid::memory_bytes() const {
          cuts_.capacity() * sizeof(cuts_[0]) + solid_.blocks.capacity() * sizeof(solid_.blocks[0]) +
          sheets + solid_.labels.memory_bytes() +
          solid_.codes.memory_bytes();
+}
+
+void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
+                       RunContext& context) {
+  const LabelledGrid grid(solid, hermite, cutters, context);
+  const CellBlocks cells(grid, context);
+  const Stage stage(context, "find joined faces");
+  std::vector<std::vector<LabelledSolid::JoinedFace>> found(cells.size());
+  parallel_blocks(cells.size(), context, [&](std::size_t b) {
+    const auto block = static_cast<std::int32_t>(b);
+    for_each_bit(cells[block].special, [&](int cell) {
+      const CellSheets& sheets = cells.sheets(block, cell);
+      const int signs = cells.corner_signs(cells.cell_number(block, cell));
+      const auto moved = [&](int steps) {  // a bit an axis, as of corners
+        return solid.locate(block, (cell >> 6) + (steps & 1), ((cell >> 3) & 7) + ((steps >> 1) & 1),
+                            (cell & 7) + (steps >> 2));
+      };
+      for (int face = 1; face < 6; face += 2) {  // the lower ones are upper ones of other cells
+        if (!((sheets.ambiguous_faces >> face) & 1)) continue;
+        const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
+        const int inside = (signs >> corners[0]) & 1 ? 0 : 1;
+        const bool is_cut_off = sheets.partner[face][edges[inside]] == edges[(inside + 3) % 4];
+        if (!is_cut_off)
+          found[b].push_back(
+              {{moved(corners[inside]), moved(corners[inside + 2])}, {moved(0), moved(1 << (face >> 1))}});
+      }
+    });
+  });
+  solid.joined_faces.clear();
+  for (const auto& list : found)
+    solid.joined_faces.insert(solid.joined_faces.end(), list.begin(), list.end());
 }
 
 }  // namespace hermesh

@@ -34,6 +34,7 @@ class LabelledGrid : public CellGrid {
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override;
   std::span<const std::array<BlockMask, 3>> cuts() const override { return cuts_; }
   std::span<const SheetsOfBlock> joint_sheets() const override { return joint_sheets_; }
+  bool is_of_one_piece(std::int32_t block, int cell, int face) const override;
 
   /// By the number of the crossing edge: by block, axis and sample.
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
@@ -53,5 +54,9 @@ class LabelledGrid : public CellGrid {
   LargeArray<EdgeSides> sides_;
   std::uint64_t made_up_ = 0;
 };
+
+/// Fills in the solid's `joined_faces`. @param solid as whole_solid() makes it @throws as LabelledGrid does
+void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
+                       RunContext& context);
 
 }  // namespace hermesh

@@ -68,6 +68,12 @@ struct LabelledSolid {
   /// Keys of cells that are to have one sheet if they are joints (label_repair.h), because polygons met where
   /// they had several.
   std::set<std::uint64_t> one_sheet;
+  /// An ambiguous face of which the whole's surface joins the inside corners across the middle.
+  struct JoinedFace {
+    std::array<Place, 2> samples;  ///< the inside corners
+    std::array<Place, 2> cells;    ///< on either side of the face
+  };
+  std::vector<JoinedFace> joined_faces;  ///< empty until find_joined_faces() of labelled_grid.h fills it
 
   /// Local coordinates from −8 to 15.
   Place locate(std::int32_t block, int x, int y, int z) const {

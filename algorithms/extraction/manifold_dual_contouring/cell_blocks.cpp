@@ -103,7 +103,7 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
-        if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell))
+        if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell) && grid_.is_of_one_piece(block, cell, face))
           faces[b].push_back({block, cell, face, normals_join(block, cell, face)});
       }
     });

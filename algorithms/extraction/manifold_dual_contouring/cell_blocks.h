@@ -44,6 +44,9 @@ class CellGrid {
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
   /// By block the joints that have several sheets or an ambiguous face; empty where there are none.
   virtual std::span<const SheetsOfBlock> joint_sheets() const { return {}; }
+  /// Whether the two inside corners of an ambiguous face without a cut are of one piece. If not, the face is
+  /// never cut so that they are joined across it.
+  virtual bool is_of_one_piece(std::int32_t /*block*/, int /*cell*/, int /*face*/) const { return true; }
 };
 
 class CellBlocks {
@@ -104,7 +107,8 @@ class CellBlocks {
   ///
   /// On an ambiguous face the corners of one kind are cut off one by one and those of the other kind are joined. Which is
   /// which the normals of its four crossings tell, so that edges and thin walls of either kind stay whole; without
-  /// normals, at joints and beside cells of which every other corner is inside it is the inside corners that are cut off.
+  /// normals, at joints, between two pieces and beside cells of which every other corner is inside it is the inside corners
+  /// that are cut off. So each sheet of a cell without a cut bounds one piece.
   /// A face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons would meet
   /// in the edge between the two cells' points. It is cut the other way, which parts each of the two sheets into two, and
   /// closes a tunnel of less than a voxel or opens a wall of less than one.
