@@ -16,7 +16,11 @@
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/fracture/thesis_fracture.h"
 #include "algorithms/hermite/samplers.h"
+#include "experiments/cases.h"
+#include "experiments/fracture_cutters.h"
 #include "experiments/fracture_tags.h"
+#include "experiments/fracture_trials.h"
+#include "experiments/harness.h"
 #include "experiments/recipes.h"
 #include "validation/fracture_ledger.h"
 
@@ -261,6 +265,53 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
     }
 }
 
+/// The books of a fracture of polygons, made as the program makes it by default.
+validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
+                                     std::uint64_t seed) {
+  RunContext context;
+  const std::vector<Voxelizer> voxelizers = all_voxelizers();
+  const Voxelizer& voxelizer = find_variant(voxelizers, "hermesh");
+  const LevelSet level_set = voxelizer.voxelize({.mesh = mesh,
+                                                 .voxel_size = bounds(mesh).size().maxCoeff() / longest,
+                                                 .context = context,
+                                                 .options = Options(voxelizer.name, voxelizer.options, {})});
+  const FloatHermite object = sample_polygons(level_set, 0.0, mesh, context);
+  CutterChoices choices;
+  choices.seed = seed;
+  const MadeCutters made = make_cutters(parse_cutters(cutters), object, choices, context);
+  return judged(pieces_of(labelled_fracture(object, *made.cutters, {}, context)));
+}
+
+TEST(FractureOfPolygons, BalancesWhereNormalsJoinTwoPiecesAcrossAFace) {
+  // Overlapping solids and a thin plate, of which samples hang together across ambiguous faces only.
+  struct Input {
+    const char* file;
+    double longest;
+    const char* cutters;
+  };
+  for (const Input& c : {Input{"csg-002.off", 16, "planes:1"}, Input{"thinplate-019.off", 24, "voronoi:5"}}) {
+    RunContext context;
+    const PolygonMesh mesh =
+        load_case((experiments_folder() / "test_inputs" / c.file).string(), context).mesh;
+    for (std::uint64_t seed = 0; seed < 5; ++seed) {
+      const validation::FractureLedger ledger = ledger_of(mesh, c.longest, c.cutters, seed);
+      EXPECT_TRUE(ledger.balances()) << c.file << " " << seed << ": " << text(ledger);
+    }
+  }
+}
+
+void expect_balance(std::uint64_t first, std::uint64_t count) {
+  for (std::uint64_t number = first; number < first + count; ++number) {
+    const FractureTrial trial = fracture_trial(number);
+    const validation::FractureLedger ledger = ledger_of(trial.mesh, trial.longest, trial.cutters, number);
+    EXPECT_TRUE(ledger.balances()) << trial.kind << " " << number << ": " << text(ledger);
+  }
+}
+
+TEST(FractureOfPolygons, BalancesOnRandomSolids) { expect_balance(0, 16); }
+
+TEST(Slow, FracturesOfRandomSolidsBalance) { expect_balance(1000, 200); }
+
 TEST(FractureOfABox, CutByTwoPlanesIsExact) {
   // A box with its faces between samples, and two planes: creases and corners are found exactly by the QEFs.
   const FloatHermite object = sampled(
@@ -323,15 +374,16 @@ TEST(FractureTags, TellCutFromOriginal) {
 }
 
 TEST(FractureTags, AreJudgedByInputAndWalls) {
-  // A box of half sides 10, 9, 8 and seeds at x = ±4: the wall is x = 0. Each half is told right at first: its five
-  // sides of the box and a rectangle at the wall, all of two triangles.
+  // A box of half sides 10, 9, 8 and seeds at x = ±4: the wall is x = 0. Each half is told right at first:
+  // its five sides of the box and a rectangle at the wall, all of two triangles.
   const std::vector<Vector3d> seeds = {{-4, 0, 0}, {4, 0, 0}};
   EXPECT_DOUBLE_EQ(distance_to_walls(seeds, {-1.5, 7, 1}), 1.5);
   EXPECT_DOUBLE_EQ(distance_to_walls({{0, 0, 0}, {2, 0, 0}, {0, 6, 0}}, {0.25, 1, 0}), 0.75);
   const PolygonMesh box = cuboid({-10, -9, -8}, {10, 9, 8});
   const DistanceOracle input(triangles_in_voxels(box, 0.5));
   PolygonMesh left = cuboid({-10, -9, -8}, {0, 9, 8});
-  left.attributes = {{"surface", AttributeDomain::polygon, 1, std::vector<std::int32_t>{0, 1, 0, 0, 0, 0}, {}}};
+  left.attributes = {
+      {"surface", AttributeDomain::polygon, 1, std::vector<std::int32_t>{0, 1, 0, 0, 0, 0}, {}}};
   TagJudge judge(input, box.origin, 0.5, seeds);
   judge.add(left);
   EXPECT_EQ(judge.counts().polygons, 6);

@@ -65,7 +65,8 @@ std::span<const Measurement> all_measurements() {
       normal_codes_measurement(),       lost_crossings_measurement(), hermite_memory_measurement(),
       hermite_csg_measurement(),        hermite_speed_measurement(),  table_9_2_measurement(),
       tables_9_3_and_9_4_measurement(), volumes_measurement(),        guarantee_measurement(),
-      fracture_measurement(),           fracture_speed_measurement()};
+      fracture_measurement(),           fracture_speed_measurement(),
+      fracture_guarantee_measurement()};
   return table;
 }
 

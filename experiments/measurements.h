@@ -103,5 +103,6 @@ Measurement volumes_measurement();
 Measurement guarantee_measurement();
 Measurement fracture_measurement();
 Measurement fracture_speed_measurement();
+Measurement fracture_guarantee_measurement();
 
 }  // namespace hermesh

@@ -128,6 +128,18 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
   return records;
 }
 
+/// Two pieces that meet across a face only have no seam there, but a gap.
+void note_gaps(const LabelledSolid& solid, RunContext& context) {
+  const auto gaps = std::ranges::count_if(solid.joined_faces, [&](const LabelledSolid::JoinedFace& face) {
+    return solid.label(face.samples[0]) != solid.label(face.samples[1]);
+  });
+  if (gaps > 0)
+    context.note(
+        "At " + std::to_string(gaps) + (gaps == 1 ? " place" : " places") +
+        " the object is too thin for a seam: pieces come apart there with a gap of less than a voxel. "
+        "Smaller voxels leave fewer.");
+}
+
 }  // namespace
 
 const char* to_string(CutterRecord::State state) {
@@ -170,6 +182,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     result.cutters = records_of(solid, grid, cutters, result.merged);
     result.mesh = joint_mesh(grid, options.placement, context);
   } while (!result.mesh.meeting_joints.empty());
+  note_gaps(solid, context);
   decimate_joint_mesh(result.mesh, options.tolerance, context);
   result.met_joints = solid.one_sheet.size();
   result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());

@@ -2,7 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+
 #include "algorithms/fracture/label_components.h"
+#include "algorithms/fracture/labelled_mesh.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/hermite/test_lattice.h"
 
@@ -122,6 +128,124 @@ TEST(LabelRepair, LeavesOneSheetWhereThatIsAsked) {
   EXPECT_TRUE(all_simple(solid));
   for (const LabelledSolid::Place& cell : cells_of_several())
     EXPECT_FALSE(solid.one_sheet.contains(LabelledSolid::key(cell)));
+}
+
+/// Whether every edge is passed once either way, and the triangles around every point are one fan.
+testing::AssertionResult is_closed_manifold(const std::vector<Triangle>& triangles) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>
+      next;  // by directed edge, the third corner
+  std::map<std::uint32_t, std::size_t> at_point;
+  for (const Triangle& t : triangles)
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!next.emplace(std::pair(t[i], t[(i + 1) % 3]), t[(i + 2) % 3]).second)
+        return testing::AssertionFailure() << "an edge is passed twice the same way";
+      ++at_point[t[i]];
+    }
+  for (const auto& [edge, ignored] : next)
+    if (!next.contains({edge.second, edge.first})) return testing::AssertionFailure() << "an edge is open";
+  for (const auto& [edge, ignored] : next) {
+    std::size_t around = 0;
+    std::uint32_t at = edge.second;
+    do ++around, at = next.at({edge.first, at});
+    while (at != edge.second);
+    if (around != at_point.at(edge.first)) return testing::AssertionFailure() << "a point has two fans";
+  }
+  return testing::AssertionSuccess();
+}
+
+/// V − E + F of closed triangles: 2 for a ball.
+int euler_characteristic(const std::vector<Triangle>& triangles) {
+  std::set<std::uint32_t> points;
+  for (const Triangle& t : triangles) points.insert(t.begin(), t.end());
+  return static_cast<int>(points.size()) - static_cast<int>(triangles.size() / 2);
+}
+
+/// By piece its triangles, outwards, without a repair.
+std::vector<std::vector<Triangle>> pieces_of(const Solid& object, std::function<CutCode(int, int, int)> code,
+                                             const ComponentOptions& options) {
+  RunContext context;
+  const FloatHermite hermite = to_sparse(sample_solid(object));
+  const CodeFunction cutters(std::move(code));
+  LabelledSolid solid = whole_solid(hermite, context);
+  find_joined_faces(solid, hermite, cutters, context);
+  label_by_codes(solid, cutters, context);
+  settle_components(solid, options, context);
+  EXPECT_TRUE(all_simple(solid));
+  const LabelledGrid grid(solid, hermite, cutters, context);
+  EXPECT_EQ(grid.made_up(), 0u);  // nothing is cut
+  const JointMesh mesh = joint_mesh(grid, {}, context);
+  EXPECT_TRUE(mesh.meeting_joints.empty());
+  const PieceTriangles sides(mesh, solid.piece_count());
+  std::vector<std::vector<Triangle>> result(solid.piece_count());
+  for (std::uint32_t piece = 1; piece <= solid.piece_count(); ++piece)
+    for (const PieceTriangles::Side& side : sides.of(piece)) {
+      Triangle t = mesh.triangles[side.triangle];
+      if (side.reversed) std::swap(t[1], t[2]);
+      result[piece - 1].push_back(t);
+    }
+  return result;
+}
+
+void expect_balls(const std::vector<std::vector<Triangle>>& pieces, std::size_t count) {
+  ASSERT_EQ(pieces.size(), count);
+  for (const std::vector<Triangle>& piece : pieces) {
+    EXPECT_TRUE(is_closed_manifold(piece));
+    EXPECT_EQ(euler_characteristic(piece), 2);
+  }
+}
+
+/// What is nearer than `radius` to the rectangle with a corner and two sides, which are at right angles.
+Solid plate(const Eigen::Vector3d& corner, const Eigen::Vector3d& side, const Eigen::Vector3d& other,
+            double radius) {
+  return [=](double x, double y, double z) {
+    Eigen::Vector3d left = Eigen::Vector3d(x, y, z) - corner;
+    const Eigen::Vector3d from_corner = left;
+    for (const Eigen::Vector3d& s : {side, other})
+      left -= std::clamp(from_corner.dot(s) / s.squaredNorm(), 0.0, 1.0) * s;
+    return left.norm() - radius;
+  };
+}
+
+TEST(JointMesh, PartsTwoPiecesThatHangTogetherAcrossFacesOnly) {
+  // Four samples are the whole solid, a thin plate: two lattice edges that lie opposite each other in one
+  // cell. The normals join them across the cell's two faces at the edges' ends, so that the cell has two
+  // sheets, each of which goes along both edges; and no cell has a cut, even if the two edges are of two
+  // pieces. (One ambiguous face alone is not joined: it would be pinched in both of its cells.)
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int turn : {1, -1}) {
+      SCOPED_TRACE(std::to_string(axis) + " " + std::to_string(turn));
+      const Eigen::Vector3d first(7, 7, 7);
+      Eigen::Vector3d across = Eigen::Vector3d::Zero();
+      across[(axis + 1) % 3] = 1, across[(axis + 2) % 3] = turn;
+      const Solid object = plate(first, across, Eigen::Vector3d::Unit(axis), 0.55);
+      const auto one = [](int, int, int) -> CutCode { return 0; };
+      const auto two = [&](int x, int y, int z) -> CutCode {
+        return Eigen::Vector3d(x, y, z)[(axis + 1) % 3] == 7 ? 0 : 1;
+      };
+      for (const bool split : {false, true}) {
+        expect_balls(pieces_of(object, one, {split, 0}), 1);
+        expect_balls(pieces_of(object, two, {split, 0}), 2);
+        expect_balls(pieces_of(object, two, {split, 3}),
+                     1);  // slivers of two samples: either joins the other
+      }
+    }
+}
+
+TEST(JointMesh, PartsAThinPlateAslantBetweenTwoOfItsRows) {
+  // The samples of x = y from 3 to 12 with z from 3 to 12: rows along z, which are neighbours across faces
+  // only.
+  const Solid object = [](double x, double y, double z) {
+    return std::max({std::abs(x - y) / std::sqrt(2.0) - 0.45, std::abs(x + y - 15) / std::sqrt(2.0) - 6.9,
+                     std::abs(z - 7.5) - 4.9});
+  };
+  for (const bool split : {false, true}) {
+    expect_balls(pieces_of(object, [](int, int, int) { return 0u; }, {split, 27}), 1);
+    expect_balls(pieces_of(object, [](int x, int, int) { return x > 9 ? 1u : 0u; }, {split, 27}), 2);
+    expect_balls(pieces_of(object, [](int x, int, int) { return x == 12 ? 1u : 0u; }, {split, 27}), 1);
+  }
+  // The outer rows are of one code, and have the others between them.
+  const auto outer = [](int x, int, int) { return x < 6 || x > 9 ? 1u : 0u; };
+  expect_balls(pieces_of(object, outer, {true, 27}), 3);
 }
 
 TEST(LabelComponents, SplitWhatHangsTogetherNowhere) {

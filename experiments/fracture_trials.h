@@ -1,0 +1,22 @@
+// Random solids that fractures are tried on: what hangs together by a hair, or across no lattice edge.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "algorithms/core/polygon_mesh.h"
+
+namespace hermesh {
+
+/// A closed mesh off the lattice, how finely it is sampled, and what breaks it.
+struct FractureTrial {
+  std::string kind;  ///< solids, plates, shell or bars
+  PolygonMesh mesh;
+  double longest = 0.0;  ///< voxels along the longest side: 12 to 48
+  std::string cutters;   ///< as parse_cutters() takes it: one to three planes, or two to twenty cells
+};
+
+/// The kinds take turns. The same on every machine.
+FractureTrial fracture_trial(std::uint64_t number);
+
+}  // namespace hermesh
