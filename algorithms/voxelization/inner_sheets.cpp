@@ -32,7 +32,7 @@ constexpr double kOff = 1e-3, kLeastOff = 1e-5;
 constexpr double kSmall = 0.5;
 /// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
 /// microseconds each.
-constexpr std::size_t kMostFaces = 1 << 18, kFacesPerSample = 4, kFacesPerTriangle = 64;
+constexpr std::size_t kMostFaces = 1 << 18, kFacesPerSample = 4, kFacesPerTriangle = 32;
 
 using Voxel = std::array<std::int32_t, 3>;
 
@@ -130,15 +130,13 @@ class Prober {
       return sees_both ? Side::inner : Side::unknown;
     };
     const Side seen = look_from(middle);
-    if (seen == Side::outer || (face.whole && face.size() <= kSmall)) return seen;
-    bool agree = seen == Side::inner;
+    const bool one_tells = face.whole ? face.size() <= kSmall : seen == Side::unknown;
+    if (seen == Side::outer || one_tells) return seen;
     for (const Vector3d& corner : face.corners) {
       const Side there = look_from(0.8 * corner + 0.2 * middle);
-      if (there == Side::outer) return Side::outer;
-      agree &= there == Side::inner;
+      if (there == Side::outer || (!face.whole && there == Side::unknown)) return there;
     }
-    const bool inner = sides[0] == Side::inner && sides[1] == Side::inner;
-    return (face.whole ? inner : agree) ? Side::inner : Side::unknown;
+    return sides[0] == Side::inner && sides[1] == Side::inner ? Side::inner : Side::unknown;
   }
 
   /// The same with all means, from the face's middle.

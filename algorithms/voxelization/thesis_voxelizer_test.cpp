@@ -251,6 +251,30 @@ TEST(ThesisVoxelizer, NoShellLeaksWhereSamplesLieHalfwayBetweenVoxels) {
   }
 }
 
+// Trap T8 a third time. Half the box's depth is 12.5 voxels, or 12.499999999999998 in double precision, so that d_T is
+// 25 and samples are one voxel apart and halfway between voxels. Of two neighbours one may round up and the other down,
+// to voxels that are two apart, and the flood goes through the voxel between.
+TEST(ThesisVoxelizer, ShellsLeakWhereRoundingTakesSamplesTwoVoxelsApart) {
+  constexpr double kVoxel = 1.1, kDepth = 13.75 / kVoxel;
+  const std::vector<Voxel> face =
+      rasterize_by_samples({Vector3d(9.2, kDepth, 0), Vector3d(-9.2, kDepth, 0), Vector3d(-9.2, -kDepth, 0)});
+  const auto is_hit = [&](int x, int y) {
+    return std::binary_search(face.begin(), face.end(), Voxel{x, y, 0});
+  };
+  int holes = 0;
+  for (int x = -9; x <= 8; ++x)
+    for (int y = -11; y <= 11; ++y) holes += !is_hit(x, y) && is_hit(x, y - 1) && is_hit(x, y + 1);
+  EXPECT_GT(holes, 0);
+
+  PolygonMesh box;
+  for (int i = 0; i < 8; ++i)
+    box.points.emplace_back(i & 1 ? 10.12f : -10.12f, i & 2 ? 13.75f : -13.75f, i & 4 ? 8.9f : -8.9f);
+  box.quads = {{3, 2, 0, 1}, {7, 5, 4, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  EXPECT_GE(voxelize(box, kVoxel)->tree().getValue({0, 0, 0}), 0.0f) << "the fault of the print is gone";
+  for (Eigen::Vector3f& p : box.points) p += Eigen::Vector3f(0.1f, 0.1f, 0.1f);
+  EXPECT_LT(voxelize(box, kVoxel)->tree().getValue({0, 0, 0}), 0.0f) << "samples are not halfway";
+}
+
 TEST(ThesisVoxelizer, OddMeshesDoNoHarm) {
   PolygonMesh single;
   single.points = {{0, 0, 0}, {9, 0, 0}, {0, 7, 3}};

@@ -66,6 +66,7 @@ TriangleCutter::TriangleCutter(const Facet& triangle)
   along_ = (triangle.corner[1] - triangle.corner[0]).normalized();
   across_ = normal_.cross(along_);
   for (const Vector3d& corner : triangle.corner) outline_.push_back(flat(corner));
+  border_ = sides(outline_);
 }
 
 Vector2d TriangleCutter::flat(const Vector3d& place) const {
@@ -96,18 +97,26 @@ void TriangleCutter::add(const Facet& other) {
 
 void TriangleCutter::add_cut(const Place& from, const Place& to) {
   Cut cut{from, to};
-  if (clip(outline_, cut)) cuts_.push_back(cut);
+  if (clip(border_, cut)) cuts_.push_back(cut);
 }
 
-/// To what of it is within a convex polygon; false if it is no more than a point, or on the border.
-bool TriangleCutter::clip(const std::vector<Place>& corners, Cut& cut) {
-  double begin = 0, end = 1;
+std::vector<TriangleCutter::Side> TriangleCutter::sides(const std::vector<Place>& corners) {
+  std::vector<Side> sides;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Place &a = corners[i], side = corners[(i + 1) % corners.size()] - a;
     const double length = side.norm();
     if (!(length > 0)) continue;
     const Place inward(-side.y() / length, side.x() / length);
-    const double from = inward.dot(cut.from - a), to = inward.dot(cut.to - a);
+    sides.push_back({inward, inward.dot(a)});
+  }
+  return sides;
+}
+
+/// To what of it is within a convex polygon; false if it is no more than a point, or on the border.
+bool TriangleCutter::clip(const std::vector<Side>& sides, Cut& cut) {
+  double begin = 0, end = 1;
+  for (const Side& side : sides) {
+    const double from = side.inward.dot(cut.from) - side.offset, to = side.inward.dot(cut.to) - side.offset;
     if (std::max(from, to) <= kBorder) return false;
     if (from < 0) begin = std::max(begin, from / (from - to));
     if (to < 0) end = std::min(end, from / (from - to));
@@ -148,8 +157,9 @@ bool TriangleCutter::split(Part& part, Part& other) {
     }
     for (Part* half : {&left, &other}) {
       half->area = area_of(half->corners);
+      const std::vector<Side> border = sides(half->corners);
       for (Cut cut : part.cuts)
-        if (clip(half->corners, cut)) half->cuts.push_back(cut);
+        if (clip(border, cut)) half->cuts.push_back(cut);
     }
     part = std::move(left);
     return true;
@@ -164,7 +174,7 @@ TriangleFace TriangleCutter::face(const Part& part) const {
   return face;
 }
 
-/// Where there are many times more than there may be faces, to hand all of them down would take far longer than to cut.
+/// Where there are more than there may be faces, to hand all of them down would take far longer than to cut.
 std::vector<TriangleCutter::Cut> TriangleCutter::longest_cuts(std::size_t most) const {
   std::vector<Cut> cuts = cuts_;
   if (cuts.size() <= most) return cuts;
@@ -178,7 +188,7 @@ std::vector<TriangleFace> TriangleCutter::faces(
     std::size_t most, const std::function<bool(const TriangleFace&)>& matters) const {
   const auto smaller = [](const Part& a, const Part& b) { return a.area < b.area; };
   std::vector<TriangleFace> faces;
-  std::vector<Part> parts = {{outline_, longest_cuts(4 * most), area_of(outline_)}};
+  std::vector<Part> parts = {{outline_, longest_cuts(most), area_of(outline_)}};
   const bool all_cuts = parts[0].cuts.size() == cuts_.size();
   while (!parts.empty()) {
     std::ranges::pop_heap(parts, smaller);

@@ -45,6 +45,10 @@ class TriangleCutter {
   struct Cut {
     Place from, to;
   };
+  struct Side {
+    Place inward;  ///< unit normal
+    double offset;
+  };
   struct Part {
     std::vector<Place> corners;
     std::vector<Cut> cuts;
@@ -55,12 +59,14 @@ class TriangleCutter {
   void add_cut(const Place& from, const Place& to);
   std::vector<Cut> longest_cuts(std::size_t most) const;
   TriangleFace face(const Part& part) const;
-  static bool clip(const std::vector<Place>& corners, Cut& cut);
+  static std::vector<Side> sides(const std::vector<Place>& corners);
+  static bool clip(const std::vector<Side>& sides, Cut& cut);
   static bool split(Part& part, Part& other);
 
   Facet triangle_;
   Eigen::Vector3d normal_, along_, across_;  ///< unit vectors; the latter two in the triangle's plane
   std::vector<Place> outline_;
+  std::vector<Side> border_;
   std::vector<Cut> cuts_;
 };
 
