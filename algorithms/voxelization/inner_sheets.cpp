@@ -32,7 +32,7 @@ constexpr double kOff = 1e-3, kLeastOff = 1e-5;
 constexpr double kSmall = 0.5;
 /// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
 /// microseconds each.
-constexpr std::size_t kMostFaces = 1 << 18, kFacesPerSample = 4, kFacesPerTriangle = 32;
+constexpr std::size_t kMostFaces = 1 << 16, kFacesPerSample = 1, kFacesPerTriangle = 16;
 
 using Voxel = std::array<std::int32_t, 3>;
 

@@ -23,7 +23,7 @@ struct InnerSheets {
 /// Triangles near places where some may be inner are cut along the lines in which others, or caps, cross them. What is
 /// left between these lines counts as inner only where that is certain: from just off either of its sides a straight way
 /// leads to a voxel inside without meeting a triangle. Everything else stays. The work grows with the number of samples
-/// and triangles: where triangles cross one another more densely than four times a sample, not all are cut along every
+/// and triangles: where triangles cross one another more densely than once a sample, not all are cut along every
 /// line, what may be on both sides of one stays, and a note says so. `reach` is how far distances matter, in voxels.
 /// @throws Cancelled.
 InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
