@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
+#include <limits>
 
 #include "algorithms/core/mesh_file_formats.h"
 #include "algorithms/core/polygon_cut.h"
@@ -22,23 +22,54 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// First word that is not in a comment.
-std::string_view first_word(std::string_view bytes) {
+/// To the first word that is not in a comment.
+TextCursor to_first_word(std::string_view bytes) {
   TextCursor cursor(bytes, "");
-  for (cursor.skip_space(); cursor.peek() == '#'; cursor.skip_space()) cursor.rest_of_line();
-  return cursor.word();
+  cursor.skip_to_word([](std::string_view) {});
+  return cursor;
 }
 
 /// The format that the content shows for certain, whatever the file is called.
 std::optional<Format> format_of_content(std::string_view bytes) {
   if (is_binary_stl(bytes)) return Format::stl;
-  if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return Format::ply;
-  const std::string_view word = first_word(bytes);
-  if (is_off_keyword(word)) return Format::off;
+  if (begins_like_ply(bytes)) return Format::ply;
+  TextCursor cursor = to_first_word(bytes);
+  const std::string_view word = cursor.word();
+  cursor.skip_blanks();
+  const bool is_off = parse_off_keyword(word).has_value();
+  if (is_off && cursor.word() == "BINARY") return Format::off;
+  // The 80 bytes of text with which a binary STL file begins say what they like.
+  if (without_padding(bytes.substr(0, 1000)).find('\0') != std::string_view::npos) return std::nullopt;
+  if (is_off) return Format::off;
   if (lower(std::string(word)) == "solid") return Format::stl;
   for (const char* keyword : {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"})
     if (word == keyword) return Format::obj;
   return std::nullopt;
+}
+
+/// As OFF files without their keyword do.
+bool begins_with_digit(std::string_view bytes) {
+  const char first = to_first_word(bytes).peek();
+  return first >= '0' && first <= '9';
+}
+
+bool is_utf16(std::string_view bytes) {
+  return bytes.size() >= 4 && ((bytes.starts_with("\xFF\xFE") && bytes[3] == '\0') ||
+                               (bytes.starts_with("\xFE\xFF") && bytes[2] == '\0'));
+}
+
+/// @throws Error where the content shows that the file is of another format than its name says.
+void check_format(std::string_view bytes, Format named, const std::string& file) {
+  const std::optional<Format> content = format_of_content(bytes);
+  const std::string is_named =
+      in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
+  if (content && *content != named) throw Error(is_named + " but holds " + std::string(name_of(*content)));
+  if (content) return;
+  if (is_utf16(bytes)) throw Error(in_quotes(file) + " is text in UTF-16; save it as UTF-8 or plain ASCII");
+  // An OBJ file may begin with any of dozens of words, a damaged binary STL file with any byte, and OFF files
+  // without their keyword exist.
+  if (named == Format::ply || (named == Format::off && !begins_with_digit(bytes)))
+    throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
 }
 
 }  // namespace
@@ -57,21 +88,6 @@ std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
 void throw_unknown_extension(const std::filesystem::path& path) {
   throw Error(in_quotes(path.string()) +
               " is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
-}
-
-void TextCursor::fail(const std::string& what) const {
-  const std::string line = std::to_string(1 + std::count(begin_, at_, '\n'));
-  throw Error(in_quotes(file_) + ", line " + line + ": " + what);
-}
-
-void TextCursor::fail_number(const char* what) {
-  if (at_end()) fail(std::string("the file is truncated: it ends where ") + what + " should be");
-  if (at_line_end()) fail(std::string("the line ends where ") + what + " should be");
-  const TextCursor here = *this;
-  std::string found(word().substr(0, 40));
-  for (char& c : found)
-    if (c < ' ' || c > '~') c = '?';
-  here.fail(in_quotes(found) + " is not " + what);
 }
 
 namespace {
@@ -139,6 +155,17 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
     if (corners.size() > 4) fans_.push_back({polygon, mesh.triangles.size(), corners.size()});
     for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
   }
+  if (!numbered_) return;
+  std::vector<std::uint32_t>& numbers = corners.size() == 4 ? numbers_of_quads_ : numbers_of_triangles_;
+  for (std::size_t i = 2; i < corners.size(); ++i) numbers.push_back(next_number_++);
+}
+
+void MeshBuilder::number_triangles() {
+  // Where one kind of polygon comes first, or is all there is, nothing is out of order.
+  if (numbers_of_quads_.empty() || numbers_of_quads_.front() == numbers_of_triangles_.size()) return;
+  mesh.triangle_numbers = std::move(numbers_of_triangles_);
+  mesh.triangle_numbers.insert(mesh.triangle_numbers.end(), numbers_of_quads_.begin(),
+                               numbers_of_quads_.end());
 }
 
 void MeshBuilder::cut_concave_polygons() {
@@ -169,42 +196,83 @@ void MeshBuilder::add_comment(std::string_view text) {
   cursor.skip_space();
   if (cursor.word() != "origin") return;
   Eigen::Vector3d origin;
-  try {
-    for (double& x : origin) {
-      cursor.skip_space();
-      x = cursor.number<double>("a number");
-    }
-  } catch (const Error&) {
-    return;  // somebody else's comment that happens to begin with the same word
+  for (double& x : origin) {
+    cursor.skip_space();
+    // Somebody else's comment may happen to begin with the same word.
+    const std::optional<double> number = cursor.at_end() ? std::nullopt : cursor.number_if_any<double>();
+    if (!number) return;
+    x = *number;
   }
   cursor.skip_space();
   if (cursor.at_end() && origin.allFinite()) mesh.origin = origin;
 }
 
+void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
+  std::vector<std::size_t> kept;
+  std::vector<std::uint32_t> numbers(mesh.points.size());
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    numbers[i] = static_cast<std::uint32_t>(kept.size());
+    if (left_out[i]) continue;
+    mesh.points[kept.size()] = mesh.points[i];
+    kept.push_back(i);
+  }
+  mesh.points.resize(kept.size());
+  const auto renumber = [&](auto& polygons) {
+    for (auto& polygon : polygons)
+      for (std::uint32_t& corner : polygon) corner = numbers[corner];
+  };
+  renumber(mesh.triangles);
+  renumber(mesh.quads);
+  if (attributes_) attributes_->keep_points(std::move(kept));
+}
+
+/// Points that no polygon uses must not stop the work, nor spoil what is computed of all points in single
+/// precision.
+void MeshBuilder::check_points() {
+  const auto fits = [](const Eigen::Vector3d& point) {
+    return (point.array().abs() <= double(std::numeric_limits<float>::max()))
+        .all();  // false for what is no number, too
+  };
+  if (std::ranges::all_of(mesh.points, fits)) return;
+  std::vector<bool> left_out;
+  for (const Eigen::Vector3d& point : mesh.points) left_out.push_back(!fits(point));
+  const auto keep = [&](const auto& polygons) {
+    for (const auto& polygon : polygons)
+      for (const std::uint32_t corner : polygon) left_out[corner] = false;
+  };
+  keep(mesh.triangles);
+  keep(mesh.quads);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    if (!left_out[i] && !mesh.points[i].allFinite())
+      fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
+  const auto count = std::ranges::count(left_out, true);
+  if (count == 0) return;
+  note(std::to_string(count) +
+       " points that no polygon uses were left out, because they have coordinates that are not "
+       "finite numbers in single precision");
+  leave_out_points(left_out);
+}
+
 MeshFile MeshBuilder::finish() {
   if (mesh.points.size() > 0xffffffff) fail("it has more than 2^32 points");
   if (largest_ >= static_cast<std::int64_t>(mesh.points.size())) fail_index(polygon_of_largest_, largest_);
-  for (std::size_t i = 0; i < mesh.points.size(); ++i)
-    if (!mesh.points[i].allFinite())
-      fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
   if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
+  check_points();
+  number_triangles();
   cut_concave_polygons();
   if (dropped_ > 0)
     context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
                   " polygons with fewer than three corners were dropped");
-  if (attributes_) mesh.attributes = attributes_->finish(context_);
+  if (attributes_) {
+    mesh.attributes = attributes_->finish(context_);
+    mesh.attributes_left_out = attributes_->has_left_out();
+  }
   return std::move(mesh);
 }
 
 MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
                     const ReadOptions& options) {
-  const std::optional<Format> content = format_of_content(bytes);
-  const std::string is_named =
-      in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
-  if (content && *content != named) throw Error(is_named + " but holds " + std::string(name_of(*content)));
-  // An OBJ file may begin with any of dozens of words, and a damaged binary STL file with any byte.
-  if (!content && (named == Format::ply || named == Format::off))
-    throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
+  check_format(bytes, named, file);
   MeshBuilder builder(file, context, options);
   switch (named) {
     case Format::ply:
@@ -239,14 +307,12 @@ MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, 
 
 PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
   MeshFile file = read_mesh_file(path, context, options);
-  std::vector<MeshAttribute> attributes = std::move(file.attributes);
-  file.attributes.clear();
-  PolygonMesh mesh = about_file(path.string(), [&] { return to_polygon_mesh(file); });
-  mesh.attributes = std::move(attributes);
-  return mesh;
+  return about_file(path.string(), [&] { return to_polygon_mesh(std::move(file)); });
 }
 
-PolygonMesh to_polygon_mesh(const MeshFile& file) {
+PolygonMesh to_polygon_mesh(const MeshFile& file) { return to_polygon_mesh(MeshFile(file)); }
+
+PolygonMesh to_polygon_mesh(MeshFile&& file) {
   Bounds box;
   for (const Triangle& triangle : file.triangles)
     for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
@@ -254,9 +320,9 @@ PolygonMesh to_polygon_mesh(const MeshFile& file) {
     for (const std::uint32_t corner : quad) box.add(file.points[corner]);
   PolygonMesh mesh;
   mesh.origin = file.origin ? *file.origin : choose_origin(box);
-  mesh.triangles = file.triangles;
-  mesh.quads = file.quads;
-  mesh.attributes = file.attributes;
+  mesh.triangles = std::move(file.triangles);
+  mesh.quads = std::move(file.quads);
+  mesh.attributes = std::move(file.attributes);
   mesh.points.reserve(file.points.size());
   for (const Eigen::Vector3d& point : file.points) {
     const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();

@@ -18,9 +18,14 @@ struct MeshFile {
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
   std::vector<MeshAttribute> attributes;  ///< only where ReadOptions asked for them
+  bool attributes_left_out = false;       ///< some were asked for, but could not be read; notes say why
   /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading
   /// back gives the same points.
   std::optional<Eigen::Vector3d> origin;
+  /// Where ReadOptions asked for them: the number in the file of each of triangulated()'s triangles, counting from 0 over
+  /// the file's polygons in their order, each cut into as many triangles as it has corners less two. Empty where that is
+  /// the order of triangulated() anyway.
+  std::vector<std::uint32_t> triangle_numbers;
 
   std::size_t triangle_count() const { return triangles.size() + 2 * quads.size(); }
 };
@@ -41,18 +46,29 @@ struct MeshFile {
 /// What is cut takes its corners' values along, and each of its triangles its polygon's; a polygon that is dropped drops its
 /// values. Degenerate polygons and points that no polygon uses keep theirs; nothing is welded in these formats. Where
 /// only some elements have a value, the others get 0, or −1 where the values are whole numbers, and a note says so. A
-/// name that is taken gets the domain in front ("polygon-quality"). OFF and STL give none.
+/// name that is taken gets the domain in front ("polygon-quality"). OFF and STL give none. An attribute that cannot be read
+/// is left out with a note: one with a value that is no number, not finite or, where it is a whole number, beyond 32 bits,
+/// with an index out of range, or with a list of another length than the polygon's.
 struct ReadOptions {
   bool attributes = false;
+  /// Names of attributes that are an Error where they cannot be read.
+  std::vector<std::string> required = {};
+  bool triangle_numbers = false;  ///< MeshFile::triangle_numbers
 };
 
-/// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, or holds an index
-/// out of range, a coordinate or attribute that is not finite, a whole number of an attribute beyond 32 bits, or no
-/// polygon; the sentence names the file.
+/// What programs write although the format says otherwise is read wherever it can mean one thing only, with a note: a
+/// wrong count in a binary STL file whose size says how many triangles it holds, no `endsolid`, words behind an element of
+/// an ASCII PLY file, unknown lines of a PLY header, an OFF file without its keyword or with the count glued to it, points
+/// that no polygon uses and that are not finite (left out), zeros or Ctrl-Z behind the data. Without a note: byte order
+/// marks, line ends of any system, blanks, comments, `end solid`, triangle strips, binary OFF.
+/// @throws Error for a file that is missing, empty, truncated, of an unknown or wrong type, holds more than it declares, an
+/// index out of range, a coordinate of a polygon that is not finite, or no polygon; the sentence names the file.
 MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options = {});
 
 /// Single precision relative to the file's own origin, or to choose_origin() of its bounds.
+/// @throws Error for coordinates beyond single precision.
 PolygonMesh to_polygon_mesh(const MeshFile& file);
+PolygonMesh to_polygon_mesh(MeshFile&& file);
 /// Double precision world coordinates of a mesh, what write_mesh() would put into a file.
 MeshFile to_mesh_file(const PolygonMesh& mesh);
 

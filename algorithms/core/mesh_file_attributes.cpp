@@ -75,20 +75,26 @@ std::vector<std::size_t> AttributeBuilder::corner_order() const {
   return order;
 }
 
-void AttributeBuilder::fail(const Gathered& gathered, const std::string& what) {
-  const MeshAttribute& attribute = gathered.result;
-  throw Error(in_quotes(file_) + ": the attribute " + in_quotes(attribute.name) + " of " +
-              name_of(attribute.domain) + " " + std::to_string(begun(attribute.domain) - 1) +
-              " (counting from 0) " + what);
+void AttributeBuilder::spoil(std::size_t attribute, const std::string& reason) {
+  std::string& spoiled = gathered_[attribute].spoiled;
+  if (spoiled.empty()) spoiled = reason;
 }
 
-std::string AttributeBuilder::unused_name(std::string name, AttributeDomain domain) const {
-  const auto taken = [&](const std::string& text) {
-    return std::ranges::any_of(gathered_, [&](const Gathered& other) { return other.result.name == text; });
-  };
-  if (taken(name)) name = std::string(name_of(domain)) + "-" + name;
+void AttributeBuilder::spoil_value(std::size_t attribute, const std::string& what) {
+  const AttributeDomain domain = gathered_[attribute].result.domain;
+  if (gathered_[attribute].spoiled.empty())
+    spoil(attribute, std::string("that of ") + name_of(domain) + " " + std::to_string(begun(domain) - 1) +
+                         " (counting from 0) " + what);
+}
+
+void AttributeBuilder::set_labels(std::size_t attribute, const std::vector<std::string>& labels) {
+  for (const std::string& label : labels) gathered_[attribute].result.labels.push_back(clean_name(label));
+}
+
+std::string AttributeBuilder::unused_name(std::string name, AttributeDomain domain) {
+  if (names_.contains(name)) name = std::string(name_of(domain)) + "-" + name;
   std::string unused = name;
-  for (int i = 2; taken(unused); ++i) unused = name + "-" + std::to_string(i);
+  while (!names_.emplace(unused, 1).second) unused = name + "-" + std::to_string(++names_[name]);
   return unused;
 }
 
@@ -96,7 +102,8 @@ std::size_t AttributeBuilder::add(std::string name, AttributeDomain domain, int 
   Gathered& gathered = gathered_.emplace_back();
   gathered.result = {"", domain, components, std::vector<float>(), {}};
   if (whole) gathered.result.values = std::vector<std::int32_t>();
-  gathered.result.name = unused_name(std::move(name), domain);
+  gathered.result.name = unused_name(clean_name(name), domain);
+  of_domain_[static_cast<std::size_t>(domain)].push_back(gathered_.size() - 1);
   grow(gathered);
   return gathered_.size() - 1;
 }
@@ -122,8 +129,7 @@ void AttributeBuilder::reserve(AttributeDomain domain, std::size_t elements) {
 
 void AttributeBuilder::begin(AttributeDomain domain) {
   ++begun(domain);
-  for (Gathered& gathered : gathered_)
-    if (gathered.result.domain == domain) grow(gathered);
+  for (const std::size_t attribute : of_domain_[static_cast<std::size_t>(domain)]) grow(gathered_[attribute]);
 }
 
 void AttributeBuilder::set(std::size_t attribute, int component, double value) {
@@ -133,12 +139,12 @@ void AttributeBuilder::set(std::size_t attribute, int component, double value) {
   if (auto* whole = std::get_if<std::vector<std::int32_t>>(&gathered.result.values)) {
     using Limits = std::numeric_limits<std::int32_t>;
     if (!(value >= Limits::min() && value <= Limits::max()))
-      fail(gathered, "does not fit into 32 bits with a sign");
+      return spoil_value(attribute, "does not fit into 32 bits with a sign");
     *place(*whole) = static_cast<std::int32_t>(value);
     return;
   }
   const auto single = static_cast<float>(value);
-  if (!std::isfinite(single)) fail(gathered, "is not a finite number in single precision");
+  if (!std::isfinite(single)) return spoil_value(attribute, "is not a finite number in single precision");
   *place(std::get<std::vector<float>>(gathered.result.values)) = single;
 }
 
@@ -150,10 +156,27 @@ void AttributeBuilder::note_missing(const Gathered& gathered, RunContext& contex
   context.note(in_quotes(file_) + ": " + std::to_string(missing) + " of " +
                std::to_string(begun(attribute.domain)) + " " +
                domain_plurals[static_cast<std::size_t>(attribute.domain)] + " have no " +
-               in_quotes(attribute.name) + " and get " + (whole ? "-1" : "0"));
+               quoted_word(attribute.name) + " and get " + (whole ? "-1" : "0"));
+}
+
+void AttributeBuilder::leave_out_spoiled(RunContext& context) {
+  constexpr std::size_t most_notes = 8;
+  for (const Gathered& gathered : gathered_) {
+    if (gathered.spoiled.empty()) continue;
+    const std::string the_attribute =
+        in_quotes(file_) + ": the attribute " + quoted_word(gathered.result.name);
+    if (std::ranges::find(required_, gathered.result.name) != required_.end())
+      throw Error(the_attribute + " cannot be read: " + gathered.spoiled);
+    if (++left_out_ <= most_notes) context.note(the_attribute + " was left out: " + gathered.spoiled);
+  }
+  if (left_out_ > most_notes)
+    context.note(in_quotes(file_) + ": " + std::to_string(left_out_ - most_notes) +
+                 " more attributes were left out for the like");
+  std::erase_if(gathered_, [](const Gathered& gathered) { return !gathered.spoiled.empty(); });
 }
 
 std::vector<MeshAttribute> AttributeBuilder::finish(RunContext& context) {
+  leave_out_spoiled(context);
   const auto any_of = [&](AttributeDomain domain) {
     return std::ranges::any_of(gathered_, [&](const Gathered& g) { return g.result.domain == domain; });
   };
@@ -166,6 +189,8 @@ std::vector<MeshAttribute> AttributeBuilder::finish(RunContext& context) {
     const AttributeDomain domain = gathered.result.domain;
     if (domain == AttributeDomain::polygon) reorder(gathered.result, polygons, begun(domain));
     if (domain == AttributeDomain::corner) reorder(gathered.result, corners, begun(domain));
+    if (domain == AttributeDomain::point && kept_points_)
+      reorder(gathered.result, *kept_points_, begun(domain));
     attributes.push_back(std::move(gathered.result));
   }
   return attributes;

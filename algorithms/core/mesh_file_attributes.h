@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,20 +17,25 @@ namespace hermesh::mesh_formats {
 
 class AttributeBuilder {
  public:
-  explicit AttributeBuilder(std::string file) : file_(std::move(file)) {}
+  /// `required` as ReadOptions has it.
+  AttributeBuilder(std::string file, std::vector<std::string> required)
+      : file_(std::move(file)), required_(std::move(required)) {}
 
   /// A new attribute and its number. Elements that have begun already get 0, or −1 where the values are whole
   /// numbers. A name that another attribute has gets the domain in front: "polygon-colour".
   std::size_t add(std::string name, AttributeDomain domain, int components, bool whole);
-  void set_labels(std::size_t attribute, std::vector<std::string> labels) {
-    gathered_[attribute].result.labels = std::move(labels);
-  }
+  void set_labels(std::size_t attribute, const std::vector<std::string>& labels);
   void reserve(AttributeDomain domain, std::size_t elements);
 
   /// The next element of the domain, filled like those in add().
   void begin(AttributeDomain domain);
-  /// Of the newest element. @throws Error for a value that is not finite, or a whole number beyond 32 bits.
+  /// Of the newest element. A value that is not finite, or a whole number beyond 32 bits, spoils the
+  /// attribute.
   void set(std::size_t attribute, int component, double value);
+  /// The attribute cannot be read and will be left out; the first reason counts.
+  void spoil(std::size_t attribute, const std::string& reason);
+  /// spoil() for the value of the newest element: "is no number".
+  void spoil_value(std::size_t attribute, const std::string& what);
   /// Once for each polygon of the file, also for those that are dropped; their corners begin on their own.
   void add_polygon(std::size_t corners) { polygon_sizes_.push_back(static_cast<std::uint32_t>(corners)); }
 
@@ -37,14 +44,19 @@ class AttributeBuilder {
     cut_polygons_.push_back({polygon, std::move(triangles)});
   }
 
+  /// Numbers of the points in the file that the mesh keeps; without the call it keeps all.
+  void keep_points(std::vector<std::size_t> points) { kept_points_ = std::move(points); }
+
   /// In the order of MeshFile, its polygons cut as MeshBuilder cuts them. Notes how many elements of an
-  /// attribute got no value.
+  /// attribute got no value, and which attributes are left out. @throws Error where one of these is required.
   std::vector<MeshAttribute> finish(RunContext& context);
+  bool has_left_out() const { return left_out_ > 0; }  ///< once finished
 
  private:
   struct Gathered {
     MeshAttribute result;
-    std::size_t given = 0;  ///< elements with a value
+    std::size_t given = 0;     ///< elements with a value
+    std::string spoiled = {};  ///< why it cannot be read, as a part of a sentence
   };
   struct CutPolygon {
     std::size_t polygon;
@@ -54,13 +66,18 @@ class AttributeBuilder {
   std::vector<std::size_t> corner_order() const;
   std::size_t& begun(AttributeDomain domain) { return begun_[static_cast<std::size_t>(domain)]; }
   void grow(Gathered& gathered);
-  std::string unused_name(std::string name, AttributeDomain domain) const;
+  std::string unused_name(std::string name, AttributeDomain domain);
   void note_missing(const Gathered& gathered, RunContext& context);
-  [[noreturn]] void fail(const Gathered& gathered, const std::string& what);
+  void leave_out_spoiled(RunContext& context);
 
   std::string file_;
+  std::vector<std::string> required_;
+  std::size_t left_out_ = 0;
   std::vector<Gathered> gathered_;
-  std::array<std::size_t, 3> begun_{};  ///< elements, by domain
+  std::array<std::vector<std::size_t>, 3> of_domain_;  ///< numbers of attributes
+  std::array<std::size_t, 3> begun_{};                 ///< elements, by domain
+  std::map<std::string, int> names_;                   ///< the last number that was put behind each name
+  std::optional<std::vector<std::size_t>> kept_points_;
   std::vector<std::uint32_t> polygon_sizes_;
   std::vector<CutPolygon> cut_polygons_;
 };

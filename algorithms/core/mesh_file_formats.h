@@ -1,9 +1,6 @@
 // What the parsers of the mesh file formats share. Private to algorithms/core/mesh_file*.cpp.
 #pragma once
 
-#include <charconv>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -12,6 +9,7 @@
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/core/mesh_file_attributes.h"
+#include "algorithms/core/mesh_file_text.h"
 
 namespace hermesh::mesh_formats {
 
@@ -25,12 +23,6 @@ struct MeshPath {
 std::string_view name_of(Format format);  ///< "PLY"
 /// Format by extension, in any case of letters. nullopt for an unknown one.
 std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path);
-/// In quotation marks, for sentences.
-inline std::string in_quotes(std::string_view text) {
-  std::string result = "'";
-  result += text;
-  return result += "'";
-}
 /// The Error that lists the known extensions.
 [[noreturn]] void throw_unknown_extension(const std::filesystem::path& path);
 
@@ -58,8 +50,8 @@ class PointMerger {
 class MeshBuilder {
  public:
   MeshBuilder(std::string file, RunContext& context, const ReadOptions& options = {})
-      : file_(std::move(file)), context_(context) {
-    if (options.attributes) attributes_.emplace(file_);
+      : file_(std::move(file)), context_(context), numbered_(options.triangle_numbers) {
+    if (options.attributes) attributes_.emplace(file_, options.required);
   }
 
   MeshFile mesh;
@@ -82,9 +74,18 @@ class MeshBuilder {
   /// The mesh, once indices, coordinates and counts have been checked. @throws Error
   MeshFile finish();
   [[noreturn]] void fail(const std::string& what) const { throw Error(in_quotes(file_) + ": " + what); }
+  /// What was forgiven, or lost.
+  void note(const std::string& what) { context_.note(in_quotes(file_) + ": " + what); }
+  /// Of the padding at the end of these bytes, where it is more than white space.
+  void note_padding(std::string_view bytes) {
+    if (has_odd_padding(bytes)) note("zeros or Ctrl-Z behind the data were passed over");
+  }
 
  private:
   [[noreturn]] void fail_index(std::size_t polygon, std::int64_t corner) const;
+  void check_points();
+  void leave_out_points(const std::vector<bool>& left_out);
+  void number_triangles();
   void cut_concave_polygons();
 
   /// Of more than four corners; a fan until all points are there.
@@ -97,89 +98,9 @@ class MeshBuilder {
   std::size_t ticks_ = 0, polygons_ = 0, dropped_ = 0, polygon_of_largest_ = 0;
   std::int64_t largest_ = -1;
   std::vector<Fan> fans_;
-};
-
-inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
-inline bool is_space(char c) { return c == '\n' || is_blank(c); }
-
-/// Reads text from front to back; independent of the locale. Complaints name the line.
-class TextCursor {
- public:
-  TextCursor(std::string_view text, std::string file, std::size_t start = 0)
-      : begin_(text.data()), at_(begin_ + start), end_(begin_ + text.size()), file_(std::move(file)) {
-    if (text.substr(start).starts_with("\xEF\xBB\xBF")) at_ += 3;  // byte order mark
-  }
-
-  bool at_end() const { return at_ == end_; }
-  bool at_line_end() const { return at_ == end_ || *at_ == '\n'; }
-  char peek() const { return at_ == end_ ? '\0' : *at_; }
-  void advance() { ++at_; }
-  std::size_t offset() const { return static_cast<std::size_t>(at_ - begin_); }
-  std::size_t remaining() const { return static_cast<std::size_t>(end_ - at_); }
-
-  void skip_space() {
-    while (at_ != end_ && is_space(*at_)) ++at_;
-  }
-  void skip_blanks() {
-    while (at_ != end_ && is_blank(*at_)) ++at_;
-  }
-  void skip_word() {
-    while (at_ != end_ && !is_space(*at_)) ++at_;
-  }
-  std::string_view word() {
-    const char* const start = at_;
-    skip_word();
-    return {start, static_cast<std::size_t>(at_ - start)};
-  }
-  /// What is left of the line, without its end; moves behind that.
-  std::string_view rest_of_line() {
-    const char* const start = at_;
-    const void* const newline = std::memchr(at_, '\n', remaining());
-    const char* stop = newline ? static_cast<const char*>(newline) : end_;
-    at_ = newline ? stop + 1 : end_;
-    while (stop != start && is_blank(stop[-1])) --stop;
-    return {start, static_cast<std::size_t>(stop - start)};
-  }
-
-  /// The number that starts here; what ends it is not looked at.
-  template <class T>
-  [[gnu::always_inline]] T leading_number(const char* what) {
-    const char* start = at_;
-    if (start != end_ && *start == '+') ++start;
-    T value{};
-    auto [stop, status] = std::from_chars(start, end_, value);
-    if constexpr (std::is_floating_point_v<T>) {
-      // Too large and too small look the same here; long double tells them apart, and its overflow is
-      // infinity.
-      long double wide = HUGE_VALL;
-      if (status == std::errc::result_out_of_range) {
-        std::from_chars(start, end_, wide);
-        value = static_cast<T>(wide);
-        status = std::errc();
-      }
-    }
-    if (status != std::errc()) fail_number(what);
-    at_ = stop;
-    return value;
-  }
-  /// The number that is the next word. Inlined by order: a seventh of the time that text takes.
-  template <class T>
-  [[gnu::always_inline]] T number(const char* what) {
-    const char* const start = at_;
-    const T value = leading_number<T>(what);
-    if (at_ != end_ && !is_space(*at_)) {
-      at_ = start;
-      fail_number(what);
-    }
-    return value;
-  }
-
-  [[noreturn]] void fail(const std::string& what) const;
-
- private:
-  [[noreturn]] void fail_number(const char* what);
-  const char *begin_, *at_, *end_;
-  std::string file_;
+  bool numbered_;
+  std::uint32_t next_number_ = 0;  ///< of a triangle, see MeshFile::triangle_numbers
+  std::vector<std::uint32_t> numbers_of_triangles_, numbers_of_quads_;
 };
 
 /// The mesh in the bytes of a file that is named as of this format. @throws Error
@@ -190,9 +111,16 @@ void read_ply(std::string_view bytes, MeshBuilder& builder);
 void read_obj(std::string_view bytes, MeshBuilder& builder);
 void read_off(std::string_view bytes, MeshBuilder& builder);
 void read_stl(std::string_view bytes, MeshBuilder& builder);
-/// 84 bytes, then 50 for each triangle: no other format has exactly that length.
+/// The length of a binary STL file of as many triangles as it declares: 84 bytes, then 50 for each triangle.
+/// No other format has exactly that length.
 bool is_binary_stl(std::string_view bytes);
-/// True for the first word of an OFF file, colours and normals included.
-bool is_off_keyword(std::string_view word);
+/// "ply" on a line of its own.
+bool begins_like_ply(std::string_view bytes);
+/// The word that an OFF file begins with.
+struct OffKeyword {
+  std::size_t length;  ///< the count of points may follow at once
+  bool texture = false, colour = false, normal = false, four = false, any_dimension = false;
+};
+std::optional<OffKeyword> parse_off_keyword(std::string_view word);
 
 }  // namespace hermesh::mesh_formats

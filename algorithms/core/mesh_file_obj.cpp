@@ -1,5 +1,6 @@
 // OBJ (Wavefront): lines of points (v) and polygons (f), and where attributes are asked for, colours behind
 // the points, normals (vn), texture coordinates (vt) and materials (usemtl); everything else is passed over.
+#include <algorithm>
 #include <map>
 
 #include "algorithms/core/mesh_file_formats.h"
@@ -18,6 +19,7 @@ struct CornerList {
   std::vector<float> values = {};
   std::vector<std::int64_t> corners = {};  ///< from 0, or kNone
   bool used = false;
+  std::string spoiled = {};  ///< why it cannot be read
 
   std::int64_t size() const { return static_cast<std::int64_t>(values.size()) / components; }
 };
@@ -25,15 +27,19 @@ struct CornerList {
 class ObjReader {
  public:
   ObjReader(std::string_view bytes, MeshBuilder& builder)
-      : cursor_(bytes, builder.file()), builder_(builder), total_(bytes.size()) {}
+      : cursor_(bytes, builder.file(), 0, '#', '\\'), builder_(builder), bytes_(bytes) {}
 
   void read() {
     while (true) {
       cursor_.skip_space();
       if (cursor_.at_end()) break;
-      builder_.tick(cursor_.offset(), total_);
+      builder_.tick(cursor_.offset(), bytes_.size());
       read_line();
     }
+    if (left_out_ > 0)
+      builder_.note("it holds curves, surfaces or calls of other files on " + std::to_string(left_out_) +
+                    " lines, which are not read; the mesh lacks them");
+    builder_.note_padding(bytes_);
     if (builder_.attributes()) finish_attributes();
   }
 
@@ -44,11 +50,12 @@ class ObjReader {
       builder_.add_comment(cursor_.rest_of_line());
       return;
     }
+    const std::size_t start = cursor_.offset();
     const std::string_view keyword = cursor_.word();
     const char first = keyword[0];
     if (keyword == "v") {
       read_point();
-    } else if (keyword == "f") {
+    } else if (keyword == "f" || keyword == "fo") {  // fo is what f was called at first
       read_polygon();
     } else if (builder_.attributes() && keyword == "vt") {
       read_value(uvs_, 1);
@@ -57,30 +64,19 @@ class ObjReader {
     } else if (builder_.attributes() && keyword == "usemtl") {
       read_material();
     } else if ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z')) {
+      left_out_ += is_other_geometry(keyword);
       skip_continued_line();
     } else {
-      cursor_.fail(in_quotes(printable(keyword)) + " is no keyword of an OBJ file");
+      cursor_.fail_at(start, quoted_word(keyword) + " is no keyword of an OBJ file");
     }
   }
 
-  static std::string printable(std::string_view word) {
-    std::string text(word.substr(0, 40));
-    for (char& c : text)
-      if (c < ' ' || c > '~') c = '?';
-    return text;
+  static bool is_other_geometry(std::string_view keyword) {
+    constexpr std::string_view keywords[] = {"curv", "surf", "call", "bzp", "bsp", "cdc", "cdp", "res"};
+    return std::ranges::find(keywords, keyword) != std::end(keywords);
   }
 
-  /// Blanks, and a backslash that continues the line on the next one.
-  void skip_blanks() {
-    cursor_.skip_blanks();
-    while (cursor_.peek() == '\\') {
-      cursor_.advance();
-      cursor_.skip_blanks();
-      if (cursor_.peek() != '\n') cursor_.fail("a backslash stands within a line");
-      cursor_.advance();
-      cursor_.skip_blanks();
-    }
-  }
+  void skip_blanks() { cursor_.skip_blanks_and_continuations(); }
 
   void skip_continued_line() {
     while (cursor_.rest_of_line().ends_with('\\')) {
@@ -92,9 +88,7 @@ class ObjReader {
     Eigen::Vector3d point;
     for (double& x : point) {
       skip_blanks();
-      x = cursor_.leading_number<double>("a number");
-      if (!is_space(cursor_.peek()) && cursor_.peek() != '\\' && !cursor_.at_end())
-        cursor_.fail("a coordinate is not a number");
+      x = cursor_.number<double>("a number");
     }
     builder_.mesh.points.push_back(point);
     if (builder_.attributes()) read_colour();
@@ -107,10 +101,15 @@ class ObjReader {
     attributes.begin(AttributeDomain::point);
     std::array<double, 4> numbers{};
     std::size_t count = 0;
-    for (skip_blanks(); count < 4 && !cursor_.at_line_end() && cursor_.peek() != '#'; skip_blanks())
-      numbers[count++] = cursor_.number<double>("a weight or a colour");
-    if (count < 3) return;
+    bool good = true;
+    for (skip_blanks(); count < 4 && !cursor_.at_line_end() && cursor_.peek() != '#'; skip_blanks()) {
+      const std::optional<double> number = cursor_.number_if_any<double>();
+      good = good && number;
+      numbers[count++] = number.value_or(0.0);
+    }
+    if (count < 3 && good) return;
     if (!colour_) colour_ = attributes.add("colour", AttributeDomain::point, 3, false);
+    if (!good) return attributes.spoil_value(*colour_, "is no number");
     for (int i = 0; i < 3; ++i) attributes.set(*colour_, i, numbers[count - 3 + static_cast<std::size_t>(i)]);
   }
 
@@ -118,16 +117,26 @@ class ObjReader {
   void read_value(CornerList& list, int least) {
     skip_blanks();
     for (int i = 0; i < list.components; ++i, skip_blanks()) {
-      const bool missing = i >= least && (cursor_.at_line_end() || cursor_.peek() == '#');
-      list.values.push_back(missing ? 0.0f : cursor_.number<float>("a number"));
+      const bool missing = cursor_.at_line_end() || cursor_.peek() == '#';
+      const std::size_t start = cursor_.offset();
+      const std::optional<float> number = missing ? 0.0f : cursor_.number_if_any<float>();
+      if (!number || (missing && i < least))
+        spoil(list, start, "a " + std::string(list.what) + (missing ? " is incomplete" : " is no number"));
+      list.values.push_back(number.value_or(0.0f));
     }
     skip_continued_line();
+  }
+
+  void spoil(CornerList& list, std::size_t offset, const std::string& reason) {
+    if (list.spoiled.empty())
+      list.spoiled = "line " + std::to_string(cursor_.line_at(offset)) + ": " + reason;
   }
 
   void read_material() {
     AttributeBuilder& attributes = *builder_.attributes();
     skip_blanks();
     const std::string name(cursor_.rest_of_line());
+    if (name.ends_with('\\')) skip_continued_line();
     if (!material_attribute_)
       material_attribute_ = attributes.add("material", AttributeDomain::polygon, 1, true);
     const auto [entry, added] = material_numbers_.emplace(name, static_cast<int>(materials_.size()));
@@ -150,11 +159,9 @@ class ObjReader {
         read_corner_value(uvs_);
         read_corner_value(normals_);
       }
-      if (cursor_.peek() == '/') {
-        while (!is_space(cursor_.peek()) && cursor_.peek() != '\\' && !cursor_.at_end()) cursor_.advance();
-      } else if (!is_space(cursor_.peek()) && cursor_.peek() != '\\' && !cursor_.at_end()) {
-        cursor_.fail("a corner of a polygon is not a number");
-      }
+      if (cursor_.peek() == '/')
+        while (!cursor_.ends_word()) cursor_.advance();
+      if (!cursor_.ends_word()) cursor_.fail("a corner of a polygon is not a number");
     }
     cursor_.rest_of_line();
     builder_.add_polygon(corners_);
@@ -169,26 +176,32 @@ class ObjReader {
     list.corners.push_back(kNone);
     if (cursor_.peek() != '/') return;
     cursor_.advance();
-    if (cursor_.peek() == '/' || is_space(cursor_.peek()) || cursor_.at_end()) return;
-    const auto index = cursor_.leading_number<std::int64_t>(list.what);
-    if (index == 0 || index < -list.size()) fail_index(list, index);
-    list.corners.back() = index > 0 ? index - 1 : list.size() + index;
+    if (cursor_.peek() == '/' || cursor_.ends_word()) return;
     list.used = true;
+    const std::size_t start = cursor_.offset();
+    const std::optional<std::int64_t> index = cursor_.leading_number_if_any<std::int64_t>();
+    if (!index || *index == 0 || *index < -list.size())
+      return spoil(
+          list, start,
+          index ? wrong_index(list, *index) : "the number of a " + std::string(list.what) + " is no number");
+    list.corners.back() = *index > 0 ? *index - 1 : list.size() + *index;
   }
 
-  [[noreturn]] void fail_index(const CornerList& list, std::int64_t index) {
-    cursor_.fail("a polygon refers to " + std::string(list.what) + " " + std::to_string(index) +
-                 ", but the file has " + std::to_string(list.size()) + " and counts them from 1");
+  static std::string wrong_index(const CornerList& list, std::int64_t index) {
+    return "a polygon refers to " + std::string(list.what) + " " + std::to_string(index) +
+           ", but the file has " + std::to_string(list.size()) + " and counts them from 1";
   }
 
   void finish_attributes() {
     AttributeBuilder& attributes = *builder_.attributes();
     if (material_attribute_) attributes.set_labels(*material_attribute_, materials_);
     std::vector<std::pair<std::size_t, const CornerList*>> lists;
-    for (const CornerList* list : {&uvs_, &normals_})
-      if (list->used)
-        lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),
-                           list);
+    for (const CornerList* list : {&uvs_, &normals_}) {
+      if (!list->used) continue;
+      lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),
+                         list);
+      if (!list->spoiled.empty()) attributes.spoil(lists.back().first, list->spoiled);
+    }
     if (lists.empty()) return;
     for (std::size_t corner = 0; corner < uvs_.corners.size(); ++corner) {
       attributes.begin(AttributeDomain::corner);
@@ -200,14 +213,15 @@ class ObjReader {
   void set_corner(AttributeBuilder& attributes, std::size_t attribute, const CornerList& list,
                   std::int64_t index) {
     if (index == kNone) return;
-    if (index >= list.size()) fail_index(list, index + 1);
+    if (index >= list.size()) return attributes.spoil(attribute, wrong_index(list, index + 1));
     for (int i = 0; i < list.components; ++i)
       attributes.set(attribute, i, list.values[static_cast<std::size_t>(index * list.components + i)]);
   }
 
   TextCursor cursor_;
   MeshBuilder& builder_;
-  std::size_t total_;
+  std::string_view bytes_;
+  std::size_t left_out_ = 0;  ///< lines with other geometry than points and polygons
   std::vector<std::int64_t> corners_;
   // Attributes, where they are asked for.
   CornerList uvs_{"uv", "texture coordinate", 2}, normals_{"normal", "normal", 3};

@@ -1,6 +1,7 @@
 // PLY (Turk 1994): a header that declares elements and their properties, then the elements in that order.
 #include "algorithms/core/mesh_file_ply.h"
 
+#include <array>
 #include <bit>
 #include <map>
 
@@ -10,21 +11,44 @@ using namespace ply;
 
 namespace {
 
-/// Where the elements' values come from, when they are text. A float is rounded as the header declares it.
+/// Where the elements' values come from, when they are text: an element a line, whatever else the line may
+/// hold. A float is rounded as the header declares it.
 class AsciiValues {
  public:
   AsciiValues(std::string_view bytes, std::size_t start, const MeshBuilder& builder)
       : cursor_(bytes, builder.file(), start) {}
+  void begin_element() {
+    skip_comments();
+    wrapped_at_.reset();
+  }
+  /// Words behind the last value are passed over, unless the element began on an earlier line: then it cannot
+  /// be told whether they belong to it or to the next.
+  void end_element() {
+    cursor_.skip_blanks();
+    if (cursor_.at_line_end()) return cursor_.skip_line_end();
+    if (wrapped_at_) cursor_.fail_at(*wrapped_at_, "the line has fewer values than the header declares");
+    if (long_lines_++ == 0) first_long_line_ = cursor_.offset();
+    cursor_.rest_of_line();
+  }
   double real(Type type) {
-    cursor_.skip_space();
+    to_value();
     return type == Type::float32 ? cursor_.number<float>("a number") : cursor_.number<double>("a number");
   }
   std::int64_t integer(Type) {
-    cursor_.skip_space();
+    to_value();
     return cursor_.number<std::int64_t>("a whole number");
   }
+  /// Nothing where the value is not of its type.
+  std::optional<double> attribute(Type type) {
+    to_value();
+    if (cursor_.at_end()) fail_truncated();
+    if (type == Type::float32) return cursor_.number_if_any<float>();
+    if (type == Type::float64) return cursor_.number_if_any<double>();
+    const std::optional<std::int64_t> whole = cursor_.number_if_any<std::int64_t>();
+    return whole ? std::optional(static_cast<double>(*whole)) : std::nullopt;
+  }
   void skip(Type) {
-    cursor_.skip_space();
+    to_value();
     if (cursor_.at_end()) fail_truncated();
     cursor_.skip_word();
   }
@@ -32,15 +56,39 @@ class AsciiValues {
   bool has(std::uint64_t count, std::size_t values) const {
     return count == 0 || values == 0 || count <= (cursor_.remaining() + 1) / (2 * values);
   }
-  bool at_end() {
-    cursor_.skip_space();
-    return cursor_.at_end();
-  }
   std::size_t offset() const { return cursor_.offset(); }
+  /// @throws Error if more follows than padding.
+  void finish(std::string_view bytes, MeshBuilder& builder) {
+    skip_comments();
+    if (!cursor_.at_end())
+      cursor_.fail("the file holds more than its header declares; correct the counts or remove the rest");
+    if (long_lines_ > 0)
+      builder.note(std::to_string(long_lines_) +
+                   " lines hold more words than the header declares, the first is line " +
+                   std::to_string(cursor_.line_at(first_long_line_)) + "; the words behind were passed over");
+    builder.note_padding(bytes);
+  }
   [[noreturn]] void fail_truncated() const { cursor_.fail("the file is truncated: values are missing"); }
 
  private:
+  /// White space, and lines that begin as comments do in the header or in other formats.
+  void skip_comments() {
+    for (cursor_.skip_space(); cursor_.peek() == '#' || cursor_.peek() == 'c'; cursor_.skip_space()) {
+      if (cursor_.peek() == 'c' && TextCursor(cursor_).word() != "comment") return;
+      cursor_.rest_of_line();
+    }
+  }
+  /// Long lists may go on on the next line.
+  void to_value() {
+    cursor_.skip_blanks();
+    if (!cursor_.at_line_end()) return;
+    if (!wrapped_at_) wrapped_at_ = cursor_.offset();
+    cursor_.skip_space();
+  }
+
   TextCursor cursor_;
+  std::optional<std::size_t> wrapped_at_;  ///< where the first line of an element of several ends
+  std::size_t long_lines_ = 0, first_long_line_ = 0;
 };
 
 /// Where the elements' values come from, when they are binary.
@@ -49,6 +97,8 @@ class BinaryValues {
  public:
   BinaryValues(std::string_view bytes, std::size_t start, const MeshBuilder& builder)
       : bytes_(bytes), at_(start), builder_(builder) {}
+  void begin_element() {}
+  void end_element() {}
   double real(Type type) {
     if (type == Type::float32) return take<float, std::uint32_t>();
     if (type == Type::float64) return take<double, std::uint64_t>();
@@ -77,6 +127,9 @@ class BinaryValues {
       builder_.fail("an index is not a whole number");
     return static_cast<std::int64_t>(value);
   }
+  std::optional<double> attribute(Type type) {
+    return type >= Type::float32 ? real(type) : static_cast<double>(integer(type));
+  }
   void skip(Type type) {
     if (remaining() < size_of[static_cast<std::size_t>(type)]) fail_truncated();
     at_ += size_of[static_cast<std::size_t>(type)];
@@ -84,8 +137,14 @@ class BinaryValues {
   bool has(std::uint64_t count, std::size_t bytes) const {
     return bytes == 0 || count <= remaining() / bytes;
   }
-  bool at_end() const { return remaining() == 0; }
   std::size_t offset() const { return at_; }
+  void finish(std::string_view, MeshBuilder& builder) const {
+    const std::string_view rest = bytes_.substr(at_);
+    if (!without_padding(rest).empty())
+      builder.fail("it has " + std::to_string(rest.size()) +
+                   " bytes more than its header declares; the header or the data are damaged");
+    builder.note_padding(rest);
+  }
   [[noreturn]] void fail_truncated() const {
     builder_.fail("the file is truncated: it ends at byte " + std::to_string(bytes_.size()) +
                   ", but its header declares more");
@@ -115,20 +174,20 @@ template <class Values, bool with_attributes>
 class ElementReader {
  public:
   ElementReader(std::string_view bytes, const Header& header, MeshBuilder& builder)
-      : header_(header), values_(bytes, header.length, builder), builder_(builder), total_(bytes.size()) {}
+      : header_(header), values_(bytes, header.length, builder), builder_(builder), bytes_(bytes) {}
 
   void read() {
     for (const Element& element : header_.elements) {
       reserve(element);
       if (element.properties.empty()) continue;
       for (std::uint64_t i = 0; i < element.count; ++i) {
-        builder_.tick(values_.offset(), total_);
+        builder_.tick(values_.offset(), bytes_.size());
+        values_.begin_element();
         read_one(element);
+        values_.end_element();
       }
     }
-    if (!values_.at_end())
-      builder_.context().note(in_quotes(builder_.file()) +
-                              " holds more than its header declares; the rest was ignored");
+    values_.finish(bytes_, builder_);
   }
 
  private:
@@ -141,15 +200,14 @@ class ElementReader {
     }
     if (!values_.has(element.count, least))
       builder_.fail("the file is truncated: its header declares " + std::to_string(element.count) +
-                    " of element '" + std::string(element.name) + "', for which it is too short");
+                    " of element " + quoted_word(element.name) + ", for which it is too short");
     if (least == 0) return;
     if (AttributeBuilder* attributes = builder_.attributes()) {
       if (element.name == "vertex") attributes->reserve(AttributeDomain::point, element.count);
-      if (element.name == "face") attributes->reserve(AttributeDomain::polygon, element.count);
+      if (element.has_polygons) attributes->reserve(AttributeDomain::polygon, element.count);
     }
     if (element.name == "vertex") builder_.mesh.points.reserve(builder_.mesh.points.size() + element.count);
-    if (element.name == "face")
-      builder_.mesh.triangles.reserve(builder_.mesh.triangles.size() + element.count);
+    if (element.has_polygons) builder_.mesh.triangles.reserve(builder_.mesh.triangles.size() + element.count);
   }
 
   void read_one(const Element& element) {
@@ -161,36 +219,38 @@ class ElementReader {
       } else if (property.role == Role::ignored) {
         values_.skip(property.type);
       } else if (with_attributes && property.role == Role::value) {
-        builder_.attributes()->set(property.attribute, property.component, number(property) / property.unit);
+        if (const std::optional<double> value = values_.attribute(property.type))
+          builder_.attributes()->set(property.attribute, property.component, *value / property.unit);
+        else
+          builder_.attributes()->spoil_value(property.attribute,
+                                             "is not of the type that the header declares");
       } else {
         point[static_cast<int>(property.role) - static_cast<int>(Role::x)] = values_.real(property.type);
       }
     }
     if (element.name == "vertex") builder_.mesh.points.push_back(point);
-    if (with_attributes && element.name == "face") end_corners();
-  }
-
-  double number(const Property& property) {
-    return property.type >= Type::float32 ? values_.real(property.type)
-                                          : static_cast<double>(values_.integer(property.type));
+    if (with_attributes && element.has_polygons) end_corners();
   }
 
   void begin_attributes(const Element& element) {
     if (element.name == "vertex") builder_.attributes()->begin(AttributeDomain::point);
-    if (element.name == "face") builder_.attributes()->begin(AttributeDomain::polygon);
+    if (element.has_polygons) builder_.attributes()->begin(AttributeDomain::polygon);
     corners_.clear();
     for (auto& [property, values] : corner_values_) values.clear();
   }
 
   /// The lists of a polygon may stand before its corners, so they are looked at when all have been read.
   void end_corners() {
-    if (corner_values_.empty()) return;
-    for (const auto& [property, values] : corner_values_)
-      if (!values.empty() && values.size() != corners_.size() * static_cast<std::size_t>(property->component))
-        builder_.fail("the list " + in_quotes(property->name) + " of a polygon has " +
-                      std::to_string(values.size()) + " numbers, but the polygon has " +
-                      std::to_string(corners_.size()) + " corners and each takes " +
-                      std::to_string(property->component));
+    if (!header_.has_corner_values) return;
+    for (auto& [property, values] : corner_values_) {
+      if (values.empty() || values.size() == corners_.size() * static_cast<std::size_t>(property->component))
+        continue;
+      builder_.attributes()->spoil(property->attribute,
+                                   "the list of a polygon has " + std::to_string(values.size()) +
+                                       " numbers, but the polygon has " + std::to_string(corners_.size()) +
+                                       " corners and each takes " + std::to_string(property->component));
+      values.clear();
+    }
     for (std::size_t corner = 0; corner < corners_.size(); ++corner) {
       builder_.attributes()->begin(AttributeDomain::corner);
       for (const auto& [property, values] : corner_values_)
@@ -198,6 +258,24 @@ class ElementReader {
           builder_.attributes()->set(
               property->attribute, i,
               values[corner * static_cast<std::size_t>(property->component) + static_cast<std::size_t>(i)]);
+    }
+  }
+
+  /// The corners of each triangle are those two before and the next one; every other one is turned over. −1
+  /// ends a strip, and a triangle with the same corner twice only leads to the next one.
+  void add_strips() {
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (corners_[i] == -1 || corners_[i] == kUnsignedEndOfStrip) first = i + 1;
+      if (i < first + 2) continue;
+      std::array<std::int64_t, 3> corners = {corners_[i - 2], corners_[i - 1], corners_[i]};
+      if ((i - first) % 2 == 1) std::swap(corners[0], corners[1]);
+      if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
+      builder_.add_polygon(corners);
+      if (!with_attributes) continue;
+      builder_.attributes()->begin(AttributeDomain::polygon);
+      for (int corner = 0; header_.has_corner_values && corner < 3; ++corner)
+        builder_.attributes()->begin(AttributeDomain::corner);
     }
   }
 
@@ -212,30 +290,44 @@ class ElementReader {
       return;
     }
     if (with_attributes && property.role == Role::corner_values) {
-      std::vector<double>& values = corner_values_[&property];
-      for (std::int64_t i = 0; i < count; ++i) values.push_back(number(property));
+      read_corner_values(property, count);
       return;
     }
     corners_.resize(static_cast<std::size_t>(count));
     for (std::int64_t& corner : corners_) corner = values_.integer(property.type);
-    builder_.add_polygon(corners_);
+    if (property.role == Role::strips)
+      add_strips();
+    else
+      builder_.add_polygon(corners_);
   }
+
+  void read_corner_values(const Property& property, std::int64_t count) {
+    std::vector<double>& values = corner_values_[&property];
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::optional<double> value = values_.attribute(property.type);
+      if (!value)
+        builder_.attributes()->spoil(property.attribute, "a value in the list of a polygon is no number");
+      values.push_back(value.value_or(0.0));
+    }
+  }
+
+  static constexpr std::int64_t kUnsignedEndOfStrip = 0xffffffff;
 
   const Header& header_;
   Values values_;
   MeshBuilder& builder_;
-  std::size_t total_;
+  std::string_view bytes_;
   std::vector<std::int64_t> corners_;  ///< of the latest polygon
   std::map<const Property*, std::vector<double>> corner_values_;
 };
 
 void check_roles(const Header& header, const MeshBuilder& builder) {
-  std::array<bool, 7> found{};  // by role
+  std::array<bool, role_count> found{};
   for (const Element& element : header.elements)
     for (const Property& property : element.properties) found[static_cast<std::size_t>(property.role)] = true;
   for (const Role role : {Role::x, Role::y, Role::z})
     if (!found[static_cast<std::size_t>(role)]) builder.fail("its points lack a property x, y or z");
-  if (!found[static_cast<std::size_t>(Role::corners)])
+  if (!found[static_cast<std::size_t>(Role::corners)] && !found[static_cast<std::size_t>(Role::strips)])
     builder.fail("it holds no polygon: there is no element 'face' with a list 'vertex_indices'");
 }
 

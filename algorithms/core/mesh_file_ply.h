@@ -10,8 +10,10 @@ namespace hermesh::mesh_formats::ply {
 enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 constexpr std::array<std::size_t, 8> size_of = {1, 1, 2, 2, 4, 4, 4, 8};
 
-/// `value` is one number of an attribute, `corner_values` a list with those of a polygon's corners.
-enum class Role { ignored, x, y, z, corners, value, corner_values };
+/// `corners` are a list of those of a polygon, `strips` of triangle strips. `value` is one number of an attribute,
+/// `corner_values` a list with those of a polygon's corners.
+enum class Role { ignored, x, y, z, corners, strips, value, corner_values };
+constexpr std::size_t role_count = 8;
 
 struct Property {
   std::string_view name;
@@ -27,7 +29,8 @@ struct Property {
 struct Element {
   std::string_view name;
   std::uint64_t count;
-  std::vector<Property> properties;
+  std::vector<Property> properties = {};
+  bool has_polygons = false;  ///< a property with the role `corners`
 };
 
 enum class Encoding { ascii, little_endian, big_endian };
@@ -36,6 +39,7 @@ struct Header {
   Encoding encoding = Encoding::ascii;
   std::vector<Element> elements;
   std::size_t length = 0;  ///< bytes, up to the first element
+  bool has_corner_values = false;
 };
 
 /// Takes over comments and, where the builder has attributes, gives each its place. @throws Error

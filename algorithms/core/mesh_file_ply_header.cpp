@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "algorithms/core/mesh_file_ply.h"
 
@@ -77,13 +78,16 @@ void find_values(Element& element, AttributeDomain domain, AttributeBuilder& att
              1.0);
 }
 
-void find_corner_values(Element& element, AttributeBuilder& attributes) {
+/// Whether there are any.
+bool find_corner_values(Element& element, AttributeBuilder& attributes) {
   for (Property& property : element.properties)
     if (property.list_count && (property.name == "texcoord" || property.name == "texture_uv")) {
       property.role = Role::corner_values;
       property.component = 2;
       property.attribute = attributes.add("uv", AttributeDomain::corner, property.component, false);
+      return true;
     }
+  return false;
 }
 
 /// Names first go to points, then to polygons, then to corners.
@@ -91,19 +95,21 @@ void find_attributes(Header& header, AttributeBuilder& attributes) {
   for (Element& element : header.elements)
     if (element.name == "vertex") find_values(element, AttributeDomain::point, attributes);
   for (Element& element : header.elements)
-    if (element.name == "face") {
+    if (element.has_polygons) {
       find_values(element, AttributeDomain::polygon, attributes);
-      find_corner_values(element, attributes);
+      if (find_corner_values(element, attributes)) header.has_corner_values = true;
     }
 }
 
 class HeaderParser {
  public:
   HeaderParser(std::string_view bytes, MeshBuilder& builder) : bytes_(bytes), builder_(builder) {
-    // Lines end in "\n", "\r\n" or, on old Macs, "\r"; the first line tells which. Binary data may follow, so
-    // a lone
-    // "\r" must not swallow a first data byte that happens to be "\n".
-    line_end_ = bytes.starts_with("ply\r\n") ? "\r\n" : bytes.starts_with("ply\r") ? "\r" : "\n";
+    position_ = bytes.size() - without_byte_order_mark(bytes).size();
+    // Lines end in "\n", "\r\n" or, on old Macs, "\r"; the first line tells whether in the last. Binary data
+    // may follow, so a lone "\r" must not swallow a first data byte that happens to be "\n".
+    const std::size_t end = bytes.find_first_of("\r\n", position_);
+    line_end_ =
+        end != std::string_view::npos && bytes[end] == '\r' && bytes.substr(end + 1, 1) != "\n" ? '\r' : '\n';
   }
 
   Header parse() {
@@ -123,9 +129,10 @@ class HeaderParser {
       } else if (keyword == "property") {
         add_property();
       } else if (keyword != "obj_info" && !keyword.empty()) {
-        fail(in_quotes(std::string(keyword.substr(0, 40))) + " is no keyword of a PLY header");
+        pass_over(keyword);
       }
     }
+    note_unknown();
     if (!format_known) fail("the header has no line 'format'");
     header_.length = position_;
     if (builder_.attributes()) find_attributes(header_, *builder_.attributes());
@@ -137,7 +144,7 @@ class HeaderParser {
     const std::size_t end = bytes_.find(line_end_, position_);
     if (end == std::string_view::npos) builder_.fail("the file is truncated: its PLY header has no end");
     line_ = bytes_.substr(position_, end - position_);
-    position_ = end + line_end_.size();
+    position_ = end + 1;
     ++line_number_;
   }
   std::string_view next_word() {
@@ -151,16 +158,36 @@ class HeaderParser {
     if (word == "ascii") return Encoding::ascii;
     if (word == "binary_little_endian") return Encoding::little_endian;
     if (word == "binary_big_endian") return Encoding::big_endian;
-    fail(in_quotes(std::string(word)) + " is no PLY format");
+    fail(quoted_word(word) + " is no PLY format");
   }
-  Type type(std::string_view word) {
+  static std::optional<Type> known_type(std::string_view word) {
     for (std::size_t i = 0; i < type_names.size(); ++i)
       if (word == type_names[i][0] || word == type_names[i][1]) return static_cast<Type>(i);
-    fail(in_quotes(std::string(word.substr(0, 40))) + " is no type of a PLY property");
+    return std::nullopt;
+  }
+  Type type(std::string_view word) {
+    if (const std::optional<Type> known = known_type(word)) return *known;
+    fail(quoted_word(word) + " is no type of a PLY property");
+  }
+  /// Some programs forget the word "comment". A line that is built like a declaration may be one whose
+  /// keyword is damaged; without it, all values would be taken for others.
+  void pass_over(std::string_view keyword) {
+    const std::string_view second = next_word(), third = next_word();
+    const bool like_element = next_word().empty() && !third.empty() &&
+                              third.find_first_not_of("0123456789") == std::string_view::npos;
+    if (like_element || second == "list" || known_type(second))
+      fail(quoted_word(keyword) + " is no keyword of a PLY header");
+    if (unknown_++ == 0) first_unknown_ = line_number_;
+  }
+  void note_unknown() {
+    if (unknown_ > 0)
+      builder_.note(std::to_string(unknown_) +
+                    " lines of its header that are no declaration were passed over, the first is line " +
+                    std::to_string(first_unknown_));
   }
   void add_element() {
     const std::string_view name = next_word(), count = next_word();
-    Element element{name, 0, {}};
+    Element element{name, 0};
     const auto [stop, status] = std::from_chars(count.begin(), count.end(), element.count);
     if (status != std::errc() || stop != count.end()) fail("the count of an element is not a number");
     header_.elements.push_back(std::move(element));
@@ -177,26 +204,36 @@ class HeaderParser {
     }
     property.type = type(word);
     property.name = next_word();
-    property.role = role(header_.elements.back().name, property);
+    property.role = role(header_.elements.back(), property);
+    header_.elements.back().has_polygons |= property.role == Role::corners;
     header_.elements.back().properties.push_back(property);
   }
-  static Role role(std::string_view element, const Property& property) {
+  static Role role_by_name(std::string_view element, const Property& property) {
     const bool list = property.list_count.has_value();
+    const bool indices = list && (property.name == "vertex_indices" || property.name == "vertex_index");
     if (element == "vertex" && !list && property.name == "x") return Role::x;
     if (element == "vertex" && !list && property.name == "y") return Role::y;
     if (element == "vertex" && !list && property.name == "z") return Role::z;
-    if (element == "face" && list && (property.name == "vertex_indices" || property.name == "vertex_index"))
-      return Role::corners;
+    if (element == "face" && indices) return Role::corners;
+    if (element == "tristrips" && indices) return Role::strips;
     return Role::ignored;
+  }
+  /// An element has each role once: a polygon cannot have two lists of corners.
+  static Role role(const Element& element, const Property& property) {
+    const Role found = role_by_name(element.name, property);
+    return std::ranges::find(element.properties, found, &Property::role) == element.properties.end()
+               ? found
+               : Role::ignored;
   }
   [[noreturn]] void fail(const std::string& what) {
     throw Error(in_quotes(builder_.file()) + ", line " + std::to_string(line_number_) + ": " + what);
   }
 
-  std::string_view bytes_, line_, line_end_;
+  std::string_view bytes_, line_;
+  char line_end_;
   MeshBuilder& builder_;
   Header header_;
-  std::size_t position_ = 0, line_number_ = 0;
+  std::size_t position_ = 0, line_number_ = 0, unknown_ = 0, first_unknown_ = 0;
 };
 
 }  // namespace
@@ -206,3 +243,10 @@ Header parse_header(std::string_view bytes, MeshBuilder& builder) {
 }
 
 }  // namespace hermesh::mesh_formats::ply
+
+bool hermesh::mesh_formats::begins_like_ply(std::string_view bytes) {
+  bytes = without_byte_order_mark(bytes);
+  if (!bytes.starts_with("ply")) return false;
+  const std::size_t end = bytes.find_first_not_of(" \t", 3);
+  return end != std::string_view::npos && is_line_end(bytes[end]);
+}

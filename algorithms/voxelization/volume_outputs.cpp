@@ -83,6 +83,19 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   return grid;
 }
 
+openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
+                                         const std::vector<std::uint32_t>& numbers, RunContext& context) {
+  if (numbers.empty()) return nearest;
+  const openvdb::Int32Grid::Ptr grid = nearest->deepCopy();
+  std::vector<openvdb::Int32Tree::LeafNodeType*> leaves;
+  grid->tree().getNodes(leaves);
+  parallel_blocks(leaves.size(), context, [&](std::size_t i) {
+    for (auto value = leaves[i]->beginValueOn(); value; ++value)
+      if (*value >= 0) value.setValue(std::int32_t(numbers[std::size_t(*value)]));
+  });
+  return grid;
+}
+
 FloatHermite make_hermite(const openvdb::FloatGrid::Ptr& sdf, const PolygonMesh& mesh, RunContext& context) {
   return sample_polygons(make_level_set(sdf), 0.0, mesh, context);
 }
@@ -191,7 +204,7 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
   outputs.active_voxels = made.distance->activeVoxelCount();
   if (request.sdf || (request.udf && !made.is_signed)) outputs.grids.push_back(made.distance);
   if (request.udf && made.is_signed) outputs.grids.push_back(make_udf(*made.distance, context));
-  if (request.triangle_id) outputs.grids.push_back(made.nearest);
+  if (request.triangle_id) outputs.grids.push_back(make_triangle_id(made.nearest, request.triangle_numbers, context));
   if (request.closest_point || !attributes.empty())
     for (const auto& grid : transfer_from_surface(mesh, *made.nearest, options.voxel_size,
                                                   {request.closest_point, attributes}, context))

@@ -18,13 +18,16 @@ namespace hermesh {
 struct VolumeRequest {
   bool sdf = false;             ///< "sdf", or "udf" where there are no signs
   bool udf = false;             ///< "udf": distance without sign
-  bool triangle_id = false;     ///< "triangle-id": number of the nearest triangle
+  bool triangle_id = false;     ///< "triangle-id": number of the nearest triangle, see below
   bool closest_point = false;   ///< "closest-point", see surface_transfer.h
   bool fog = false;             ///< "fog": 1 inside, a ramp over the band, 0 outside
   bool fog_exterior = false;    ///< the ramp lies over both bands, not the interior one alone (§5.6)
   bool hermite = false;         ///< exact edge hits with the polygons' normals; brings "sdf" along
   bool all_attributes = false;  ///< see surface_transfer.h
   std::vector<std::string> attributes = {};  ///< names of single ones
+  /// What "triangle-id" calls each of triangulated()'s triangles, such as MeshFile::triangle_numbers; empty where that is
+  /// its place there.
+  std::vector<std::uint32_t> triangle_numbers = {};
 
   /// Whether a mesh must be read with its attributes.
   bool any_attributes() const { return all_attributes || !attributes.empty(); }
@@ -37,7 +40,8 @@ VolumeRequest parse_volume_request(const std::string& list);
 
 struct VolumeOutputs {
   /// Standard types only, each with the voxel size and the mesh's origin as transform: float "sdf" (level
-  /// set), "udf" and "fog" (fog volume, background 0, active where above 0), int32 "triangle-id", vec3d
+  /// set), "udf" and "fog" (fog volume, background 0, active where above 0), int32 "triangle-id" (−1 where only the
+  /// cap of a hole is near), vec3d
   /// "closest-point", attributes.
   std::vector<openvdb::GridBase::Ptr> grids;
   std::optional<FloatHermite> hermite;

@@ -143,7 +143,13 @@ TEST_F(VoxelizeTest, WhatTheMeshDoesNotHave) {
 TEST_F(VoxelizeTest, BadAttributesMatterOnlyWhereTheyAreAskedFor) {
   write("nan.obj",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 nan\nf 1//1 3//1 2//1\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
-  expect_refusal(1, {"--grids", "sdf,attributes"}, {"nan.obj", "normal", "finite"}, "nan.obj");
+  expect_refusal(1, {"--grids", "sdf,attribute:normal"}, {"nan.obj", "normal", "finite"}, "nan.obj");
+  for (const char* asked : {"udf,attributes", "attributes"}) {
+    const Outcome outcome = voxelize("nan.obj", {"--grids", asked});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("'normal' was left out"), std::string::npos) << outcome.err;
+    EXPECT_EQ(grids("out.vdb"), std::vector<std::string>{asked[0] == 'u' ? "udf" : "sdf"});
+  }
   EXPECT_EQ(voxelize("nan.obj", {}).exit_code, 0);
 }
 

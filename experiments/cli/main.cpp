@@ -16,8 +16,8 @@ namespace hermesh::cli {
 namespace {
 
 int fail(int exit_code, std::string sentence) {
-  // Messages of libraries may hold line breaks; scripts rely on one line.
-  std::replace(sentence.begin(), sentence.end(), '\n', ' ');
+  // Messages of libraries may hold line breaks, and names of files anything that a terminal obeys; scripts rely on one line.
+  std::ranges::replace_if(sentence, [](char c) { return (c >= '\0' && c < ' ') || c == '\x7f'; }, ' ');
   std::cerr << "hermesh: " << sentence << std::endl;
   return exit_code;
 }

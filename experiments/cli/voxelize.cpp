@@ -7,6 +7,7 @@
 #include "algorithms/core/vdb_file.h"
 #include "algorithms/voxelization/grid_frame.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
+#include "algorithms/voxelization/quad_diagonals.h"
 #include "algorithms/voxelization/volume_outputs.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"
@@ -51,11 +52,35 @@ std::string names_of(const std::vector<openvdb::GridBase::Ptr>& grids) {
   return names;
 }
 
+/// "attributes" asks for what there is, so that attributes that cannot be read stop nothing.
+void drop_unreadable(VolumeRequest& request, const std::string& file, Session& session) {
+  request.all_attributes = false;
+  const bool nothing_else = !request.sdf && !request.udf && !request.triangle_id && !request.closest_point &&
+                            !request.fog && !request.hermite && !request.any_attributes();
+  if (!nothing_else) return;
+  request.sdf = true;
+  session.context.note("'" + file + "' has no attribute that can be read, so the volume is its sdf");
+}
+
+/// With what the request needs to know of the file.
+PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& session) {
+  MeshFile file = read_mesh_file(path, session.context,
+                                 {.attributes = request.any_attributes(),
+                                  .required = request.attributes,
+                                  .triangle_numbers = request.triangle_id});
+  if (request.all_attributes && file.attributes.empty() && file.attributes_left_out)
+    drop_unreadable(request, path, session);
+  request.triangle_numbers = std::move(file.triangle_numbers);
+  PolygonMesh mesh = about_file(path, [&] { return to_polygon_mesh(std::move(file)); });
+  choose_diagonals(mesh);
+  return mesh;
+}
+
 /// By the voxelizer that knows which triangle is nearest.
-void write_outputs(const Arguments& arguments, const VolumeRequest& request, const ChosenVoxelizer& chosen,
+void write_outputs(const Arguments& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
                    Session& session) {
   const Paths& paths = arguments.paths;
-  PolygonMesh mesh = read_polygons(paths.in, session, {.attributes = request.any_attributes()});
+  PolygonMesh mesh = read_for(request, paths.in, session);
   VoxelizeArguments voxelizing = arguments.voxelizing;
   GridFrame frame;
   std::array<int, 3> first{};
