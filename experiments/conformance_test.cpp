@@ -8,12 +8,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <iostream>
 #include <map>
 #include <ostream>
 #include <random>
 
+#include "algorithms/core/blocks.h"
 #include "algorithms/variants.h"
 #include "experiments/test_volumes.h"
 #include "validation/mesh_report.h"
@@ -98,6 +101,64 @@ class Conformance : public testing::TestWithParam<Extractor> {
     expect_on(volume(smaller), isovalue);
   }
 };
+
+/// Extracts in a process of its own. Ends with 0, or with 1 after a sentence, so that whoever starts it can tell both
+/// from a signal.
+[[noreturn]] void extract_and_exit(const Extractor& extractor, const LevelSet& volume) {
+  try {
+    extract(extractor, volume);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << std::endl;
+    std::_Exit(1);
+  }
+  std::_Exit(0);
+}
+
+/// Volumes in which every kind of block has a neighbour that is not there.
+std::vector<LevelSet> volumes_with_open_ends() {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  const auto noise = [&](int, int, int) { return value(random); };
+  return {patterns(
+              7, 2, [](int i) { return static_cast<std::uint32_t>(i % 256); }, 1),
+          make_volume({17, 9, 16}, 1.0f, noise), make_volume({16, 17, 9}, -1.0f, noise),
+          make_volume({8, 8, 8}, 1.0f, [](int x, int y, int z) { return x * y * z == 343 ? -1.0f : 1.0f; })};
+}
+
+/// How a variant fares that looks up samples in all directions without asking whether there is a block.
+Extractor careless_extractor() {
+  Extractor careless = find_variant(our_extractors(), "marching-cubes");
+  careless.name = "careless";
+  careless.extract = [](const ExtractionInput& input) {
+    const BlockGrid grid(input.level_set, input.isovalue, input.context);
+    PolygonMesh mesh;
+    for (std::size_t b = 0; b < grid.blocks().size(); ++b) {
+      const auto far = grid.locate(static_cast<std::int32_t>(b), 8, 8, 8);
+      mesh.points.emplace_back(float(grid.signed_value(grid.blocks()[std::size_t(far.block)], far.sample)), 0, 0);
+    }
+    return mesh;
+  };
+  return careless;
+}
+
+void expect_no_signal(const Extractor& extractor) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  int number = 0;
+  for (const LevelSet& volume : volumes_with_open_ends()) {
+    EXPECT_EXIT(extract_and_exit(extractor, volume), testing::ExitedWithCode(0), "")
+        << "the extractor " << extractor.name << " does not get through volume " << number
+        << "; it may read where the grid has no block (BlockGrid::locate)";
+    ++number;
+  }
+}
+
+TEST(Carelessness, IsToldInASentenceAndNotByASignal) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  EXPECT_EXIT(extract_and_exit(careless_extractor(), volumes_with_open_ends()[1]), testing::ExitedWithCode(1),
+              "the grid has no block");
+}
+
+TEST_P(Conformance, EndsWithoutASignal) { expect_no_signal(extractor()); }
 
 TEST_P(Conformance, All256PatternsOfACell) {
   expect_on(patterns(

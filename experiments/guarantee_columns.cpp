@@ -1,9 +1,14 @@
 #include "experiments/guarantee_columns.h"
 
+#include <algorithm>
+#include <iterator>
+
+#include "experiments/solid_columns.h"
+
 namespace hermesh {
 
 std::vector<MeasuredColumn> guarantee_mesh_columns() {
-  return {
+  std::vector<MeasuredColumn> columns = {
       {"resolution", "res.", "voxels along the longest side"},
       {"extractor", "extractor", "adaptive-dual-contouring with threshold 0.1, openvdb with adaptivity 0.1"},
       {"tolerance", "tol. [vx]", "0 gives the uniform mesh"},
@@ -28,6 +33,8 @@ std::vector<MeasuredColumn> guarantee_mesh_columns() {
       {"fanned_edges", "fanned", "crossing edges that became four triangles or more"},
       {"escaped", "escaped", "points outside their cells"},
       {"digest", "digest", "of the mesh's arrays: the first 16 digits of their SHA-256"}};
+  std::ranges::copy(solid_columns(), std::back_inserter(columns));
+  return columns;
 }
 
 std::vector<MeasuredColumn> guarantee_overview_columns() {

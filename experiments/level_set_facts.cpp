@@ -7,6 +7,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
+#include "validation/solid_comparison.h"
 #include "validation/topology.h"
 
 namespace hermesh {
@@ -72,6 +73,14 @@ std::int64_t count_surface_components(const LevelSet& level_set, RunContext& con
   validation::MeshReport report;
   validation::count_topology(to_mesh_file(mesh), report, context);
   return report.components;
+}
+
+std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set, const PolygonMesh& source,
+                                                           RunContext& context) {
+  const PolygonMesh mesh = marching_cubes(level_set, 0.0, nullptr, context);
+  if (mesh.empty()) return std::nullopt;
+  return validation::compare_solids(to_mesh_file(mesh), to_mesh_file(source), {.voxel_size = level_set.voxel_size()},
+                                    context);
 }
 
 }  // namespace hermesh

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "algorithms/core/level_set.h"
+#include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh {
 
@@ -14,5 +17,10 @@ std::uint64_t fingerprint(const LevelSet& level_set);
 
 /// Connected components of the zero set, polygonised by marching cubes; 0 where it is empty.
 std::int64_t count_surface_components(const LevelSet& level_set, RunContext& context);
+
+/// The solid within the zero set, polygonised by marching cubes, beside that of the polygons it was made from; nothing
+/// where it is empty.
+std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set, const PolygonMesh& source,
+                                                           RunContext& context);
 
 }  // namespace hermesh

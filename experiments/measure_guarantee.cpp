@@ -25,8 +25,10 @@
 #include "experiments/measurements.h"
 #include "experiments/run_cells.h"
 #include "experiments/sha256.h"
+#include "experiments/solid_columns.h"
 #include "experiments/test_volumes.h"
 #include "validation/mesh_report.h"
+#include "validation/solid_comparison.h"
 
 namespace hermesh {
 namespace {
@@ -36,6 +38,9 @@ constexpr const char* kGuaranteed = "manifold-dual-contouring";
 /// What the bound may be exceeded by, in voxels: the slack of the extractor's own proof, and the gap of the
 /// judge's.
 constexpr double kSlack = 0.01, kGap = 0.001;
+
+/// Enough for a hundredth of a solid; there are thousands of meshes.
+constexpr std::int64_t kSolidSamples = 20'000;
 
 /// Single precision in the file moves points by less than this, in voxels.
 constexpr double kRounding = 1e-4;
@@ -277,6 +282,7 @@ class SubjectMeasurement {
     if (!input_.parameters.is("largest_cube", "8"))
       subject.label += ", cubes of " + input_.parameters.text("largest_cube");
     if (input_.parameters.is("representation", "sparse")) subject.label += ", packed";
+    source_ = subject.source ? std::optional(to_mesh_file(*subject.source)) : std::nullopt;
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
@@ -293,6 +299,7 @@ class SubjectMeasurement {
       for (const Contender& other : others())
         overview.add_other(other.name, add_row(subject, other, std::nullopt).values);
     rows.push_back(overview.row(judged_));
+    source_.reset();
     reference_ = {};  // of hundreds of subjects it would be gigabytes
   }
 
@@ -340,7 +347,8 @@ class SubjectMeasurement {
   void judge(Json& values, MeshFile written, const Subject& subject, std::optional<double> tolerance,
              RunContext& context) {
     // The distances over samples, which come along with the certificate, are not wanted.
-    validation::JudgeOptions options = {.self_intersections = true, .libraries = false, .samples = 1};
+    validation::JudgeOptions options = {
+        .self_intersections = true, .libraries = false, .samples = 1, .solid_samples = 0};
     if (tolerance.value_or(0.0) > 0 && subject.certify && !written.points.empty() &&
         !reference_.points.empty()) {
       options.reference = &reference_;
@@ -349,6 +357,7 @@ class SubjectMeasurement {
     }
     const validation::MeshReport report = validation::judge(written, options, context);
     set_counts(values, report);
+    if (source_) compare_with_source(values, written, subject, context);
     if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
       values["to_upper"] = to->upper / subject.voxel_size;
@@ -362,6 +371,12 @@ class SubjectMeasurement {
                         report.euler_characteristic == reference_report_->euler_characteristic;
       values["same_topology"] = same ? "yes" : "no";
     }
+  }
+
+  /// The promise is about the level set; whether that has the solid of the polygons is a figure.
+  void compare_with_source(Json& values, const MeshFile& written, const Subject& subject, RunContext& context) const {
+    set_solid(values, validation::compare_solids(
+                          written, *source_, {.samples = kSolidSamples, .voxel_size = subject.voxel_size}, context));
   }
 
   void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
@@ -384,6 +399,7 @@ class SubjectMeasurement {
   const MeasurementInput& input_;
   const std::vector<double> tolerances_;
   const bool judged_;
+  std::optional<MeshFile> source_;  ///< the polygons of a model
   MeshFile reference_;  ///< the subject's uniform mesh
   std::optional<validation::MeshReport> reference_report_;
 };

@@ -167,6 +167,7 @@ class Group {
     options.self_intersections = in_.tier.self_intersections;
     options.reference = &source_;
     options.samples = in_.tier.samples;
+    options.voxel_size = voxel_size_;
     if (in_.experiment.features) {
       options.features = &source_;
       options.dihedral_degrees = *in_.experiment.features;

@@ -10,6 +10,7 @@
 #include "experiments/level_set_facts.h"
 #include "experiments/provenance.h"
 #include "reference/level_set_judge.h"
+#include "validation/report_json.h"
 
 namespace hermesh {
 namespace {
@@ -186,7 +187,12 @@ class Group {
     if (!cell.timing->warm) cell.timing->cpu_seconds = {first.cpu_seconds};
     cell.row["notes"] = first.notes;
     describe(cell, first.level_set);
-    if (truths) truths->judge(first.level_set, cell.row, context_);
+    if (truths) {
+      truths->judge(first.level_set, cell.row, context_);
+      RunContext child = child_context(context_, true);
+      if (const auto solid = compare_surface(first.level_set, in_.input.mesh, child))
+        cell.row["report"]["solid"] = validation::to_json(*solid);
+    }
     if (in_.tier.components) {
       RunContext child = child_context(context_, true);
       cell.row["surface_components"] = count_surface_components(first.level_set, child);

@@ -12,7 +12,7 @@
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
-#include "reference/grid_frame.h"
+#include "reference/meshing_frame.h"
 #include "reference/isosurface_seeds.h"
 
 namespace hermesh {
@@ -62,7 +62,7 @@ using Oracle = CGAL::Surface_mesher::Implicit_surface_oracle_3<
 /// The trilinear interpolation of a grid at points relative to the frame's origin.
 class Field {
  public:
-  Field(const openvdb::FloatGrid& grid, const GridFrame& frame, double isovalue, const RunContext& context)
+  Field(const openvdb::FloatGrid& grid, const MeshingFrame& frame, double isovalue, const RunContext& context)
       : values_(grid.getConstAccessor()),
         transform_(frame.transform),
         isovalue_(isovalue),
@@ -124,7 +124,7 @@ class QuietCgal {
   CGAL::Failure_function previous_;
 };
 
-Kernel::Sphere_3 bounding_sphere(const openvdb::FloatGrid& grid, const GridFrame& frame) {
+Kernel::Sphere_3 bounding_sphere(const openvdb::FloatGrid& grid, const MeshingFrame& frame) {
   openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
   box.expand(2);
   const openvdb::BBoxd world = frame.transform->indexToWorld(box);
@@ -132,7 +132,7 @@ Kernel::Sphere_3 bounding_sphere(const openvdb::FloatGrid& grid, const GridFrame
   return {Point(centre.x(), centre.y(), centre.z()), 0.26 * world.extents().lengthSqr()};
 }
 
-void insert_seeds(Triangulation& triangulation, const openvdb::FloatGrid& grid, const GridFrame& frame,
+void insert_seeds(Triangulation& triangulation, const openvdb::FloatGrid& grid, const MeshingFrame& frame,
                   const ExtractionInput& input) {
   std::vector<Point> points;
   const int spacing = std::max(1, int(input.options.number("seed_spacing")));
@@ -196,7 +196,7 @@ PolygonMesh to_mesh(const Complex& complex, Field& field) {
 PolygonMesh cgal_surface_mesher(const ExtractionInput& input) {
   const Stage stage(input.context, "extraction");
   const openvdb::FloatGrid& grid = *input.level_set.grid().grid;
-  const GridFrame frame = grid_frame(grid, input.isovalue);
+  const MeshingFrame frame = meshing_frame(grid, input.isovalue);
   PolygonMesh mesh;
   if (grid.tree().activeVoxelCount() == 0) return mesh;
 

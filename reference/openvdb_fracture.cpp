@@ -9,7 +9,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/stopwatch.h"
-#include "reference/grid_frame.h"
+#include "reference/meshing_frame.h"
 #include "reference/openvdb_mesh_to_volume.h"
 
 namespace hermesh {
@@ -17,7 +17,7 @@ namespace {
 
 using openvdb::FloatGrid;
 
-PolygonMesh mesh_of(const FloatGrid& fragment, const FloatGrid& reference, const GridFrame& frame,
+PolygonMesh mesh_of(const FloatGrid& fragment, const FloatGrid& reference, const MeshingFrame& frame,
                     double adaptivity) {
   // Both with the transform without the origin, so that points keep their precision.
   const auto moved = [&](const FloatGrid& grid) {
@@ -62,7 +62,7 @@ void openvdb_fracture(const LevelSet& object, std::size_t cutters, const Openvdb
   const FloatGrid& whole = *object.grid().grid;
   if (!whole.transform().isLinear() || !whole.transform().hasUniformScale())
     throw Error("OpenVDB's fracture needs an object whose voxels are cubes");
-  const GridFrame frame = grid_frame(whole, 0.0);
+  const MeshingFrame frame = meshing_frame(whole, 0.0);
   const openvdb::Vec3d corner = whole.transform().indexToWorld(openvdb::Vec3d(0.0));
   // Made aside, because a fragment takes its transform with it.
   std::list<FloatGrid::Ptr> rest{whole.deepCopy()};

@@ -3,14 +3,14 @@
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include "algorithms/core/level_set_grid.h"
-#include "reference/grid_frame.h"
+#include "reference/meshing_frame.h"
 
 namespace hermesh {
 
 PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   const Stage stage(input.context, "extraction");
   const openvdb::FloatGrid& grid = *input.level_set.grid().grid;
-  const GridFrame frame = grid_frame(grid, input.isovalue);
+  const MeshingFrame frame = meshing_frame(grid, input.isovalue);
 
   // OpenVDB takes the inside of a level set to be below the isovalue and that of any other grid to be above
   // it, so the copy, which shares the tree with the original, says what the inside is.

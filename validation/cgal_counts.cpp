@@ -39,29 +39,40 @@ std::vector<Kernel::Point_3> shifted_points(const MeshFile& file, const Eigen::V
 }
 
 // CGAL's test of a soup says no without a place. Adding polygon after polygon finds one.
-std::string refusal_with_place(const MeshFile& file) {
+std::string refusal_with_place(const MeshFile& file, double unit) {
   Mesh mesh;
   for (std::size_t p = 0; p < file.points.size(); ++p) mesh.add_vertex(Kernel::Point_3(0, 0, 0));
   std::vector<Mesh::Vertex_index> vertices;
   for (std::int64_t p = 0; p < polygon_count(file); ++p) {
     const PolygonCorners corners = polygon_corners(file, p);
     if (repeats_corner(corners))
-      return "CGAL does not take the polygons for a surface mesh: " + describe_polygon(file, p) +
+      return "CGAL does not take the polygons for a surface mesh: " + describe_polygon(file, p, unit) +
              " has one point at two corners.";
     vertices.clear();
     for (int k = 0; k < corners.count; ++k) vertices.emplace_back(corners.points[k]);
     if (mesh.add_face(vertices) == Mesh::null_face())
       return "CGAL does not take the polygons for a surface mesh: an edge or a point of " +
-             describe_polygon(file, p) + " is used up by the polygons before it.";
+             describe_polygon(file, p, unit) + " is used up by the polygons before it.";
   }
   std::vector<Mesh::Halfedge_index> singular;
   PMP::non_manifold_vertices(mesh, std::back_inserter(singular));
   if (singular.empty()) return "CGAL does not take the polygons for a surface mesh.";
   return "CGAL finds more than one fan of polygons at the point " +
-         describe_point(file.points[std::size_t(target(singular.front(), mesh))]) + ".";
+         describe_point(unit * file.points[std::size_t(target(singular.front(), mesh))]) + ".";
 }
 
-LibraryFindings count(Mesh& mesh) {
+// A halfedge of a polygon that ends where the fan starts that cuts it: anywhere in a triangle.
+Mesh::Halfedge_index fan_start(const Mesh& mesh, const MeshFile& file, Mesh::Face_index f) {
+  const std::size_t polygon = std::size_t(f);
+  const auto first = mesh.halfedge(f);
+  if (polygon < file.triangles.size()) return first;
+  const Quad quad = cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given);
+  for (const auto h : CGAL::halfedges_around_face(first, mesh))
+    if (std::size_t(mesh.target(h)) == quad[0]) return h;
+  return first;
+}
+
+LibraryFindings count(Mesh& mesh, const MeshFile& file) {
   LibraryFindings findings;
   findings.polygons = std::int64_t(mesh.number_of_faces());
   for (const auto e : mesh.edges()) findings.boundary_edges += mesh.is_border(e);
@@ -72,7 +83,7 @@ LibraryFindings count(Mesh& mesh) {
   findings.components = std::int64_t(PMP::connected_components(mesh, component));
   const Kernel::Point_3 centre(0, 0, 0);
   for (const auto f : mesh.faces()) {
-    const auto first = mesh.halfedge(f);
+    const auto first = fan_start(mesh, file, f);
     const Kernel::Point_3& a = mesh.point(mesh.target(first));
     for (auto h = mesh.next(first); mesh.next(h) != first; h = mesh.next(h)) {
       const Kernel::Point_3 &b = mesh.point(mesh.target(h)), &c = mesh.point(mesh.target(mesh.next(h)));
@@ -85,17 +96,17 @@ LibraryFindings count(Mesh& mesh) {
 
 }  // namespace
 
-LibraryCounts count_with_cgal(const MeshFile& file, const MeshReport& ours, RunContext& context) {
+LibraryCounts count_with_cgal(const MeshFile& file, const MeshReport& ours, RunContext& context, double unit) {
   const std::vector<Polygon> soup = polygon_soup(file);
   if (!PMP::is_polygon_soup_a_polygon_mesh(soup)) {
     context.check();
-    return library_refused(kName, refusal_with_place(file), file, ours);
+    return library_refused(kName, refusal_with_place(file, unit), file, ours);
   }
   context.check();
   Mesh mesh;
   PMP::polygon_soup_to_polygon_mesh(shifted_points(file, box_of(file).centre()), soup, mesh);
   context.check();
-  return library_loaded(kName, count(mesh), file, ours);
+  return library_loaded(kName, count(mesh, file), file, ours);
 }
 
 }  // namespace hermesh::validation

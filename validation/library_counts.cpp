@@ -19,6 +19,7 @@ bool fits_half_edges(const MeshFile& mesh, const MeshReport& ours) {
 template <class Number>
 void expect_equal(const std::string& what, Number theirs, Number ours, double tolerance,
                   LibraryCounts& counts) {
+  // Not for numbers of which one is none.
   if (std::abs(double(theirs) - double(ours)) <= tolerance) return;
   std::ostringstream sentence;
   sentence.precision(12);
@@ -71,11 +72,11 @@ std::string describe_point(const Eigen::Vector3d& point) {
   return text.str();
 }
 
-std::string describe_polygon(const MeshFile& mesh, std::int64_t polygon) {
+std::string describe_polygon(const MeshFile& mesh, std::int64_t polygon, double unit) {
   const PolygonCorners corners = polygon_corners(mesh, polygon);
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (int k = 0; k < corners.count; ++k) centre += mesh.points[corners.points[k]] / corners.count;
-  return "polygon " + std::to_string(polygon) + " at " + describe_point(centre);
+  return "polygon " + std::to_string(polygon) + " at " + describe_point(unit * centre);
 }
 
 PolygonCorners polygon_corners(const MeshFile& mesh, std::int64_t polygon) {

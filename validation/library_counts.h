@@ -17,10 +17,12 @@ struct LibraryFindings {
 /// difference between the two becomes a sentence: in whether the mesh loads, and where it does in boundary
 /// edges, components (by shared edges: the same thing in such a mesh), Euler characteristic and number of
 /// polygons, exactly, and in volume (about the same centre as ours) and area to 1e-9 of the area, for the
-/// volume times the diagonal.
+/// volume times the diagonal. Places in sentences are the mesh's coordinates times `unit`.
 /// @throws Cancelled.
-LibraryCounts count_with_openmesh(const MeshFile& mesh, const MeshReport& ours, RunContext& context);
-LibraryCounts count_with_cgal(const MeshFile& mesh, const MeshReport& ours, RunContext& context);
+LibraryCounts count_with_openmesh(const MeshFile& mesh, const MeshReport& ours, RunContext& context,
+                                double unit = 1.0);
+LibraryCounts count_with_cgal(const MeshFile& mesh, const MeshReport& ours, RunContext& context,
+                                double unit = 1.0);
 
 /// The comparison that both end with.
 LibraryCounts library_loaded(const std::string& library, const LibraryFindings& theirs, const MeshFile& mesh,
@@ -28,8 +30,8 @@ LibraryCounts library_loaded(const std::string& library, const LibraryFindings& 
 LibraryCounts library_refused(const std::string& library, const std::string& refusal, const MeshFile& mesh,
                               const MeshReport& ours);
 
-/// "polygon 12 at (0.5, 0, 1)", by the polygon's centre.
-std::string describe_polygon(const MeshFile& mesh, std::int64_t polygon);
+/// "polygon 12 at (0.5, 0, 1)", by the polygon's centre times `unit`.
+std::string describe_polygon(const MeshFile& mesh, std::int64_t polygon, double unit = 1.0);
 /// "(0.5, 0, 1)"
 std::string describe_point(const Eigen::Vector3d& point);
 

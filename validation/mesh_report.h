@@ -64,6 +64,35 @@ struct FeatureDistances {
   Distances edge_to_mesh, corner_to_mesh;  ///< from the reference's features to the judged mesh
 };
 
+/// Of a share that was sampled, with the ends of its interval (solid_comparison.h).
+struct Estimate {
+  double value = 0.0, lower = 0.0, upper = 0.0;
+};
+
+/// A mesh's solid beside that of a reference. World units.
+struct SolidComparison {
+  enum class Verdict { same, differs, unknown };
+  Verdict verdict = Verdict::unknown;
+  Estimate mesh_volume, reference_volume;  ///< of what is inside for certain
+  Estimate difference;            ///< volume of the symmetric difference; the upper end includes `unknown_volume`
+  Estimate unknown_volume;        ///< where nobody can tell whether it is inside
+  Estimate unexplained;           ///< of `difference`, what lies beyond `explained` from either boundary
+  double mesh_area = 0.0, reference_area = 0.0;  ///< of the mesh as it stands, and of what bounds the reference
+  double possible_area = 0.0;  ///< of the reference's polygons that bound its solid by one rule and not by another
+  std::int64_t mesh_components = 0, reference_components = 0;  ///< of these surfaces
+  Estimate false_area, lost_area;  ///< of the mesh and of the reference: beyond `explained` from the other's
+  double explained = 0.0;          ///< the way that discretisation explains
+  std::int64_t samples = 0;
+  std::optional<Eigen::Vector3d> false_place, lost_place, unexplained_place;  ///< the first samples
+  bool reference_closed = true, reference_oriented = true;
+};
+
+/// "same", "differs" or "unknown".
+inline std::string verdict_word(const SolidComparison& solid) {
+  using Verdict = SolidComparison::Verdict;
+  return solid.verdict == Verdict::same ? "same" : solid.verdict == Verdict::differs ? "differs" : "unknown";
+}
+
 struct MeshReport {
   // Counts over the polygons as they stand.
   std::int64_t points = 0, triangles = 0, quads = 0;
@@ -83,13 +112,14 @@ struct MeshReport {
   std::optional<NormalAngles> normals_to_reference;
   std::optional<HausdorffBound> certified_to_reference, certified_from_reference;
   std::optional<FeatureDistances> features;
+  std::optional<SolidComparison> solid;  ///< beside the reference's
 
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
-  /// Closed, manifold, not self-intersecting. False when self-intersections were not asked for.
+  /// Closed, manifold, oriented, not self-intersecting. False when self-intersections were not asked for.
   bool watertight() const {
-    return closed() && manifold() && self_intersections && self_intersections->pairs == 0;
+    return closed() && manifold() && oriented() && self_intersections && self_intersections->pairs == 0;
   }
   bool libraries_agree() const {
     for (const LibraryCounts& l : libraries)
@@ -105,6 +135,8 @@ struct JudgeOptions {
   const MeshFile* reference = nullptr;  ///< for the distances
   std::int64_t samples = 200'000;       ///< on each surface, by area, besides every point of it
   bool certify = false;                 ///< certified Hausdorff bound, both ways
+  std::int64_t solid_samples = 100'000;  ///< to compare the solid with the reference's; 0 = not at all
+  double voxel_size = 0.0;              ///< world units, of the volume that the mesh was made from; 0 = unknown
   double certify_gap = 0.0;             ///< world units; 0 = 1e-4 of the reference's diagonal
   const MeshFile* features = nullptr;   ///< reference for the sharp features
   double dihedral_degrees = 30.0;

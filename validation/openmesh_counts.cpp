@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <OpenMesh/Core/Mesh/PolyMesh_ArrayKernelT.hh>
-#include <numeric>
+#include <algorithm>
+#include <vector>
 
 #include "validation/library_counts.h"
 #include "validation/triangle_soup.h"
@@ -21,7 +22,7 @@ Eigen::Vector3d position(const Mesh& mesh, Mesh::VertexHandle v) {
 }
 
 // Adds all polygons. Returns a sentence about the first that is refused, or nothing.
-std::string load(const MeshFile& file, Mesh& mesh, const RunContext& context) {
+std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext& context) {
   const auto polygons = std::size_t(polygon_count(file));
   mesh.reserve(file.points.size(), file.points.size() + polygons, polygons);
   for (const Eigen::Vector3d& p : file.points) mesh.add_vertex(OpenMesh::Vec3d(p.x(), p.y(), p.z()));
@@ -31,11 +32,11 @@ std::string load(const MeshFile& file, Mesh& mesh, const RunContext& context) {
     const PolygonCorners corners = polygon_corners(file, p);
     // add_face() takes it for granted that the corners differ.
     if (repeats_corner(corners))
-      return "OpenMesh cannot hold " + describe_polygon(file, p) + ", which has one point at two corners.";
+      return "OpenMesh cannot hold " + describe_polygon(file, p, unit) + ", which has one point at two corners.";
     handles.clear();
     for (int k = 0; k < corners.count; ++k) handles.emplace_back(int(corners.points[k]));
     if (!mesh.add_face(handles).is_valid())
-      return "OpenMesh refuses " + describe_polygon(file, p) +
+      return "OpenMesh refuses " + describe_polygon(file, p, unit) +
              ": an edge or a point of it is used up by the polygons before it.";
   }
   return {};
@@ -43,7 +44,7 @@ std::string load(const MeshFile& file, Mesh& mesh, const RunContext& context) {
 
 // OpenMesh takes two fans at one point as long as one of them is open when the other comes. Then either the
 // point has two gaps, or walking around it leaves polygons out.
-std::string find_singular_vertex(const MeshFile& file, const Mesh& mesh) {
+std::string find_singular_vertex(const MeshFile& file, double unit, const Mesh& mesh) {
   std::vector<std::uint32_t> polygons_at(file.points.size(), 0);
   for (std::int64_t p = 0; p < polygon_count(file); ++p) {
     const PolygonCorners corners = polygon_corners(file, p);
@@ -55,7 +56,7 @@ std::string find_singular_vertex(const MeshFile& file, const Mesh& mesh) {
     for (auto it = mesh.cvf_ccwbegin(v); it.is_valid(); ++it) ++reached;
     if (!mesh.is_manifold(v) || reached != polygons_at[std::size_t(v.idx())])
       return "OpenMesh finds more than one fan of polygons at the point " +
-             describe_point(position(mesh, v)) + ".";
+             describe_point(unit * position(mesh, v)) + ".";
   }
   return {};
 }
@@ -82,7 +83,23 @@ std::int64_t count_components(const Mesh& mesh) {
   return components;
 }
 
-LibraryFindings count(const Mesh& mesh, const Eigen::Vector3d& centre) {
+// The corners of a polygon, beginning where the fan starts that cuts it: anywhere in a triangle.
+std::vector<Eigen::Vector3d> fan(const Mesh& mesh, const MeshFile& file, Mesh::FaceHandle f) {
+  std::vector<Eigen::Vector3d> corners;
+  std::size_t start = 0;
+  const std::size_t polygon = std::size_t(f.idx());
+  const bool quad = polygon >= file.triangles.size();
+  const std::uint32_t first =
+      quad ? cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given)[0] : 0;
+  for (auto it = mesh.cfv_ccwbegin(f); it.is_valid(); ++it) {
+    if (quad && std::uint32_t(it->idx()) == first) start = corners.size();
+    corners.push_back(position(mesh, *it));
+  }
+  std::rotate(corners.begin(), corners.begin() + std::ptrdiff_t(start), corners.end());
+  return corners;
+}
+
+LibraryFindings count(const Mesh& mesh, const MeshFile& file) {
   LibraryFindings findings;
   findings.polygons = std::int64_t(mesh.n_faces());
   for (const auto e : mesh.edges()) findings.boundary_edges += mesh.is_boundary(e);
@@ -90,15 +107,14 @@ LibraryFindings count(const Mesh& mesh, const Eigen::Vector3d& centre) {
   for (const auto v : mesh.vertices()) used += !mesh.is_isolated(v);
   findings.euler_characteristic = used - std::int64_t(mesh.n_edges()) + findings.polygons;
   findings.components = count_components(mesh);
+  const Eigen::Vector3d centre = box_of(file).centre();
   for (const auto f : mesh.faces()) {
-    auto it = mesh.cfv_ccwbegin(f);
-    const Eigen::Vector3d first = position(mesh, *it++) - centre;
-    Eigen::Vector3d last = position(mesh, *it++) - centre;
-    for (; it.is_valid(); ++it) {
-      const Eigen::Vector3d next = position(mesh, *it) - centre;
+    const std::vector<Eigen::Vector3d> corners = fan(mesh, file, f);
+    const Eigen::Vector3d first = corners[0] - centre;
+    for (std::size_t i = 2; i < corners.size(); ++i) {
+      const Eigen::Vector3d last = corners[i - 1] - centre, next = corners[i] - centre;
       findings.area += 0.5 * (last - first).cross(next - first).norm();
       findings.volume += first.dot(last.cross(next)) / 6.0;
-      last = next;
     }
   }
   return findings;
@@ -106,15 +122,15 @@ LibraryFindings count(const Mesh& mesh, const Eigen::Vector3d& centre) {
 
 }  // namespace
 
-LibraryCounts count_with_openmesh(const MeshFile& file, const MeshReport& ours, RunContext& context) {
+LibraryCounts count_with_openmesh(const MeshFile& file, const MeshReport& ours, RunContext& context, double unit) {
   // Its complaints about polygons that it refuses go into the report rather than to the terminal.
   omerr().disable();
   Mesh mesh;
-  std::string refusal = load(file, mesh, context);
-  if (refusal.empty()) refusal = find_singular_vertex(file, mesh);
+  std::string refusal = load(file, unit, mesh, context);
+  if (refusal.empty()) refusal = find_singular_vertex(file, unit, mesh);
   if (!refusal.empty()) return library_refused(kName, refusal, file, ours);
   context.check();
-  return library_loaded(kName, count(mesh, box_of(file).centre()), file, ours);
+  return library_loaded(kName, count(mesh, file), file, ours);
 }
 
 }  // namespace hermesh::validation

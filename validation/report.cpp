@@ -1,5 +1,6 @@
 #include <tbb/parallel_invoke.h>
 
+#include <cmath>
 #include <sstream>
 
 #include "validation/distance.h"
@@ -9,7 +10,9 @@
 #include "validation/measures.h"
 #include "validation/mesh_report.h"
 #include "validation/normal_error.h"
+#include "validation/report_scale.h"
 #include "validation/self_intersection.h"
+#include "validation/solid_comparison.h"
 #include "validation/topology.h"
 
 namespace hermesh::validation {
@@ -35,17 +38,17 @@ void check_reference(const MeshFile* mesh, const std::string& name) {
   if (polygon_count(*mesh) == 0) throw Error(name + " holds no polygon; give a reference with a surface");
 }
 
-void count_with_libraries(const MeshFile& mesh, MeshReport& report, RunContext& context) {
+void count_with_libraries(const MeshFile& mesh, double unit, MeshReport& report, RunContext& context) {
   const Stage stage(context, "library counts");
   LibraryCounts openmesh, cgal;
-  tbb::parallel_invoke([&] { openmesh = count_with_openmesh(mesh, report, context); },
-                       [&] { cgal = count_with_cgal(mesh, report, context); });
+  tbb::parallel_invoke([&] { openmesh = count_with_openmesh(mesh, report, context, unit); },
+                       [&] { cgal = count_with_cgal(mesh, report, context, unit); });
   report.libraries = {std::move(openmesh), std::move(cgal)};
 }
 
 void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const JudgeOptions& options,
                        MeshReport& report, RunContext& context) {
-  const TriangleSoup reference(*options.reference);
+  const TriangleSoup reference(*options.reference, QuadRule::better);
   const TriangleTree reference_tree(reference);
   {
     const Stage stage(context, "distances");
@@ -62,18 +65,21 @@ void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const
 }
 
 // What needs a surface to be there.
-void judge_surface(const TriangleSoup& soup, const JudgeOptions& options, MeshReport& report,
-                   RunContext& context) {
+void judge_surface(const MeshFile& mesh, const TriangleSoup& soup, const JudgeOptions& options,
+                   MeshReport& report, RunContext& context) {
   const TriangleTree tree(soup);
   if (options.self_intersections) {
     const Stage stage(context, "self-intersections");
     report.self_intersections = find_self_intersections(soup, tree, context);
   }
   if (options.reference) measure_distances(soup, tree, options, report, context);
+  if (options.reference && options.solid_samples > 0)
+    report.solid =
+        compare_solids(mesh, *options.reference, {options.solid_samples, options.voxel_size}, context);
   if (options.features) {
     const Stage stage(context, "features");
-    report.features =
-        feature_distances(TriangleSoup(*options.features), tree, options.dihedral_degrees, context);
+    report.features = feature_distances(TriangleSoup(*options.features, QuadRule::better), tree,
+                                        options.dihedral_degrees, context);
   }
 }
 
@@ -109,6 +115,7 @@ class Verdict {
     if (r_.to_reference) distance("the mesh to the reference", *r_.to_reference, r_.certified_to_reference);
     if (r_.from_reference)
       distance("the reference to the mesh", *r_.from_reference, r_.certified_from_reference);
+    if (r_.solid) solid(*r_.solid);
     if (r_.features) features(*r_.features);
     return std::move(out_);
   }
@@ -172,6 +179,8 @@ class Verdict {
   void notes() {
     if (r_.isolated_points > 0)
       say(counted(r_.isolated_points, "point is", "points are") + " used by no polygon");
+    if (!std::isfinite(r_.area) || !std::isfinite(r_.volume))
+      say("The area or the volume is beyond the range of double precision and is not stated");
     if (r_.genus && r_.volume < 0.0) say("The volume is negative: the surface is inside out");
   }
 
@@ -182,6 +191,54 @@ class Verdict {
     if (bound)
       text += "; the true maximum is between " + number(bound->lower) + " and " + number(bound->upper);
     say(text);
+  }
+
+  void solid(const SolidComparison& s) {
+    using Kind = SolidComparison::Verdict;
+    if (s.verdict == Kind::same)
+      say("The mesh bounds the reference's solid: beyond a distance of " + number(s.explained) +
+          ", which discretisation explains, nothing differs; the symmetric difference is " +
+          interval(s.difference));
+    if (s.verdict == Kind::unknown) cannot_tell(s);
+    if (s.verdict != Kind::differs) return;
+    say("The mesh does not bound the reference's solid: their symmetric difference is " +
+        interval(s.difference) + ", the mesh has area " + number(s.mesh_area) + " in " +
+        counted(s.mesh_components, "component", "components") + ", what bounds the reference " +
+        number(s.reference_area) + " in " + counted(s.reference_components, "component", "components"));
+    differing(s.false_area, s.false_place,
+              "area " + number(s.false_area.value) + " of the mesh lies more than " + number(s.explained) +
+                  " from all polygons that have inside on one side and outside on the other, so "
+                  "that it follows inner walls or nothing");
+    differing(s.lost_area, s.lost_place,
+              "of the polygons that bound the reference, area " + number(s.lost_area.value) +
+                  " lies more than " + number(s.explained) + " from the mesh");
+    differing(s.unexplained, s.unexplained_place,
+              "of the symmetric difference, " + number(s.unexplained.value) + " lies more than " +
+                  number(s.explained) + " from one of the two surfaces");
+  }
+
+  void differing(const Estimate& what, const std::optional<Eigen::Vector3d>& place, std::string text) {
+    if (!place || what.lower <= 0.0) return;
+    text[0] = char(std::toupper(text[0]));
+    say(text + "; the first sample at " + describe_point(*place));
+  }
+
+  void cannot_tell(const SolidComparison& s) {
+    std::string text = "Nobody can tell whether the mesh bounds the reference's solid: ";
+    if (s.reference_volume.value <= 0.0 && s.unknown_volume.value <= 0.0)
+      return say(text + "the reference encloses nothing");
+    if (!s.reference_closed)
+      text += "the reference is open";
+    else if (!s.reference_oriented)
+      text += "the reference's polygons do not agree on a side";
+    else
+      text += "the reference has voids or parts that are turned inside out";
+    say(text + ", and of its volume " + number(s.unknown_volume.value) + " may be inside or outside beside " +
+        number(s.reference_volume.value) + " inside");
+  }
+
+  static std::string interval(const Estimate& e) {
+    return number(e.value) + " (from " + number(e.lower) + " to " + number(e.upper) + ")";
   }
 
   void features(const FeatureDistances& f) {
@@ -206,10 +263,9 @@ class Verdict {
 
 std::vector<std::string> MeshReport::sentences() const { return Verdict(*this).sentences(); }
 
-MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& context) {
-  check_input(mesh, "the mesh");
-  check_reference(options.reference, "the reference mesh");
-  check_reference(options.features, "the reference mesh for the features");
+namespace {
+
+MeshReport judge_scaled(const MeshFile& mesh, const JudgeOptions& options, double unit, RunContext& context) {
   MeshReport report;
   const TriangleSoup soup(mesh);
   {
@@ -217,11 +273,35 @@ MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& 
     count_topology(mesh, report, context);
     measure_triangles(mesh, soup, report, context);
   }
-  if (options.libraries) count_with_libraries(mesh, report, context);
+  if (options.libraries) count_with_libraries(mesh, unit, report, context);
   if (!soup.triangles.empty())
-    judge_surface(soup, options, report, context);
+    judge_surface(mesh, soup, options, report, context);
   else if (options.self_intersections)
     report.self_intersections.emplace();
+  return report;
+}
+
+}  // namespace
+
+MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& context) {
+  check_input(mesh, "the mesh");
+  check_reference(options.reference, "the reference mesh");
+  check_reference(options.features, "the reference mesh for the features");
+  const double scale = comfortable_scale({&mesh, options.reference, options.features});
+  if (scale == 1.0) return judge_scaled(mesh, options, 1.0, context);
+  JudgeOptions at_scale = options;
+  MeshFile reference, features;
+  const auto replace = [&](const MeshFile*& given, MeshFile& copy) {
+    if (!given) return;
+    copy = scaled(*given, scale, "the reference mesh");
+    given = &copy;
+  };
+  replace(at_scale.reference, reference);
+  replace(at_scale.features, features);
+  at_scale.certify_gap *= scale;
+  at_scale.voxel_size *= scale;
+  MeshReport report = judge_scaled(scaled(mesh, scale, "the mesh"), at_scale, 1.0 / scale, context);
+  unscale(report, scale);
   return report;
 }
 

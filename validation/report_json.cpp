@@ -69,6 +69,10 @@ Json features(const FeatureDistances& f) {
 
 Json bound(const HausdorffBound& b) { return {{"lower", number(b.lower)}, {"upper", number(b.upper)}}; }
 
+Json estimate(const Estimate& e) {
+  return {{"value", number(e.value)}, {"lower", number(e.lower)}, {"upper", number(e.upper)}};
+}
+
 Json counts(const MeshReport& r) {
   Json json = {{"points", r.points},
                {"triangles", r.triangles},
@@ -97,6 +101,32 @@ Json counts(const MeshReport& r) {
 
 }  // namespace
 
+nlohmann::json to_json(const SolidComparison& s) {
+  Json places = Json::object();
+  if (s.false_place) places["false_area"] = vector(*s.false_place);
+  if (s.lost_place) places["lost_area"] = vector(*s.lost_place);
+  if (s.unexplained_place) places["unexplained"] = vector(*s.unexplained_place);
+  return {{"verdict", verdict_word(s)},
+          {"symmetric_difference", estimate(s.difference)},
+          {"difference_percent", s.reference_volume.value > 0.0
+                                     ? number(100.0 * s.difference.value / s.reference_volume.value)
+                                     : Json(nullptr)},
+          {"unexplained", estimate(s.unexplained)},
+          {"unknown_volume", estimate(s.unknown_volume)},
+          {"mesh_volume", estimate(s.mesh_volume)},
+          {"reference_volume", estimate(s.reference_volume)},
+          {"mesh_area", number(s.mesh_area)},
+          {"reference_area", number(s.reference_area)},
+          {"possible_area", number(s.possible_area)},
+          {"mesh_components", s.mesh_components},
+          {"reference_components", s.reference_components},
+          {"false_area", estimate(s.false_area)},
+          {"lost_area", estimate(s.lost_area)},
+          {"explained", number(s.explained)},
+          {"samples", s.samples},
+          {"places", places}};
+}
+
 nlohmann::json to_json(const MeshReport& r) {
   Json json = counts(r);
   json["closed"] = r.closed();
@@ -113,6 +143,7 @@ nlohmann::json to_json(const MeshReport& r) {
   if (r.certified_to_reference) json["certified_to_reference"] = bound(*r.certified_to_reference);
   if (r.certified_from_reference) json["certified_from_reference"] = bound(*r.certified_from_reference);
   if (r.features) json["features"] = features(*r.features);
+  if (r.solid) json["solid"] = to_json(*r.solid);
   if (r.self_intersections)
     json["self_intersections"] = {{"disjoint", r.self_intersections->disjoint},
                                   {"vertex_sharing", r.self_intersections->vertex_sharing},

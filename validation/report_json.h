@@ -16,11 +16,16 @@ namespace hermesh::validation {
 ///  - certified_to_reference, certified_from_reference: {lower, upper};
 ///  - features: {edges, corners, edges_excluded, edge_length, edge_to_mesh, corner_to_mesh}, the last two as
 ///  above;
+///  - solid: {verdict ("same", "differs", "unknown"), symmetric_difference, difference_percent (of the reference's
+///  volume), unexplained, unknown_volume, mesh_volume, reference_volume, mesh_area, reference_area, possible_area,
+///  mesh_components, reference_components, false_area, lost_area, explained, samples, places}, with {value, lower,
+///  upper} for what was sampled;
 ///  - self_intersections: {disjoint, vertex_sharing, edge_sharing};
 ///  - libraries: by name {loaded, refusal, boundary_edges, …, disagreements};
 /// and always closed, manifold, oriented, watertight (null unless self-intersections were asked for),
 /// sentences, and places: by the name of the count, a list of {point, polygons}. All lengths are in world
 /// units.
 nlohmann::json to_json(const MeshReport& report);
+nlohmann::json to_json(const SolidComparison& solid);
 
 }  // namespace hermesh::validation

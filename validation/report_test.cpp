@@ -156,6 +156,34 @@ TEST(Report, ExtremeCoordinatesDoNotCrash) {
   }
 }
 
+TEST(Report, FiguresOfExtremeCoordinatesAreRightOrNotStated) {
+  const MeshReport large = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e100));
+  EXPECT_DOUBLE_EQ(large.area, 6e200);
+  EXPECT_DOUBLE_EQ(large.volume, 1e300);
+  EXPECT_TRUE(large.libraries_agree());
+  for (const LibraryCounts& l : large.libraries) {
+    EXPECT_DOUBLE_EQ(l.area, 6e200);
+    EXPECT_DOUBLE_EQ(l.volume, 1e300);
+  }
+  const MeshReport beyond = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e200));
+  EXPECT_TRUE(to_json(beyond).at("area").is_null());
+  EXPECT_TRUE(says(beyond, "beyond the range of double precision"));
+  const MeshReport tiny = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e-200));
+  EXPECT_TRUE(to_json(tiny).at("area").is_null());  // and not 0
+  EXPECT_TRUE(says(tiny, "beyond the range of double precision"));
+  // Distances at that scale, too.
+  const MeshFile reference = cube_of_quads(Eigen::Vector3d::Constant(-1e120), 2e120);
+  JudgeOptions options;
+  options.reference = &reference;
+  options.samples = 1000;
+  options.solid_samples = 1000;
+  EXPECT_DOUBLE_EQ(judged(cube_of_quads(Eigen::Vector3d::Constant(-5e119), 1e120), options).to_reference->max, 5e119);
+  // What no scale fits is refused.
+  MeshFile spread = cube_of_quads(Eigen::Vector3d::Zero(), 1e300);
+  spread.points[7] = Eigen::Vector3d::Constant(1.2345678901234567e-300);
+  EXPECT_NE(error_of(spread).find("orders of magnitude"), std::string::npos);
+}
+
 TEST(Report, CanBeCancelled) {
   const std::atomic<bool> stop = true;
   RunContext context;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algorithms/core/mesh_file.h"
+#include "validation/quad_cut.h"
 
 namespace hermesh::validation {
 
@@ -48,17 +49,19 @@ struct Box {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-/// The triangles of the file first, then each quad (a,b,c,d) as abc and acd. Refers to the file's points, so
-/// the file has to outlive it.
+/// The triangles of the file first, then the two of each quad, cut by the rule. Refers to the file's points, so the
+/// file has to outlive it.
 struct TriangleSoup {
   const std::vector<Eigen::Vector3d>& points;
   std::vector<Triangle> triangles;
   std::size_t undivided = 0;  ///< how many triangles come before the halves of quads
 
-  explicit TriangleSoup(const MeshFile& mesh) : points(mesh.points), undivided(mesh.triangles.size()) {
+  explicit TriangleSoup(const MeshFile& mesh, QuadRule rule = QuadRule::as_given)
+      : points(mesh.points), undivided(mesh.triangles.size()) {
     triangles.reserve(mesh.triangle_count());
     triangles = mesh.triangles;
-    for (const Quad& q : mesh.quads) {
+    for (const Quad& quad : mesh.quads) {
+      const Quad q = cut_from_first(points, quad, rule);
       triangles.push_back({q[0], q[1], q[2]});
       triangles.push_back({q[0], q[2], q[3]});
     }

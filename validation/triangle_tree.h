@@ -1,6 +1,7 @@
 // A bounding-volume hierarchy over triangles: closest points and box overlaps.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -65,6 +66,26 @@ class TriangleTree {
     return true;
   }
 
+  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more.
+  template <class Visit>
+  void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
+    const Slabs slabs(from, to);
+    std::size_t stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::size_t node = stack[--top];
+      if (!slabs.meet(boxes_[node])) continue;
+      if (node < leaves() - 1) {
+        stack[top++] = 2 * node + 2;
+        stack[top++] = 2 * node + 1;
+        continue;
+      }
+      const std::size_t leaf = node - (leaves() - 1);
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot) visit(std::uint32_t(slot));
+    }
+  }
+
   /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.
   template <class Visit>
   void for_each_overlapping_leaf(std::size_t leaf, const Visit& visit) const {
@@ -90,6 +111,26 @@ class TriangleTree {
 
  private:
   static constexpr int kMaxDepth = 40;
+
+  // A segment against boxes: the interval of its parameter between each pair of planes, a little widened, so that
+  // rounding loses no box.
+  struct Slabs {
+    Eigen::Vector3d from, inverse;
+    Slabs(const Eigen::Vector3d& start, const Eigen::Vector3d& end)
+        : from(start), inverse((end - start).cwiseInverse()) {}
+    bool meet(const Box& box) const {
+      constexpr double kSlack = 1e-9;
+      double first = -kSlack, last = 1.0 + kSlack;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double a = (box.lower[axis] - from[axis]) * inverse[axis];
+        const double b = (box.upper[axis] - from[axis]) * inverse[axis];
+        // Of a segment in a plane of the box, 0 times infinity is no number and bounds nothing.
+        if (std::min(a, b) - kSlack > first) first = std::min(a, b) - kSlack;
+        if (std::max(a, b) + kSlack < last) last = std::max(a, b) + kSlack;
+      }
+      return first <= last;
+    }
+  };
 
   ClosestHit slot_hit(const Eigen::Vector3d& point, std::uint32_t slot) const;
   ClosestHit closest(const Eigen::Vector3d& point, ClosestHit best) const;

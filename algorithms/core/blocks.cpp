@@ -10,6 +10,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <string>
 #include <unordered_map>
 
 #include "algorithms/core/leaf_table.h"
@@ -277,6 +278,16 @@ void BlockGrid::read_leaves(const LevelSet& level_set, RunContext& context) {
     if (!all_finite) finite = false;
   });
   if (!finite) throw Error("the volume holds a value that is not finite; replace it before the extraction");
+}
+
+void BlockGrid::throw_no_block(std::int32_t block, int x, int y, int z) const {
+  const auto& lower = blocks_[static_cast<std::size_t>(block)].lower;
+  const auto at = [](int i, int j, int k) {
+    return "(" + std::to_string(i) + ", " + std::to_string(j) + ", " + std::to_string(k) + ")";
+  };
+  throw Error("an extractor looked up the sample " + at(x, y, z) + " of the block at " +
+              at(lower[0], lower[1], lower[2]) +
+              ", where the grid has no block; Block::neighbours tells what is outside or inside throughout");
 }
 
 BlockMask BlockGrid::shifted_inside(std::int32_t block, int dx, int dy, int dz) const {

@@ -90,14 +90,20 @@ class BlockGrid {
   double signed_value(const Block& block, int sample) const {
     return scale_ * (static_cast<double>(block.values[sample]) - isovalue_);
   }
-  /// Block and sample for local coordinates from −8 to 15; index −1 or −2 as in Block::neighbours.
+  /// Block and sample for local coordinates from −8 to 15, where there is a block: at the ends of every edge with a
+  /// change of sign, and at the first corners of the four cells around it. Of any other sample Block::neighbours tells
+  /// whether there is a block. @throws Error that names the sample if there is none, or if a coordinate is beyond.
   struct Location {
     std::int32_t block;
     int sample;
   };
   Location locate(std::int32_t block, int x, int y, int z) const {
-    const std::int32_t neighbour = blocks_[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
-    return {neighbour, sample_index(x & 7, y & 7, z & 7)};
+    constexpr auto is_beyond = [](int i) { return static_cast<unsigned>(i + 8) > 23u; };
+    if (is_beyond(x) || is_beyond(y) || is_beyond(z)) throw_no_block(block, x, y, z);
+    const std::int32_t there =
+        blocks_[static_cast<std::size_t>(block)].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
+    if (there < 0) throw_no_block(block, x, y, z);
+    return {there, sample_index(x & 7, y & 7, z & 7)};
   }
 
   /// Inside bits of the sample that is (dx,dy,dz), each 0 or 1, further on than the bit's own.
@@ -108,6 +114,7 @@ class BlockGrid {
 
  private:
   void read_leaves(const LevelSet& level_set, RunContext& context);
+  [[noreturn]] void throw_no_block(std::int32_t block, int x, int y, int z) const;
   std::vector<Block> blocks_;
   std::vector<std::unique_ptr<std::array<float, 512>>> uniform_values_;
   LevelSet level_set_;  // keeps the leaves alive

@@ -35,6 +35,29 @@ TEST(Blocks, OneInsideVoxelHasSixCrossingEdgesWhereverItLies) {
   }
 }
 
+TEST(Blocks, LookingUpWhereThereIsNoBlockIsRefusedInASentence) {
+  auto grid = outside_grid();
+  grid->tree().setValue(Coord(3, 3, 3), -1.0f);
+  RunContext context;
+  const BlockGrid blocks(make_level_set(grid), 0.0, context);
+  ASSERT_EQ(blocks.blocks().size(), 1u);
+  EXPECT_EQ(blocks.locate(0, 3, 4, 5).block, 0);
+  EXPECT_EQ(blocks.locate(0, 3, 4, 5).sample, sample_index(3, 4, 5));
+  const auto sentence = [&](int x, int y, int z) -> std::string {
+    try {
+      blocks.locate(0, x, y, z);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // A neighbour that is outside throughout, and what is beyond all neighbours.
+  EXPECT_NE(sentence(8, 0, 0).find("sample (8, 0, 0) of the block at (0, 0, 0)"), std::string::npos);
+  EXPECT_NE(sentence(0, -1, 7).find("no block"), std::string::npos);
+  EXPECT_NE(sentence(16, 0, 0).find("no block"), std::string::npos);
+  EXPECT_NE(sentence(0, 0, -9).find("no block"), std::string::npos);
+}
+
 TEST(Blocks, ATileOfTheOtherSignIsWalledIn) {
   // An inside tile of 8³ alone in the background, where the tree has no leaf at all: 6 faces of 64 edges
   // each.

@@ -2,7 +2,9 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "experiments/cli/process_for_tests.h"
 
@@ -197,6 +199,58 @@ TEST_F(CliTest, RequirementNotMetIsExitCodeThree) {
       run({"validate", "triangle.off", "--require", "manifold,oriented,no-self-intersection"}).exit_code, 0);
   EXPECT_EQ(run({"validate", "triangle.off", "--require", "watertight"}).exit_code, 3);
   EXPECT_EQ(run({"validate", "triangle.off"}).exit_code, 0);
+}
+
+/// Boxes of 10 × 10 between heights, on points of their own.
+std::string boxes_obj(const std::vector<std::pair<double, double>>& heights) {
+  std::ostringstream file;
+  int base = 1;
+  for (const auto& [from, to] : heights) {
+    for (const double z : {from, to})
+      for (const int y : {0, 10})
+        for (const int x : {0, 10}) file << "v " << x << ' ' << y << ' ' << z << '\n';
+    for (const auto& face : {std::array{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
+      file << 'f';
+      for (const int corner : face) file << ' ' << base + corner;
+      file << '\n';
+    }
+    base += 8;
+  }
+  return file.str();
+}
+
+TEST_F(CliTest, AWatertightMeshOfAnotherSolidDoesNotMeetTheRequirement) {
+  // Inner walls of the reference: distances to it are small wherever a mesh follows them.
+  write("reference.obj", boxes_obj({{0, 30}, {20, 60}}));
+  write("three.obj", boxes_obj({{0, 19.995}, {20.005, 29.995}, {30.005, 60}}));
+  write("one.obj", boxes_obj({{0, 60}}));
+  EXPECT_EQ(run({"validate", "three.obj", "--require", "watertight"}).exit_code, 0);
+  for (const char* word : {"watertight", "solid"}) {
+    const Outcome bad =
+        run({"validate", "three.obj", "--reference", "reference.obj", "--certify", "--require", word});
+    EXPECT_EQ(bad.exit_code, 3) << word;
+    EXPECT_NE(bad.out.find("does not bound the reference's solid"), std::string::npos) << bad.out;
+    EXPECT_NE(bad.out.find("Required but not met: solid."), std::string::npos) << bad.out;
+    EXPECT_EQ(run({"validate", "one.obj", "--reference", "reference.obj", "--require", word}).exit_code, 0) << word;
+  }
+  const Json report = Json::parse(run({"validate", "three.obj", "--reference", "reference.obj", "--json"}).out);
+  EXPECT_EQ(report.at("solid").at("verdict"), "differs");
+  EXPECT_EQ(report.at("solid").at("mesh_components"), 3);
+  EXPECT_EQ(report.at("solid").at("reference_components"), 1);
+  EXPECT_EQ(run({"validate", "one.obj", "--require", "solid"}).exit_code, 2);
+  EXPECT_EQ(run({"validate", "one.obj", "--voxel-size", "1"}).exit_code, 2);
+}
+
+TEST_F(CliTest, WatertightIncludesOriented) {
+  std::string cube = boxes_obj({{0, 10}});
+  write("cube.obj", cube);
+  EXPECT_EQ(run({"validate", "cube.obj", "--require", "watertight"}).exit_code, 0);
+  const std::string face = "f 1 5 7 3", turned = "f 3 7 5 1";
+  cube.replace(cube.find(face), face.size(), turned);
+  write("turned.obj", cube);
+  const Outcome outcome = run({"validate", "turned.obj", "--require", "watertight", "--json"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_EQ(Json::parse(outcome.out).at("watertight"), false);
 }
 
 TEST_F(CliTest, InfoOfAMesh) {

@@ -73,6 +73,24 @@ void add_counts(Lines& lines, const MeshReport& report) {
   }
 }
 
+std::string estimate_text(const validation::Estimate& e) {
+  return text(e.value) + ", between " + text(e.lower) + " and " + text(e.upper);
+}
+
+void add_solid(Lines& lines, const validation::SolidComparison& solid) {
+  lines.line("symmetric difference", estimate_text(solid.difference));
+  lines.line("", "of it unexplained by a distance of " + text(solid.explained) + ": " +
+                     estimate_text(solid.unexplained));
+  lines.line("reference's solid", "volume " + estimate_text(solid.reference_volume));
+  lines.line("", "unknown volume " + estimate_text(solid.unknown_volume));
+  lines.line("", "outer boundary of area " + text(solid.reference_area) +
+                     (solid.possible_area > 0.0 ? " and perhaps " + text(solid.possible_area) : "") + " in " +
+                     std::to_string(solid.reference_components) + " components; the mesh: " + text(solid.mesh_area) +
+                     " in " + std::to_string(solid.mesh_components));
+  lines.line("wrong area of the mesh", estimate_text(solid.false_area));
+  lines.line("lost area", estimate_text(solid.lost_area));
+}
+
 void add_measures(Lines& lines, const MeshReport& report) {
   lines.line("volume", text(report.volume));
   lines.line("area", text(report.area));
@@ -82,6 +100,7 @@ void add_measures(Lines& lines, const MeshReport& report) {
   if (report.certified_to_reference) lines.line("", bound_text(*report.certified_to_reference));
   if (report.from_reference) lines.line("from the reference", distances_text(*report.from_reference));
   if (report.certified_from_reference) lines.line("", bound_text(*report.certified_from_reference));
+  if (report.solid) add_solid(lines, *report.solid);
   if (const auto& features = report.features) {
     lines.line("sharp edges", std::to_string(features->edges) + " of length " + text(features->edge_length) +
                                   "; " + std::to_string(features->edges_excluded) +

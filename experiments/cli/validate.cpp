@@ -1,5 +1,6 @@
 // hermesh validate: the judges' report of one mesh.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -20,8 +21,15 @@ struct Arguments {
   std::string require;
   bool certify = false, json = false;
   std::int64_t samples = JudgeOptions().samples;
-  double dihedral = JudgeOptions().dihedral_degrees;
+  double dihedral = JudgeOptions().dihedral_degrees, voxel_size = 0.0;
 };
+
+bool same_solid(const MeshReport& r) {
+  return r.solid && r.solid->verdict == validation::SolidComparison::Verdict::same;
+}
+bool other_solid(const MeshReport& r) {
+  return r.solid && r.solid->verdict == validation::SolidComparison::Verdict::differs;
+}
 
 using Requirement = std::pair<std::string, bool (*)(const MeshReport&)>;
 
@@ -30,6 +38,7 @@ const Requirement kRequirements[] = {
     {"manifold", [](const MeshReport& r) { return r.manifold(); }},
     {"oriented", [](const MeshReport& r) { return r.oriented(); }},
     {"watertight", [](const MeshReport& r) { return r.watertight(); }},
+    {"solid", same_solid},
     {"no-self-intersection",
      [](const MeshReport& r) { return r.self_intersections && r.self_intersections->pairs == 0; }},
 };
@@ -51,6 +60,10 @@ std::vector<Requirement> parse_requirements(const std::string& list) {
   return requirements;
 }
 
+bool names(const std::vector<Requirement>& requirements, const std::string& name) {
+  return std::ranges::any_of(requirements, [&](const Requirement& r) { return r.first == name; });
+}
+
 std::optional<MeshFile> read_if_named(const std::string& file, RunContext& context) {
   if (file.empty()) return std::nullopt;
   return read_mesh_file(file, context);
@@ -60,6 +73,11 @@ int run_validate(const Arguments& arguments, Session& session) {
   const std::vector<Requirement> requirements = parse_requirements(arguments.require);
   if (arguments.certify && arguments.reference.empty())
     throw UsageError("--certify bounds the distance to a reference: name it with --reference");
+  const bool watertight = names(requirements, "watertight"), solid = names(requirements, "solid");
+  if (solid && arguments.reference.empty())
+    throw UsageError("--require solid compares the mesh with a reference: name it with --reference");
+  if (arguments.voxel_size > 0.0 && arguments.reference.empty())
+    throw UsageError("--voxel-size says what explains a distance to a reference: name it with --reference");
 
   const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
   const auto reference = read_if_named(arguments.reference, session.context);
@@ -70,11 +88,15 @@ int run_validate(const Arguments& arguments, Session& session) {
   options.samples = arguments.samples;
   options.certify = arguments.certify;
   options.dihedral_degrees = arguments.dihedral;
+  options.voxel_size = arguments.voxel_size;
   const MeshReport report = validation::judge(mesh, options, session.context);
 
   std::vector<std::string> unmet;
   for (const Requirement& requirement : requirements)
     if (!requirement.second(report)) unmet.push_back(requirement.first);
+  // A watertight surface about something else is not what was meant by naming a reference. Where nobody can tell what
+  // the reference encloses, only who asks for the solid asks too much.
+  if (watertight && !solid && other_solid(report)) unmet.push_back("solid");
   std::cout << (arguments.json ? report_json(report, arguments.mesh, unmet)
                                : report_text(report, arguments.mesh, unmet));
   return unmet.empty() ? kDone : kNotMet;
@@ -103,7 +125,14 @@ void add_validate(CLI::App& app, Session& session) {
   command->add_option(
       "--require", arguments->require,
       "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "
-      "watertight, no-self-intersection");
+      "watertight (all of these and no-self-intersection), no-self-intersection, solid (bounds the solid of the "
+      "--reference: no inner wall taken for an outer one, no part lost or added); with --reference, watertight asks "
+      "that the solid is no other, too");
+  command
+      ->add_option("--voxel-size", arguments->voxel_size,
+                   "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "
+                   "(default: three times the distance from the mesh to the reference)")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &session] {
     session.command = [arguments, &session] { return run_validate(*arguments, session); };

@@ -23,7 +23,7 @@ using Eigen::Vector3d;
 /// when others are proposed, and then points on fanned edges, which do not.
 class RegionPolygons {
  public:
-  RegionPolygons(const Regions& regions, const UniformPoints& points, const RunContext& context)
+  RegionPolygons(const CellRegions& regions, const UniformPoints& points, const RunContext& context)
       : regions_(regions),
         cells_(regions.cells()),
         points_(points),
@@ -342,7 +342,7 @@ class RegionPolygons {
     return result;
   }
 
-  const Regions& regions_;
+  const CellRegions& regions_;
   const CellBlocks& cells_;
   const UniformPoints& points_;
   const std::uint32_t first_cube_;  ///< name
@@ -374,7 +374,7 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
 
 /// @param connect() the polygons of the uniform mesh, of lone edges at least
 template <class Connect>
-RegionMesh merge(const Regions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
+RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
                  RunContext& context) {
   RegionPolygons merged(regions, points, context);
   const auto call_bold = [&](const std::vector<CellBlocks::Edge>& meeting) {
@@ -404,7 +404,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
     const bool needs_slabs =
         options.tolerance.least() <= RegionProof::kDiagonal * float(options.largest_cube);
     if (needs_slabs && !in_hulls) uniform.place_all(context);
-    Regions regions(cells, points, options, file, context);
+    CellRegions regions(cells, points, options, file, context);
     std::optional<RegionSlabs> slabs;
     if (needs_slabs) slabs.emplace(regions, in_hulls ? nullptr : &points, context);
     RegionProof proof =
@@ -419,7 +419,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
   }
   uniform.place_all(context);
   const EdgePolygons fine = uniform.connect(nullptr, context);
-  Regions regions(cells, points, options, file, context);
+  CellRegions regions(cells, points, options, file, context);
   const std::vector<float> tolerance = tolerances_of_points(cells, fine, options.tolerance, context);
   const RegionShell shell = [&] {
     Stage stage(context, "prepare the proof");

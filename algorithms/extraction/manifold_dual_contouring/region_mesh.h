@@ -8,7 +8,7 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/file_points.h"
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {

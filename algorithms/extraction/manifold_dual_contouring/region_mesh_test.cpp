@@ -197,7 +197,7 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
   UniformCells uniform(view, {.placement = DualContouringOptions::Placement::average, .reach = 0}, file,
                        context);
   const CellBlocks& cells = uniform.cells();
-  const auto cubes = [&](const Regions& regions) {
+  const auto cubes = [&](const CellRegions& regions) {
     std::size_t sum = 0;
     for (std::size_t b = 0; b < cells.size(); ++b)
       regions.for_each_cube(static_cast<std::int32_t>(b), [&](const Region&) { ++sum; });
@@ -207,7 +207,7 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
   const EdgePolygons polygons = uniform.connect(nullptr, context);
   {
     RegionOptions options{CellTolerances(1.0f)};
-    Regions regions(cells, uniform.points(), options, file, context);
+    CellRegions regions(cells, uniform.points(), options, file, context);
     EXPECT_GT(cubes(regions), 20u);
     options.tolerance = CellTolerances(1e-4f);
     const std::vector<float> narrow(polygons.point_count(), 1e-4f);
@@ -217,7 +217,7 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
   }
   {
     RegionOptions options{CellTolerances(4.0f)};
-    Regions regions(cells, uniform.points(), options, file, context);
+    CellRegions regions(cells, uniform.points(), options, file, context);
     EXPECT_GT(cubes(regions), 20u);
     options.tolerance = CellTolerances(1e-4f);
     RegionSlabs slabs(regions, nullptr, context);

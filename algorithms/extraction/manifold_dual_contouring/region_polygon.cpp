@@ -56,7 +56,7 @@ const Region& RegionRing::largest() const {
                            [](const Region& a, const Region& b) { return a.level < b.level; });
 }
 
-RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
+RegionRing ring_of(const CellRegions& regions, const CellBlocks::Edge& edge) {
   const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
   std::array<Region, 4> around;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -78,7 +78,7 @@ RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge) {
   return ring;
 }
 
-RegionPolygon polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring) {
+RegionPolygon polygon_of(const CellRegions& regions, const CellBlocks::Edge& edge, const RegionRing& ring) {
   const CellBlocks& cells = regions.cells();
   const int u = (edge.axis + 1) % 3, v = (edge.axis + 2) % 3;
   RegionPolygon polygon;

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 
 namespace hermesh {
 
@@ -48,12 +48,12 @@ struct RegionRing {
   int corners = 0;
   std::array<Region, 4> regions{};
   std::array<int, 4> across{};  ///< axis of the step from each to the next
-  int least_level = Regions::kLevels;
+  int least_level = CellRegions::kLevels;
   const Region& largest() const;
 };
-RegionRing ring_of(const Regions& regions, const CellBlocks::Edge& edge);
+RegionRing ring_of(const CellRegions& regions, const CellBlocks::Edge& edge);
 
 /// @param ring of three regions at least, one of them a cube, so that none is a cell of several sheets
-RegionPolygon polygon_of(const Regions& regions, const CellBlocks::Edge& edge, const RegionRing& ring);
+RegionPolygon polygon_of(const CellRegions& regions, const CellBlocks::Edge& edge, const RegionRing& ring);
 
 }  // namespace hermesh

@@ -32,16 +32,16 @@ bool overlap(const BlockMask& mask, const Region& region) {
 
 }  // namespace
 
-RegionProof::RegionProof(Regions& regions, UniformCells& uniform, RunContext& context)
+RegionProof::RegionProof(CellRegions& regions, UniformCells& uniform, RunContext& context)
     : RegionProof(regions, nullptr, nullptr, &uniform, context) {}
 
-RegionProof::RegionProof(Regions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context)
+RegionProof::RegionProof(CellRegions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context)
     : RegionProof(regions, &slabs, nullptr, &uniform, context) {}
 
-RegionProof::RegionProof(Regions& regions, const RegionShell& shell, RunContext& context)
+RegionProof::RegionProof(CellRegions& regions, const RegionShell& shell, RunContext& context)
     : RegionProof(regions, nullptr, &shell, nullptr, context) {}
 
-RegionProof::RegionProof(Regions& regions, RegionSlabs* slabs, const RegionShell* shell,
+RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionShell* shell,
                          UniformCells* uniform, RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),

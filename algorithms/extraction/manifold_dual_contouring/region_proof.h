@@ -13,7 +13,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_shell.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_slabs.h"
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
 
 namespace hermesh {
@@ -49,11 +49,11 @@ class RegionProof {
 
   /// For tolerances beyond the largest cubes' diagonal. @param uniform makes the points of cells that are
   /// alone
-  RegionProof(Regions& regions, UniformCells& uniform, RunContext& context);
+  RegionProof(CellRegions& regions, UniformCells& uniform, RunContext& context);
   /// With slabs, and such points.
-  RegionProof(Regions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context);
+  RegionProof(CellRegions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context);
   /// With a shell. All points that the uniform mesh has in cells have been made.
-  RegionProof(Regions& regions, const RegionShell& shell, RunContext& context);
+  RegionProof(CellRegions& regions, const RegionShell& shell, RunContext& context);
 
   /// Splits until all polygons keep the promises, but for whether loose ones meet others. Then all points are
   /// there.
@@ -68,7 +68,7 @@ class RegionProof {
   void call_bold(const CellBlocks::Edge& edge);
 
  private:
-  RegionProof(Regions& regions, RegionSlabs* slabs, const RegionShell* shell, UniformCells* uniform,
+  RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionShell* shell, UniformCells* uniform,
               RunContext& context);
 
   void place_lone_points();
@@ -83,13 +83,13 @@ class RegionProof {
   template <class F>
   void for_each_touched(std::size_t block, F&& f) const;
 
-  Regions& regions_;
+  CellRegions& regions_;
   const CellBlocks& cells_;
   RegionSlabs* const slabs_;        ///< either these
   const RegionShell* const shell_;  ///< or this, or neither;
   UniformCells* const uniform_;     ///< null with the second, which wants all points beforehand
   RunContext& context_;
-  std::vector<std::array<std::uint64_t, Regions::kLevels>>
+  std::vector<std::array<std::uint64_t, CellRegions::kLevels>>
       bold_;                            ///< by block and level, less 1: cubes to be split
   std::vector<std::uint8_t> any_bold_;  ///< by block
   LargeArray<BlockMask> changed_;       ///< by block: stirred since take_changed()

@@ -123,7 +123,7 @@ class RegionShell::Search {
   std::array<Planes, kMostTriangles> planes_;
 };
 
-RegionShell::RegionShell(const Regions& regions, const EdgePolygons& polygons, const UniformPoints& points,
+RegionShell::RegionShell(const CellRegions& regions, const EdgePolygons& polygons, const UniformPoints& points,
                          std::span<const float> tolerance, RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),

@@ -17,7 +17,7 @@
 #include "algorithms/extraction/manifold_dual_contouring/edge_polygons.h"
 #include "algorithms/extraction/manifold_dual_contouring/kernels/shell_kernels.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 #include "algorithms/extraction/manifold_dual_contouring/triangle_contact.h"
 #include "algorithms/extraction/manifold_dual_contouring/uniform_points.h"
 
@@ -47,7 +47,7 @@ class RegionShell {
   static constexpr double kFarthest = 2.0;
 
   /// @param tolerance by point, those on fanned edges included; voxels
-  RegionShell(const Regions& regions, const EdgePolygons& polygons, const UniformPoints& points,
+  RegionShell(const CellRegions& regions, const EdgePolygons& polygons, const UniformPoints& points,
               std::span<const float> tolerance, RunContext& context);
   ~RegionShell();
 
@@ -63,7 +63,7 @@ class RegionShell {
   void describe(std::size_t block, std::uint32_t first_quad);
   void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
 
-  const Regions& regions_;
+  const CellRegions& regions_;
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
   const UniformPoints& points_;

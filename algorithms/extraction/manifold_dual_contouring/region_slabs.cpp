@@ -95,7 +95,7 @@ struct RegionSlabs::Corners {
   std::size_t count = 0;
 };
 
-RegionSlabs::RegionSlabs(const Regions& regions, const UniformPoints* points, RunContext& context)
+RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points, RunContext& context)
     : regions_(regions), cells_(regions.cells()), bins_(cells_.size()), first_(cells_.size()) {
   Stage stage(context, "list crossings");
   std::vector<std::uint64_t> first(cells_.size());

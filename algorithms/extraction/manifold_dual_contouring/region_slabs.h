@@ -10,7 +10,7 @@
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/manifold_dual_contouring/region_polygon.h"
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 
 namespace hermesh {
 
@@ -47,7 +47,7 @@ class RegionSlabs {
   static constexpr float kLeast = 2.0f;
 
   /// @param points of S, if they may be out of the hull of their cells' crossings; else null
-  RegionSlabs(const Regions& regions, const UniformPoints* points, RunContext& context);
+  RegionSlabs(const CellRegions& regions, const UniformPoints* points, RunContext& context);
 
   /// For cubes that were proposed meanwhile. Before the next begin().
   void make_room();
@@ -84,7 +84,7 @@ class RegionSlabs {
   template <class F>
   void for_each_near(std::int32_t block, const Box& box, F&& f) const;
 
-  const Regions& regions_;
+  const CellRegions& regions_;
   const CellBlocks& cells_;
   std::vector<std::array<std::uint16_t, 65>>
       bins_;                                 ///< by block and cube of 2³ samples: where its places begin

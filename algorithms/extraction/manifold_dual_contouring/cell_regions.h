@@ -30,13 +30,13 @@ struct Region {
 
 /// Which cells share a point. Begins with all cubes that are proposed (region_proposals.h), and gets finer by
 /// split().
-class Regions {
+class CellRegions {
  public:
   static constexpr int kLevels = kCubeLevels;
 
   /// @param points of the uniform mesh; only those of cells that are alone are ever looked at
   /// @param options outlive this
-  Regions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
+  CellRegions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
           const FilePoints& file, RunContext& context);
 
   /// Of an active cell.

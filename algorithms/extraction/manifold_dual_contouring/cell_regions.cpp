@@ -1,4 +1,4 @@
-#include "algorithms/extraction/manifold_dual_contouring/regions.h"
+#include "algorithms/extraction/manifold_dual_contouring/cell_regions.h"
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -25,7 +25,7 @@ BlockMask moved_up(const BlockMask& mask, const BlockMask& below, int axis) {
 
 }  // namespace
 
-Regions::Regions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
+CellRegions::CellRegions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
                  const FilePoints& file, RunContext& context)
     : cells_(cells), points_(points), options_(options), file_(file), blocks_(cells.size()) {
   Stage stage(context, "propose regions");
@@ -39,7 +39,7 @@ Regions::Regions(const CellBlocks& cells, const UniformPoints& points, const Reg
   propose_parts(context);
 }
 
-void Regions::propose_parts(RunContext& context) {
+void CellRegions::propose_parts(RunContext& context) {
   tbb::enumerable_thread_specific<RegionProposals> proposals(
       [&] { return RegionProposals(cells_, options_, file_); });
   std::vector<std::size_t> asked;
@@ -85,7 +85,7 @@ void Regions::propose_parts(RunContext& context) {
   });
 }
 
-void Regions::propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
+void CellRegions::propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
                       std::vector<ProposedCube>& found) {
   for (int level = kLevels; level > 0; --level) {
     const auto at = static_cast<std::size_t>(level - 1);
@@ -101,7 +101,7 @@ void Regions::propose(RegionProposals& proposals, std::int32_t number, BlockRegi
   find_merged(block);
 }
 
-void Regions::find_merged(BlockRegions& block) {
+void CellRegions::find_merged(BlockRegions& block) {
   block.merged = {};
   for (int level = 1; level <= kLevels; ++level) {
     const BlockMask cells = cells_of(block.alive[static_cast<std::size_t>(level - 1)], level);
@@ -109,7 +109,7 @@ void Regions::find_merged(BlockRegions& block) {
   }
 }
 
-void Regions::split(const Region& region) {
+void CellRegions::split(const Region& region) {
   BlockRegions& block = blocks_[static_cast<std::size_t>(region.block)];
   const int cube = cube_of(region.cell, region.level);
   block.alive[region.level - 1u] &= ~(std::uint64_t{1} << cube);
@@ -118,7 +118,7 @@ void Regions::split(const Region& region) {
 }
 
 /// By axis the cells whose lower face there is within a cube.
-std::array<BlockMask, 3> Regions::inner_faces(std::int32_t block) const {
+std::array<BlockMask, 3> CellRegions::inner_faces(std::int32_t block) const {
   const BlockRegions& own = blocks_[static_cast<std::size_t>(block)];
   std::array<BlockMask, 3> result{};
   for (int level = own.alive[kLevels - 1] ? kLevels : 1; level <= kLevels; ++level) {
@@ -133,7 +133,7 @@ std::array<BlockMask, 3> Regions::inner_faces(std::int32_t block) const {
   return result;
 }
 
-std::array<BlockMask, 3> Regions::merged_edges(std::int32_t block,
+std::array<BlockMask, 3> CellRegions::merged_edges(std::int32_t block,
                                                const std::array<BlockMask, 3>& lone) const {
   const auto& neighbours = cells_.source(block).neighbours;
   const std::array<BlockMask, 3> inner = inner_faces(block);
@@ -159,7 +159,7 @@ std::array<BlockMask, 3> Regions::merged_edges(std::int32_t block,
   return result;
 }
 
-std::array<BlockMask, 3> Regions::lone_edges(std::int32_t block) const {
+std::array<BlockMask, 3> CellRegions::lone_edges(std::int32_t block) const {
   const auto& neighbours = cells_.source(block).neighbours;
   constexpr BlockMask kNone{};
   std::array<const BlockMask*, 8> at;  // in blocks below along the axes whose bits are set
@@ -181,7 +181,7 @@ std::array<BlockMask, 3> Regions::lone_edges(std::int32_t block) const {
   return result;
 }
 
-Vector3d Regions::normal(const Region& region) const {
+Vector3d CellRegions::normal(const Region& region) const {
   if (region.merged()) return cubes_[number(region)].normal.cast<double>();
   Vector3d sum = Vector3d::Zero();
   const int signs = cells_.corner_signs(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints

@@ -1,4 +1,4 @@
-#include "reference/grid_frame.h"
+#include "reference/meshing_frame.h"
 
 #include <tbb/parallel_for.h>
 
@@ -29,9 +29,9 @@ void check_finite(const openvdb::FloatGrid& grid, double isovalue) {
 
 }  // namespace
 
-GridFrame grid_frame(const openvdb::FloatGrid& grid, double isovalue) {
+MeshingFrame meshing_frame(const openvdb::FloatGrid& grid, double isovalue) {
   check_finite(grid, isovalue);
-  GridFrame frame;
+  MeshingFrame frame;
   frame.transform = grid.transform().copy();
   frame.inside_is_above =
       grid.getGridClass() != openvdb::GRID_LEVEL_SET && double(grid.background()) < isovalue;

@@ -10,7 +10,7 @@ namespace hermesh {
 /// A grid's placement cut in two, and its inside. The transform maps voxel coordinates to world units
 /// relative to `origin`, so that points computed with it keep single precision's full relative accuracy
 /// however far from zero the grid stands.
-struct GridFrame {
+struct MeshingFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< choose_origin() of the box of the active voxels
   openvdb::math::Transform::Ptr transform;
   /// The same rule as for our own extractors: inside is below the isovalue, except in a volume that is no
@@ -19,6 +19,6 @@ struct GridFrame {
 };
 
 /// @throws Error for an isovalue, a background or a value in a leaf that is not finite
-GridFrame grid_frame(const openvdb::FloatGrid& grid, double isovalue);
+MeshingFrame meshing_frame(const openvdb::FloatGrid& grid, double isovalue);
 
 }  // namespace hermesh

@@ -1,0 +1,85 @@
+#!/usr/bin/env bash
+# Whether every name has one definition: what the linker takes for granted and no compiler sees.
+#   experiments/check_one_definition.sh names    classes of one name in two files: seconds, builds nothing
+#   experiments/check_one_definition.sh odr      the program with link-time optimisation and -Wodr: half an hour
+#   experiments/check_one_definition.sh plain    the program without optimisation, and what it then makes of regions
+#   experiments/check_one_definition.sh          all of them
+# Says what is wrong and exits with 1; builds in build/odr and build/plain.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+jobs=${JOBS:-$(nproc)}
+
+build() {  # folder, then options of CMake
+  local folder=$1
+  shift
+  cmake -S . -B "$folder" -G Ninja -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF "$@" > "$folder.log"
+  cmake --build "$folder" --target hermesh -j "$jobs" >> "$folder.log" 2>&1 || { tail -40 "$folder.log"; exit 1; }
+}
+
+# A class or an enumeration at the scope of a namespace that has a name, defined in two files. Files with a main() or
+# with tests are programs of their own.
+check_names() {
+  find algorithms reference validation experiments -name '*.h' -o -name '*.cpp' ! -name '*_test.cpp' ! -name main.cpp |
+    grep -v '^experiments/bench/' | sort | xargs awk '
+      FNR == 1 { depth = 0; hidden = 0; space = "" }
+      { line = $0; sub(/\/\/.*/, "", line) }
+      line ~ /^namespace \{/ { hidden = 1; next }
+      line ~ /^}  *\/\/ namespace$/ || $0 ~ /^}  \/\/ namespace$/ { hidden = 0; next }
+      line ~ /^namespace [a-z_:]+ \{/ { split(line, words, " "); space = words[2]; next }
+      !hidden && line ~ /^(class|struct|enum class|enum|union) [A-Za-z_0-9]+( final)?( :[^;]*)? \{/ {
+        name = line
+        sub(/^(enum class|class|struct|enum|union) /, "", name)
+        sub(/[^A-Za-z_0-9].*/, "", name)
+        key = space "::" name
+        if (key in seen && seen[key] != FILENAME) { print key " is defined in " seen[key] " and in " FILENAME; bad = 1 }
+        seen[key] = FILENAME
+      }
+      END { exit bad }'
+  echo "names: each class is defined in one file"
+}
+
+check_odr() {
+  mkdir -p build
+  build build/odr -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS=-Wodr -DCMAKE_INTERPROCEDURAL_OPTIMIZATION=ON
+  if grep -E 'Wodr|Wlto-type-mismatch|violates the C\+\+ One Definition Rule' build/odr.log; then exit 1; fi
+  echo "odr: the program links without a word on definitions"
+}
+
+check_plain() {
+  mkdir -p build
+  build build/plain -DCMAKE_BUILD_TYPE=Debug
+  local out
+  out=$(mktemp -d)
+  trap 'rm -r "$out"' EXIT
+  # An octahedron of radius 1, which merged regions must leave closed.
+  cat > "$out/octahedron.off" << 'OFF'
+OFF
+6 8 0
+1 0 0
+-1 0 0
+0 1 0
+0 -1 0
+0 0 1
+0 0 -1
+3 0 2 4
+3 2 1 4
+3 1 3 4
+3 3 0 4
+3 2 0 5
+3 1 2 5
+3 3 1 5
+3 0 3 5
+OFF
+  timeout 600 build/plain/hermesh remesh "$out/octahedron.off" "$out/octahedron.ply" --resolution 24 \
+    --extractor manifold-dual-contouring -o merging=regions -o tolerance=0.5
+  timeout 600 build/plain/hermesh validate "$out/octahedron.ply" --reference "$out/octahedron.off" --require watertight
+  echo "plain: merging=regions runs without optimisation"
+}
+
+case "${1:-all}" in
+  names) check_names ;;
+  odr) check_odr ;;
+  plain) check_plain ;;
+  all) check_names && check_odr && check_plain ;;
+  *) sed -n '2,7s/^# \{0,1\}//p' "$0"; [ "$1" = --help ] && exit 0 || exit 2 ;;
+esac

@@ -1,0 +1,45 @@
+// The part of space that certainly hangs together with infinity.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "validation/triangle_tree.h"
+
+namespace hermesh::validation {
+
+/// Cubes of 1/128 of the longest side of a mesh's box, flooded from outside through the sides of those that
+/// no triangle's box of parts meets.
+class FreeCells {
+ public:
+  /// None: every point in the box counts as not free.
+  FreeCells() = default;
+  explicit FreeCells(const TriangleTree& tree);
+
+  double cell() const { return cell_; }
+  /// Whether the flood came to the point's cell. Points beyond the box are free.
+  bool free(const Eigen::Vector3d& point) const { return state_at(point) == kFree; }
+  /// Whether neither the flood nor a triangle came there, so that triangles part it from infinity but for
+  /// gaps that are narrower than a cell or two.
+  bool enclosed(const Eigen::Vector3d& point) const { return state_at(point) == kUnseen; }
+
+ private:
+  void block(const Corners& triangle);
+  void flood();
+  std::size_t index(const Eigen::Vector3i& at) const {
+    return (std::size_t(at.x()) * std::size_t(size_.y()) + std::size_t(at.y())) * std::size_t(size_.z()) +
+           std::size_t(at.z());
+  }
+  Eigen::Vector3i cell_of(const Eigen::Vector3d& point) const;
+
+  double cell_ = 0.0;
+  Eigen::Vector3d lower_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3i size_ = Eigen::Vector3i::Zero();
+  enum : std::uint8_t { kUnseen, kBlocked, kFree };
+  std::uint8_t state_at(const Eigen::Vector3d& point) const {
+    return state_.empty() ? kBlocked : state_[index(cell_of(point))];
+  }
+  std::vector<std::uint8_t> state_;
+};
+
+}  // namespace hermesh::validation

@@ -1,0 +1,306 @@
+#include "validation/solid_comparison.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "algorithms/core/disjoint_sets.h"
+#include "validation/outer_boundary.h"
+#include "validation/solid.h"
+#include "validation/surface_samples.h"
+
+namespace hermesh::validation {
+namespace {
+
+constexpr double kDeviations = 3.0;
+constexpr double kFalseShare = 0.001, kLostShare = 0.01, kVolumeShare = 0.005;
+constexpr double kTimesDistance = 3.0, kLongestShare = 1.0 / 16;
+
+/// A number in [0, 1) that the counter alone decides (Steele, Lea and Flood, Fast Splittable Pseudorandom
+/// Number Generators, 2014), so that points do not depend on threads.
+double random_fraction(std::uint64_t counter) {
+  std::uint64_t z = (counter + 1) * 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+/// Wilson's interval of a share, times `whole`.
+Estimate estimate(std::int64_t hits, std::int64_t samples, double whole) {
+  if (samples == 0) return {};
+  const double n = double(samples), p = double(hits) / n, z = kDeviations;
+  const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+  const double half = z / (1.0 + z * z / n) * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
+  // Of no hits the lower end is 0 and of nothing else the upper end is 1; rounding would leave a trace.
+  return {whole * p, hits == 0 ? 0.0 : whole * std::max(0.0, centre - half),
+          hits == samples ? whole : whole * std::min(1.0, centre + half)};
+}
+
+struct Hits {
+  std::int64_t hits = 0, samples = 0;
+  std::optional<Eigen::Vector3d> place;
+
+  void add(bool hit, const Eigen::Vector3d& point) {
+    ++samples;
+    hits += hit;
+    if (hit && !place) place = point;
+  }
+  void append(const Hits& later) {
+    hits += later.hits;
+    samples += later.samples;
+    if (!place) place = later.place;
+  }
+};
+
+struct InSpace {
+  Hits mesh, reference, difference, unknown, unexplained;
+  void append(const InSpace& later) {
+    mesh.append(later.mesh);
+    reference.append(later.reference);
+    difference.append(later.difference);
+    unknown.append(later.unknown);
+    unexplained.append(later.unexplained);
+  }
+};
+
+/// Sums add(i, sum) over i < count, in ranges that do not depend on threads.
+template <class Sum, class Add>
+Sum sum_over(std::int64_t count, const Add& add, const RunContext& context) {
+  const auto add_range = [&](const tbb::blocked_range<std::int64_t>& range, Sum sum) {
+    context.check();
+    for (std::int64_t i = range.begin(); i < range.end(); ++i) add(i, sum);
+    return sum;
+  };
+  const auto join = [](Sum left, const Sum& right) {
+    left.append(right);
+    return left;
+  };
+  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::int64_t>(0, count, 256), Sum{}, add_range,
+                                            join);
+}
+
+/// A surface with all that is asked of it.
+struct Body {
+  MeshFile mesh;
+  TriangleSoup soup;
+  TriangleTree tree;
+  Solid solid;
+
+  Body(MeshFile welded, Solid::Reading reading, const RunContext& context)
+      : mesh(std::move(welded)), soup(mesh), tree(soup), solid(soup, tree, reading, context) {}
+  Body(const Body&) = delete;
+};
+
+/// Of triangles that need not be there.
+struct Surface {
+  TriangleSoup soup;
+  std::optional<TriangleTree> tree;
+
+  explicit Surface(const MeshFile& mesh) : soup(mesh) {
+    if (!soup.triangles.empty()) tree.emplace(soup);
+  }
+  bool beyond(const Eigen::Vector3d& point, double way) const {
+    return !tree || tree->closest(point).squared > way * way;
+  }
+};
+
+std::int64_t count_components(const MeshFile& mesh) {
+  DisjointSets sets(mesh.points.size());
+  const TriangleSoup soup(mesh);
+  for (const Triangle& t : soup.triangles) sets.join(sets.join(t[0], t[1]), t[2]);
+  std::vector<std::uint8_t> counted(mesh.points.size(), 0);
+  std::int64_t components = 0;
+  for (const Triangle& t : soup.triangles) components += !std::exchange(counted[sets.find(t[0])], 1);
+  return components;
+}
+
+double area_of(const MeshFile& mesh) {
+  const TriangleSoup soup(mesh);
+  double area = 0.0;
+  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
+    const Corners c = soup.corners(t);
+    area += 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm();
+  }
+  return area;
+}
+
+class Comparison {
+ public:
+  Comparison(const Body& mesh, const Body& reference, const SolidOptions& options, const RunContext& context)
+      : mesh_(mesh),
+        reference_(reference),
+        options_(options),
+        context_(context),
+        boundary_(outer_boundary(reference.soup, reference.tree, reference.solid, context)),
+        pieces_(options.pieces ? outer_boundary(mesh.soup, mesh.tree, mesh.solid, context).bounding
+                               : MeshFile{}),
+        ours_(options.pieces ? pieces_ : mesh.mesh),
+        bounding_(boundary_.bounding),
+        possible_(boundary_.possible) {}
+
+  SolidComparison run(const SolidComparison& known) {
+    result_ = known;
+    result_.reference_closed = reference_.solid.closed();
+    result_.reference_oriented = reference_.solid.oriented();
+    result_.reference_area = boundary_.area;
+    result_.possible_area = boundary_.possible_area;
+    result_.reference_components = boundary_.components;
+    if (options_.pieces) result_.mesh_area = area_of(pieces_);
+    result_.explained = explained_way();
+    compare_surfaces();
+    compare_space();
+    result_.verdict = verdict();
+    return result_;
+  }
+
+ private:
+  double explained_way() const {
+    const Box& box = reference_.tree.bounds();
+    const double least = 1.5 * boundary_.finest;
+    if (options_.voxel_size > 0.0) return std::max(least, std::sqrt(3.0) * options_.voxel_size);
+    const SurfaceSamples samples(ours_.soup, options_.samples);
+    struct Farthest {
+      double squared = 0.0;
+      void append(const Farthest& o) { squared = std::max(squared, o.squared); }
+    };
+    const auto farthest = sum_over<Farthest>(
+        samples.size(),
+        [&](std::int64_t i, Farthest& f) { f.append({reference_.tree.closest(samples[i]).squared}); },
+        context_);
+    const double longest = (box.upper - box.lower).maxCoeff();
+    return std::max(least, std::min(kTimesDistance * std::sqrt(farthest.squared), kLongestShare * longest));
+  }
+
+  /// Whether what lies on a surface, `explained` from the other boundary, has the same on both sides of it
+  /// there.
+  bool alike_about(const Eigen::Vector3d& point, const Corners& on, const Solid& solid) const {
+    const Eigen::Vector3d step = result_.explained * (on[1] - on[0]).cross(on[2] - on[0]).stableNormalized();
+    const Side front = solid.side(point + step), back = solid.side(point - step);
+    return front == back && front != Side::unknown;
+  }
+
+  void compare_surfaces() {
+    const double way = result_.explained;
+    const SurfaceSamples ours(ours_.soup, options_.samples), theirs(bounding_.soup, options_.samples);
+    const Hits false_ones = sum_over<Hits>(
+        ours.size(),
+        [&](std::int64_t i, Hits& hits) {
+          const Eigen::Vector3d p = ours[i];
+          hits.add(bounding_.beyond(p, way) && possible_.beyond(p, way) &&
+                       alike_about(p, ours_.soup.corners(ours.triangle(i)), reference_.solid),
+                   p);
+        },
+        context_);
+    const Hits lost_ones = sum_over<Hits>(
+        theirs.size(),
+        [&](std::int64_t i, Hits& hits) {
+          const Eigen::Vector3d p = theirs[i];
+          hits.add(
+              ours_.beyond(p, way) && alike_about(p, bounding_.soup.corners(theirs.triangle(i)), mesh_.solid),
+              p);
+        },
+        context_);
+    result_.false_area = estimate(false_ones.hits, false_ones.samples, result_.mesh_area);
+    result_.lost_area = estimate(lost_ones.hits, lost_ones.samples, result_.reference_area);
+    result_.false_place = false_ones.place;
+    result_.lost_place = lost_ones.place;
+  }
+
+  void compare_space() {
+    Box box = reference_.tree.bounds();
+    box.add(mesh_.tree.bounds());
+    const Eigen::Vector3d size = box.upper - box.lower;
+    const double whole = size.prod();
+    const Eigen::Vector3d strata = strata_along(size);
+    const std::int64_t ny = std::int64_t(strata.y()), nz = std::int64_t(strata.z());
+    const std::int64_t count = std::int64_t(strata.prod());
+    const InSpace found = sum_over<InSpace>(
+        count,
+        [&](std::int64_t i, InSpace& sum) {
+          const Eigen::Vector3d at(double(i / (ny * nz)), double(i / nz % ny), double(i % nz));
+          const std::uint64_t counter = 3 * std::uint64_t(i);
+          const Eigen::Vector3d within(random_fraction(counter), random_fraction(counter + 1),
+                                       random_fraction(counter + 2));
+          add(box.lower + (at + within).cwiseQuotient(strata).cwiseProduct(size), sum);
+        },
+        context_);
+    const auto volume = [&](const Hits& hits) { return estimate(hits.hits, hits.samples, whole); };
+    result_.mesh_volume = volume(found.mesh);
+    result_.reference_volume = volume(found.reference);
+    result_.difference = volume(found.difference);
+    result_.unknown_volume = volume(found.unknown);
+    result_.unexplained = volume(found.unexplained);
+    result_.unexplained_place = found.unexplained.place;
+    Hits at_most = found.difference;
+    at_most.hits += found.unknown.hits;
+    result_.difference.upper = volume(at_most).upper;
+  }
+
+  /// How many along each side, so that they are about cubes and about as many as samples.
+  Eigen::Vector3d strata_along(const Eigen::Vector3d& size) const {
+    const double longest = size.maxCoeff();
+    const Eigen::Vector3d shape = (size / longest).cwiseMax(1e-6);
+    const double scale = std::cbrt(double(options_.samples) / shape.prod());
+    Eigen::Vector3d strata;
+    for (int axis = 0; axis < 3; ++axis) strata[axis] = std::max(1.0, std::round(scale * shape[axis]));
+    return strata;
+  }
+
+  void add(const Eigen::Vector3d& point, InSpace& sum) const {
+    const Side ours = mesh_.solid.side(point), theirs = reference_.solid.side(point);
+    const bool unknown = ours == Side::unknown || theirs == Side::unknown;
+    const bool differs = !unknown && ours != theirs;
+    sum.mesh.add(ours == Side::inside, point);
+    sum.reference.add(theirs == Side::inside, point);
+    sum.unknown.add(unknown, point);
+    sum.difference.add(differs, point);
+    const double way = result_.explained;
+    const auto far = [&] {
+      return ours_.beyond(point, way) || (bounding_.beyond(point, way) && possible_.beyond(point, way));
+    };
+    sum.unexplained.add(differs && far(), point);
+  }
+
+  SolidComparison::Verdict verdict() const {
+    using Verdict = SolidComparison::Verdict;
+    const SolidComparison& r = result_;
+    if (r.reference_volume.value <= 0.0 || r.reference_area <= 0.0) return Verdict::unknown;
+    if (r.false_area.lower > kFalseShare * r.mesh_area || r.lost_area.lower > kLostShare * r.reference_area ||
+        r.unexplained.lower > kVolumeShare * r.reference_volume.value)
+      return Verdict::differs;
+    const bool known =
+        r.reference_area > r.possible_area && r.reference_volume.value > r.unknown_volume.value;
+    return known ? Verdict::same : Verdict::unknown;
+  }
+
+  const Body &mesh_, &reference_;
+  const SolidOptions& options_;
+  const RunContext& context_;
+  OuterBoundary boundary_;
+  MeshFile pieces_;  ///< without their seams; empty for a mesh that is one
+  Surface ours_, bounding_, possible_;
+  SolidComparison result_;
+};
+
+}  // namespace
+
+SolidComparison compare_solids(const MeshFile& mesh, const MeshFile& reference, const SolidOptions& options,
+                               RunContext& context) {
+  const Stage stage(context, "solids");
+  SolidComparison result;
+  result.samples = options.samples;
+  result.mesh_components = count_components(mesh);
+  result.mesh_area = area_of(mesh);
+  MeshFile ours = welded_triangles(mesh), theirs = welded_triangles(reference, QuadRule::better);
+  if (ours.triangles.empty() || theirs.triangles.empty()) return result;
+  const Body body(std::move(ours), Solid::Reading::by_orientation, context);
+  const Body reference_body(std::move(theirs), Solid::Reading::by_any_rule, context);
+  return Comparison(body, reference_body, options, context).run(result);
+}
+
+}  // namespace hermesh::validation
