@@ -286,12 +286,13 @@ class SubjectMeasurement {
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
-      const Contender ours = {kGuaranteed,
-                              {{"tolerance", readable_exactly(tolerance)},
-                               {"merging", input_.parameters.text("merging")},
-                               {"placement", input_.parameters.text("placement")},
-                               {"largest_cube", input_.parameters.text("largest_cube")},
-                               {"representation", input_.parameters.text("representation")}}};
+      Contender ours = {kGuaranteed,
+                        {{"tolerance", readable_exactly(tolerance)},
+                         {"merging", input_.parameters.text("merging")},
+                         {"placement", input_.parameters.text("placement")},
+                         {"representation", input_.parameters.text("representation")}}};
+      if (input_.parameters.is("merging", "regions"))
+        ours.options["largest_cube"] = input_.parameters.text("largest_cube");
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }

@@ -53,6 +53,22 @@ std::string checked(std::string_view variant, const OptionSpec& spec, const std:
   return shortest(*number);
 }
 
+/// Whether a condition of OptionSpec::only_with holds.
+bool holds(const std::string& condition, const Options& options) {
+  const auto [name, values] = parse_option(condition);
+  for (std::size_t first = 0; first <= values.size();) {
+    const std::size_t end = std::min(values.find('|', first), values.size());
+    if (options.is(name, values.substr(first, end - first))) return true;
+    first = end + 1;
+  }
+  return false;
+}
+
+std::string in_words(std::string condition) {
+  for (std::size_t bar; (bar = condition.find('|')) != std::string::npos;) condition.replace(bar, 1, " or ");
+  return condition;
+}
+
 }  // namespace
 
 Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
@@ -68,6 +84,11 @@ Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
     const auto entry = given.find(spec.name);
     values_[spec.name] = checked(variant, spec, entry == given.end() ? spec.fallback : entry->second);
   }
+  for (const OptionSpec& spec : declared)
+    for (const std::string& condition : spec.only_with)
+      if (given.contains(spec.name) && !holds(condition, *this))
+        throw Error("option '" + spec.name + "' of " + std::string(variant) + " has no effect without " +
+                    in_words(condition));
 }
 
 double Options::number(std::string_view name) const {

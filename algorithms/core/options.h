@@ -18,13 +18,17 @@ struct OptionSpec {
   std::vector<std::string> choices = {};
   double minimum = 0.0;
   double maximum = 1e300;
+  /// Settings of the variant's other options, each "name=value" or "name=value|value…", without any one of which this
+  /// option has no effect, so that to give it is an error.
+  std::vector<std::string> only_with = {};
 };
 
 class Options {
  public:
   Options() = default;
   /// Checks `given` against the declarations and fills in what is missing.
-  /// @throws Error naming the variant, the option and what would be allowed.
+  /// @throws Error naming the variant, the option and what would be allowed; also for an option that has no effect beside
+  /// the others.
   Options(std::string_view variant, std::span<const OptionSpec> declared,
           const std::map<std::string, std::string>& given);
 

@@ -50,6 +50,29 @@ TEST(Options, RefusalsNameVariantOptionAndWhatIsAllowed) {
     EXPECT_NE(error_of({{"threshold", bad}}), "") << bad;
 }
 
+TEST(Options, AnOptionThatHasNoEffectBesideTheOthersIsRefused) {
+  const std::vector<OptionSpec> specs = {
+      {.name = "kind", .fallback = "plain", .help = "", .choices = {"plain", "packed", "fixed"}},
+      {.name = "code", .fallback = "a", .help = "", .choices = {"a", "b"}, .only_with = {"kind=packed|fixed"}},
+      {.name = "world", .fallback = "0", .help = ""},
+      {.name = "voxels", .fallback = "1", .help = "", .only_with = {"world=0", "kind=plain"}}};
+  const auto error = [&](const std::map<std::string, std::string>& given) {
+    try {
+      Options("it", specs, given);
+      return std::string();
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+  };
+  EXPECT_EQ(error({}), "");
+  EXPECT_EQ(error({{"kind", "packed"}, {"code", "b"}}), "");
+  EXPECT_EQ(error({{"kind", "fixed"}, {"code", "a"}}), "");
+  EXPECT_EQ(error({{"code", "a"}}), "option 'code' of it has no effect without kind=packed or fixed");
+  EXPECT_EQ(error({{"voxels", "2"}, {"world", "0.0"}}), "");
+  EXPECT_EQ(error({{"voxels", "2"}, {"world", "3"}}), "option 'voxels' of it has no effect without world=0");
+  EXPECT_EQ(error({{"voxels", "2"}, {"kind", "fixed"}}), "option 'voxels' of it has no effect without kind=plain");
+}
+
 TEST(Options, AVariantWithoutOptionsTakesNone) {
   EXPECT_THROW(Options("marching-cubes", {}, {{"a", "1"}}), Error);
   EXPECT_NO_THROW(Options("marching-cubes", {}, {}));

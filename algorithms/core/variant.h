@@ -23,6 +23,9 @@ struct Promises {
 };
 
 struct AdaptivityField;  // extraction/adaptivity_field.h
+struct EdgeCrossing;     // hermite/crossing.h
+template <class Crossing>
+struct SparseHermite;  // hermite/sparse_hermite.h
 
 /// Volume in, mesh out.
 struct ExtractionInput {
@@ -35,6 +38,12 @@ struct ExtractionInput {
   /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform one
   /// leaves it alone.
   const AdaptivityField* field = nullptr;
+  /// Exact Hermite data of the surface at isovalue 0 on the level set's lattice and with its signs, where they are at hand
+  /// instead of polygons; null: they are not.
+  const SparseHermite<EdgeCrossing>* hermite = nullptr;
+  /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a variant which
+  /// proves something of its mesh proves it of the points as they will be written.
+  bool written_in_single = false;
 };
 
 struct Extractor {

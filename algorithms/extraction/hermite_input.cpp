@@ -9,11 +9,12 @@ namespace {
 
 bool wants_polygons(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
-  return source == "exact" || (source == "auto" && input.source && input.isovalue == 0.0);
+  return source == "exact" || (source == "auto" && (input.source || input.hermite) && input.isovalue == 0.0);
 }
 
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
+  if (input.hermite && input.isovalue == 0.0) return *input.hermite;
   const PolygonMesh& source =
       polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
@@ -24,6 +25,13 @@ FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
                        " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
                        " took the nearest one's plane, the others the level set's gradient");
   return hermite;
+}
+
+/// The same points of the world about the world's own origin: with it single precision is that of a file in single
+/// precision.
+void about_world_origin(IndexToWorld& placement) {
+  placement.offset += placement.origin;
+  placement.origin.setZero();
 }
 
 std::vector<std::string> normal_code_names() {
@@ -51,6 +59,7 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
   PackedHermite hermite = wants_polygons(input)
                               ? pack(sample(input, variant), code, input.context)
                               : sample_level_set_packed(input.level_set, input.isovalue, code, input.context);
+  if (input.written_in_single) about_world_origin(hermite.placement);
   Represented figures;
   figures.crossings = hermite.crossings.size();
   figures.bytes = hermite.memory_bytes();
@@ -64,6 +73,7 @@ FloatHermite hermite_input(const ExtractionInput& input, const std::string& vari
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");
   Represented data =
       through(representation, parse_normal_code(input.options.text("normals")), sample(input, variant), input.context);
+  if (input.written_in_single) about_world_origin(data.hermite.placement);
   report_figures(data, input.level_set, input.context);
   return std::move(data.hermite);
 }
@@ -84,7 +94,11 @@ std::vector<OptionSpec> hermite_options() {
            "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: 'dense-float' (52 "
            "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
            {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
-          {"normals", "octahedral", "code of 16 bits for normals in 'sparse' and 'fixed'", normal_code_names()}};
+          {.name = "normals",
+           .fallback = "octahedral",
+           .help = "code of 16 bits for normals in 'sparse' and 'fixed'",
+           .choices = normal_code_names(),
+           .only_with = {"representation=sparse|fixed"}}};
 }
 
 }  // namespace hermesh

@@ -189,7 +189,9 @@ EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& i
                                       .source = input.source,
                                       .options = input.options,
                                       .context = input.context,
-                                      .field = input.field}),
+                                      .field = input.field,
+                                      .hermite = input.hermite,
+                                      .written_in_single = input.written_in_single}),
                    closed.ends};
   if (!closed.ends.any()) return result;
   if (ends == Ends::open)

@@ -10,6 +10,8 @@
 namespace hermesh::cli {
 namespace {
 
+constexpr int kFrustumResolution = 84;
+
 constexpr const char* kFrustumForm =
     "\"px,py,pz lx,ly,lz angle aspect near far\", and \"ux,uy,uz\" for up behind them unless it is 0,1,0";
 
@@ -106,6 +108,8 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
                                                Session& session) {
   const bool has_mask = !arguments.mask.empty() || !arguments.frustum.empty();
   if (!arguments.outside.empty() && !has_mask) throw UsageError("--outside needs --mask or --frustum");
+  if (arguments.frustum_resolution && arguments.frustum.empty())
+    throw UsageError("--frustum-resolution needs --frustum");
   if (!has_mask && arguments.tolerance_grid.empty()) return std::nullopt;
   check_adaptive(extractor);
   AdaptivityField field;
@@ -114,7 +118,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
   if (!arguments.mask.empty()) field.mask = read_part(arguments.mask, &AdaptivityField::mask, field.outside, session);
   if (!arguments.frustum.empty()) {
     try {
-      field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution, session.context);
+      field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution.value_or(kFrustumResolution), session.context);
     } catch (const Error& error) {
       throw UsageError(std::string("--frustum: ") + error.what());
     }

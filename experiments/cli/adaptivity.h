@@ -12,7 +12,7 @@ namespace hermesh::cli {
 
 struct AdaptivityArguments {
   std::string mask, frustum, outside, tolerance_grid;  ///< empty: not given
-  int frustum_resolution = 84;
+  std::optional<int> frustum_resolution;
 };
 
 void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments);

@@ -1,19 +1,21 @@
 // hermesh combine: the union, intersection or difference of two solids, as Hermite data and back to a mesh.
-#include "algorithms/hermite/combine.h"
-
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
 #include <memory>
 
 #include "algorithms/core/mesh_file.h"
-#include "algorithms/extraction/dual_contouring/dual_contouring.h"
-#include "algorithms/hermite/hermite_file.h"
-#include "algorithms/hermite/samplers.h"
+#include "algorithms/core/written_precision.h"
+#include "algorithms/hermite/lost_slivers.h"
+#include "algorithms/hermite/solids.h"
+#include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
-#include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
+#include "experiments/rows.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::cli {
 namespace {
@@ -22,7 +24,8 @@ struct Arguments {
   std::string operation;
   std::string first, second, out;
   VoxelizeArguments voxelizing;
-  std::vector<std::string> options;  ///< key=value, of dual contouring
+  ExtractorArguments extracting;
+  bool judge = false;
 };
 
 Boolean boolean_of(const std::string& operation) {
@@ -30,47 +33,110 @@ Boolean boolean_of(const std::string& operation) {
   return operation == "intersection" ? Boolean::intersect : Boolean::subtract;
 }
 
-/// The same points about another origin, so that both meshes are voxelized on one lattice.
-PolygonMesh about(PolygonMesh mesh, const Eigen::Vector3d& origin) {
-  const Eigen::Vector3d shift = mesh.origin - origin;
-  for (auto& point : mesh.points) point = (point.cast<double>() + shift).cast<float>();
-  mesh.origin = origin;
+std::string result_name(const Arguments& arguments) {
+  return "the " + arguments.operation + " of '" + arguments.first + "' and '" + arguments.second + "'";
+}
+
+/// A resolution is that of the longer operand, so that the order of the two does not matter.
+double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Arguments& arguments,
+                  const ChosenVoxelizer& chosen, Session& session) {
+  const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
+  return voxelization_input(second_is_longer ? second : first,
+                            second_is_longer ? arguments.second : arguments.first, arguments.voxelizing,
+                            chosen, session)
+      .voxel_size;
+}
+
+SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const SharedLattice& lattice,
+                     const Arguments& arguments, const ChosenVoxelizer& chosen, Session& session) {
+  const auto voxelized = [&](const PolygonMesh& framed) {
+    return voxelize(framed, file, arguments.voxelizing, chosen, session);
+  };
+  SampledSolid solid =
+      about_file(file, [&] { return sample_solid(mesh, lattice, voxelized, session.context); });
+  const PolygonSampling& sampling = solid.sampling;
+  if (const std::size_t missed = sampling.nearest + sampling.fallback; missed > 0)
+    session.context.note("'" + file + "': " + std::to_string(missed) + " of " +
+                         std::to_string(sampling.exact + missed) +
+                         " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
+                         " took the nearest one's plane, the others the level set's gradient");
+  return solid;
+}
+
+/// What became of parts that are thinner than a voxel. (Of parts that an operand alone lost its voxelization
+/// tells.)
+std::string sentence(const LostSlivers& lost, Boolean boolean, double voxel_size) {
+  const double volume = lost.volume * voxel_size * voxel_size * voxel_size;
+  return std::to_string(lost.edges) + " lattice edges pass through " +
+         (boolean == Boolean::unite ? "gaps that hold no sample: they were closed"
+                                    : "parts that hold no sample: they were lost") +
+         ", a volume of about " + text(volume) + ", the thickest of them " + text(lost.longest * voxel_size) +
+         " at " + text(lost.place) + "; smaller voxels keep more";
+}
+
+/// @throws Error that tells a result that is empty from one that is too thin.
+void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const Arguments& arguments,
+                     double voxel_size) {
+  if (!result.hermite.leaves.empty()) return;
+  if (lost.edges > 0)
+    throw Error(result_name(arguments) + " is thinner than a voxel everywhere, nothing was written: " +
+                sentence(lost, boolean_of(arguments.operation), voxel_size));
+  throw Error(result_name(arguments) +
+              " is empty, nothing was written: no sample and no edge of the lattice lies in it");
+}
+
+PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, const Arguments& arguments,
+                    Session& session) {
+  const Stopwatch watch;
+  PolygonMesh mesh = chosen.extractor.extract({.level_set = solid.level_set,
+                                               .options = chosen.options,
+                                               .context = session.context,
+                                               .hermite = &solid.hermite,
+                                               .written_in_single = is_written_in_single(arguments.out)});
+  session.context.check();
+  if (mesh.empty()) throw Error(result_name(arguments) + " has no surface, nothing was written");
+  print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;
 }
 
-FloatHermite sampled(const PolygonMesh& mesh, const std::string& file, const Arguments& arguments,
-                     const ChosenVoxelizer& chosen, Session& session) {
-  return sample_polygons(voxelize(mesh, file, arguments.voxelizing, chosen, session), 0.0, mesh, session.context);
+/// Reads the file back; returns whether it is what the extractor promises.
+bool keeps_promises(const std::string& file, const Promises& promises, Session& session) {
+  const validation::MeshReport report =
+      validation::judge(read_mesh_file(file, session.context), {.libraries = false}, session.context);
+  const PromiseCheck check = check_promises(promises, report);
+  std::cout << promise_verdict(promises, check) << '\n';
+  for (const std::string& line : report.sentences()) std::cout << line << '\n';
+  return check.broken.empty();
 }
 
 int run_combine(const Arguments& given, Session& session) {
   Arguments arguments = given;
-  const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
-  const DualContouringOptions placement = as_usage([&] {
-    return read_dual_contouring_options(
-        parse_options("dual-contouring", dual_contouring_options(), arguments.options));
-  });
+  const ChosenVoxelizer voxelizer = choose_voxelizer(arguments.voxelizing);
+  if (voxelizer.options.is("signs", "unsigned"))
+    throw UsageError("--signs unsigned leaves the solids without an inside that could be combined");
+  const ChosenExtractor extractor = choose_extractor(arguments.extracting);
   check_mesh_output(arguments.out);
   const PolygonMesh first = read_polygons(arguments.first, session);
-  const PolygonMesh second = about(read_polygons(arguments.second, session), first.origin);
-  // A resolution is the first mesh's; the second takes the size of voxel that comes of it.
-  arguments.voxelizing.voxel_size =
-      voxelization_input(first, arguments.first, arguments.voxelizing, chosen, session).voxel_size;
+  const PolygonMesh second = read_polygons(arguments.second, session);
+  arguments.voxelizing.voxel_size = voxel_size(first, second, arguments, voxelizer, session);
+  const SharedLattice lattice = shared_lattice(first, second, *arguments.voxelizing.voxel_size);
 
-  const FloatHermite a = sampled(first, arguments.first, arguments, chosen, session);
-  const FloatHermite b = sampled(second, arguments.second, arguments, chosen, session);
+  const SampledSolid a = sampled(first, arguments.first, lattice, arguments, voxelizer, session);
+  const SampledSolid b = sampled(second, arguments.second, lattice, arguments, voxelizer, session);
+  const Boolean boolean = boolean_of(arguments.operation);
   const Stopwatch watch;
-  const FloatHermite result = combine(boolean_of(arguments.operation), a, b, session.context);
+  const CombinedSolid result = combine(boolean, a, b, session.context);
+  const LostSlivers lost = lost_slivers(boolean, a.hermite, b.hermite);
   session.context.check();
-  if (result.leaves.empty())
-    throw Error("the " + arguments.operation + " of " + arguments.first + " and " + arguments.second +
-                " is empty, nothing was written");
-  const PolygonMesh mesh = dual_contouring(view_of(result, session.context), placement, session.context);
-  print_summary(session, "combined to " + std::to_string(result.crossings.size()) + " edge crossings and " +
-                             std::to_string(mesh.triangle_count()) + " triangles, " + seconds_text(watch.seconds()));
-  write_mesh(arguments.out, mesh, session.context);
+  check_not_empty(result, lost, arguments, lattice.voxel_size);
+  if (lost.edges > 0) session.context.note(sentence(lost, boolean, lattice.voxel_size));
+  check_written_precision(arguments.out, result.level_set);
+  print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
+                             " edge crossings, " + seconds_text(watch.seconds()));
+  write_mesh(arguments.out, contour(result, extractor, arguments, session), session.context);
+  const bool kept = !arguments.judge || keeps_promises(arguments.out, extractor.extractor.promises, session);
   work_is_finished();
-  return kDone;
+  return kept ? kDone : kNotMet;
 }
 
 }  // namespace
@@ -78,18 +144,20 @@ int run_combine(const Arguments& given, Session& session) {
 void add_combine(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command = add_command(app, session, "combine", "Union, intersection or difference of two solids");
-  command->add_option("OPERATION", arguments->operation, "union, intersection or difference (the first without the second)")
+  command
+      ->add_option("OPERATION", arguments->operation,
+                   "union, intersection or difference (the first without the second)")
       ->required()
       ->check(CLI::IsMember({"union", "intersection", "difference"}));
   command->add_option("A", arguments->first, kMeshIn)->required();
   command->add_option("B", arguments->second, kMeshIn)->required();
   command->add_option("OUT", arguments->out, kMeshOut)->required();
   add_voxelize_options(*command, arguments->voxelizing);
-  command
-      ->add_option("-o", arguments->options,
-                   "key=value, an option of the extractor dual-contouring; may be repeated")
-      ->allow_extra_args(false)
-      ->check(key_value());
+  command->get_option("--resolution")->description("Voxels along the longest side of the larger solid");
+  add_extractor_options(*command, arguments->extracting, "manifold-dual-contouring");
+  command->add_flag(
+      "--judge", arguments->judge,
+      "Read the file back and judge whether it is what the extractor promises; if not, the exit code is 3");
   command->callback([arguments, &session] {
     session.command = [arguments, &session] { return run_combine(*arguments, session); };
   });

@@ -5,59 +5,50 @@
 #include <optional>
 #include <sstream>
 
-#include "algorithms/core/mesh_file.h"
 #include "algorithms/core/value_range.h"
 #include "algorithms/core/vdb_file.h"
+#include "algorithms/core/written_precision.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/extraction/volume_ends.h"
 #include "experiments/cli/adaptivity.h"
+#include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/session.h"
-#include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/harness.h"
 
 namespace hermesh::cli {
 namespace {
 
 struct ExtractArguments {
-  std::string extractor;  ///< set by add_extract_options()
+  ExtractorArguments variant;
   double isovalue = 0.0;
-  std::string grid;                  ///< empty: `sdf`, or the only scalar grid there is
-  std::string source;                ///< empty: the polygons are not at hand
-  std::vector<std::string> options;  ///< key=value
+  std::string grid;    ///< empty: `sdf`, or the only scalar grid there is
+  std::string source;  ///< empty: the polygons are not at hand
   std::string ends = "closed";
   std::string attributes;  ///< names of grids to sample, or "all"; empty: none
   AdaptivityArguments adaptivity;
 };
 
-/// A variant that was looked up, with its options checked.
-struct ChosenExtractor {
-  Extractor extractor;
-  Options options;
-};
-
 void add_extract_options(CLI::App& command, ExtractArguments& arguments, const std::string& fallback) {
-  arguments.extractor = fallback;
-  command.add_option("--extractor", arguments.extractor,
-                     "Name of the extractor, see hermesh list (default: " + arguments.extractor + ")");
+  add_extractor_options(command, arguments.variant, fallback);
   command
       .add_option("--isovalue", arguments.isovalue,
                   "Value of the surface, in the units of the grid (default: 0)")
       ->check(finite_number());
-  command.add_option("-o", arguments.options, "key=value, an option of the extractor; may be repeated")
-      ->allow_extra_args(false)
-      ->check(key_value());
   add_adaptivity_options(command, arguments.adaptivity);
 }
 
-ChosenExtractor choose_extractor(const ExtractArguments& arguments) {
-  return as_usage([&] {
-    const Extractor extractor = find_variant(all_extractors(), arguments.extractor);
-    return ChosenExtractor{extractor, parse_options(extractor.name, extractor.options, arguments.options)};
-  });
+/// Polygons that the extractor would not look at would leave the user in the belief that it did.
+void check_source_has_effect(const ExtractArguments& arguments, const ChosenExtractor& chosen) {
+  const Options& options = chosen.options;
+  if (options.is("hermite", "exact") || options.is("crossings", "exact")) return;
+  const bool automatic = options.is("hermite", "auto");
+  if (automatic && arguments.isovalue == 0.0) return;
+  throw UsageError("--source has no effect: " +
+                   (automatic ? "the polygons lie at the isovalue 0"
+                              : chosen.extractor.name + " with these options takes nothing from polygons"));
 }
 
 std::vector<std::string> attribute_names(const std::string& list) {
@@ -81,15 +72,24 @@ void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
                                                 : "closed half a voxel beyond its last samples; see --ends"));
 }
 
-/// `input`: the file that it is about.
-PolygonMesh extract(const std::string& input, const LevelSet& level_set, const PolygonMesh* source,
+/// `paths.in`: the file that it is about.
+PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
                     const ChosenExtractor& chosen, const ExtractArguments& arguments, Session& session) {
   const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);
+  const std::string& input = paths.in;
+  check_written_precision(paths.out, level_set);
   const Stopwatch watch;
   const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
   EndedMesh ended = about_file(input, [&] {
     return extract_with_ends(
-        chosen.extractor, {level_set, arguments.isovalue, source, chosen.options, session.context, field ? &*field : nullptr},
+        chosen.extractor,
+        {.level_set = level_set,
+         .isovalue = arguments.isovalue,
+         .source = source,
+         .options = chosen.options,
+         .context = session.context,
+         .field = field ? &*field : nullptr,
+         .written_in_single = is_written_in_single(paths.out)},
         treatment);
   });
   PolygonMesh mesh = std::move(ended.mesh);
@@ -105,27 +105,22 @@ PolygonMesh extract(const std::string& input, const LevelSet& level_set, const P
                 " beyond");
   }
   note_ends(ended.ends, treatment, session);
-  print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
-                             std::to_string(mesh.triangles.size()) + " triangles, " +
-                             std::to_string(mesh.quads.size()) + " quads, " + chosen.extractor.name + ", " +
-                             seconds_text(watch.seconds()));
+  print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;
 }
 
-void save(const std::string& path, const PolygonMesh& mesh, Session& session) {
-  write_mesh(path, mesh, session.context);
-  work_is_finished();
-}
-
 int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& session) {
-  const ChosenExtractor chosen = choose_extractor(arguments);
+  const ChosenExtractor chosen = choose_extractor(arguments.variant);
   const std::vector<std::string> attributes = attribute_names(arguments.attributes);
   check_mesh_output(paths.out);
   if (!attributes.empty()) check_keeps_attributes(paths.out);
   std::optional<PolygonMesh> source;
-  if (!arguments.source.empty()) source = read_polygons(arguments.source, session);
+  if (!arguments.source.empty()) {
+    check_source_has_effect(arguments, chosen);
+    source = read_polygons(arguments.source, session);
+  }
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  PolygonMesh mesh = extract(paths.in, level_set, source ? &*source : nullptr, chosen, arguments, session);
+  PolygonMesh mesh = extract(paths, level_set, source ? &*source : nullptr, chosen, arguments, session);
   if (!attributes.empty()) {
     std::string line = "attributes";
     for (const std::string& name : sample_attributes(mesh, paths.in, attributes, session.context))
@@ -139,11 +134,11 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
 int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const ExtractArguments& extracting,
                Session& session) {
   const ChosenVoxelizer voxelizer = choose_voxelizer(voxelizing);
-  const ChosenExtractor chosen = choose_extractor(extracting);
+  const ChosenExtractor chosen = choose_extractor(extracting.variant);
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  save(paths.out, extract(paths.in, level_set, &mesh, chosen, extracting, session), session);
+  save(paths.out, extract(paths, level_set, &mesh, chosen, extracting, session), session);
   return kDone;
 }
 

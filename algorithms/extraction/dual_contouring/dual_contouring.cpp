@@ -235,25 +235,23 @@ PolygonMesh dual_contouring(const ExtractionInput& input) {
 
 std::vector<OptionSpec> dual_contouring_options() {
   std::vector<OptionSpec> options = {
-      {"placement",
-       "optimal",
-       "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
-       "the mean of its crossings",
-       {"optimal", "average"}},
-      {"truncation",
-       "0.1",
-       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
-       "features",
-       {},
-       0.0,
-       1.0},
-      {"reach",
-       "1",
-       "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
-       "the surface less",
-       {},
-       0.0,
-       1e6}};
+      {.name = "placement",
+       .fallback = "optimal",
+       .help = "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
+               "the mean of its crossings",
+       .choices = {"optimal", "average"}},
+      {.name = "truncation",
+       .fallback = "0.1",
+       .help = "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+               "features",
+       .maximum = 1.0,
+       .only_with = {"placement=optimal"}},
+      {.name = "reach",
+       .fallback = "1",
+       .help = "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
+               "the surface less",
+       .maximum = 1e6,
+       .only_with = {"placement=optimal"}}};
   const std::vector<OptionSpec> of_hermite = hermite_options();
   options.insert(options.begin() + 1, of_hermite.begin(), of_hermite.end());
   return options;

@@ -249,13 +249,15 @@ double CellBlocks::margin_for_rounding() const {
   } else {
     for (const HermiteView::Block& block : source_) include(lower_of(block), lower_of(block) + side);
   }
-  const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * farthest * 0x1p-24;
+  // Of single precision about the origin, and of double precision where the file's coordinates lie (FilePoints).
+  const Eigen::Vector3d in_world = farthest * 0x1p-24 + (placement.origin.cwiseAbs() + farthest) * 0x1p-53;
+  const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * in_world;
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
   static_assert(kLargestMargin == 0.25);  // eight times what the error names
   if (!(margin <= kLargestMargin))
-    throw Error("single precision cannot hold a mesh of this volume to a thirty-second of a voxel, so nothing can be "
-                "promised of it: its axes lie nearly in a plane, or it reaches too far; resample or divide it, or use "
-                "--extractor dual-contouring");
+    throw Error("the coordinates of a mesh file cannot hold a mesh of this volume to a thirty-second of a voxel, so "
+                "nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far, or lies too far from "
+                "the origin; resample, divide or move it, or use --extractor dual-contouring");
   return margin;
 }
 

@@ -1,4 +1,6 @@
-// Points as the file will hold them: single precision in world units, seen from index space.
+// Points as the file will hold them, seen from index space: PolygonMesh::world(), the sum in double precision of the
+// placement's origin and of single precision about it. Far from the world's zero that sum rounds, too; about zero itself
+// it is single precision (STL).
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +20,9 @@ class FilePoints {
   Eigen::Vector3f in_file(const Eigen::Vector3d& index) const { return placement_.local(index).cast<float>(); }
   /// The index coordinates, relative to the placement's base, of the nearest point that the file can hold.
   Eigen::Vector3d rounded(const Eigen::Vector3d& index) const {
-    return to_index_ * (in_file(index).cast<double>() - placement_.offset);
+    const Eigen::Vector3d written = placement_.origin + in_file(index).cast<double>();
+    // The difference is exact, for the origin is zero or several times as far from zero as points are from it.
+    return to_index_ * ((written - placement_.origin) - placement_.offset);
   }
   const IndexToWorld& placement() const { return placement_; }
 

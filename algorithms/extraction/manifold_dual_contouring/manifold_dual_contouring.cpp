@@ -246,12 +246,15 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
   std::vector<OptionSpec> options = dual_contouring_options();
+  for (OptionSpec& option : options)
+    if (option.name == "reach") option.only_with.push_back("merging=collapses");
   options.insert(options.begin(),
                  {.name = "tolerance",
                   .fallback = "0.1",
                   .help = "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
                           "gives fewer polygons, 0 the uniform mesh itself",
-                  .maximum = 1e6});
+                  .maximum = 1e6,
+                  .only_with = {"tolerance_world=0"}});
   options.insert(options.begin() + 1,
                  {.name = "tolerance_world",
                   .fallback = "0",
@@ -271,7 +274,8 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
                   .help = "with merging=regions: how far a cube's point may be from the planes of its "
                           "crossings, in voxels, root "
                           "mean square, if tolerance allows more; 0 for what tolerance allows",
-                  .maximum = 1e6});
+                  .maximum = 1e6,
+                  .only_with = {"merging=regions"}});
   options.insert(
       options.begin() + 4,
       {.name = "largest_cube",
@@ -279,7 +283,8 @@ std::vector<OptionSpec> manifold_dual_contouring_options() {
        .help =
            "with merging=regions: cells a side of the largest cubes; where flatness is below 0.2 or so, 4 "
            "is as fast as 8, and nearer",
-       .choices = {"8", "4", "2"}});
+       .choices = {"8", "4", "2"},
+       .only_with = {"merging=regions"}});
   return options;
 }
 

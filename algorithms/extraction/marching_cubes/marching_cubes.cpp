@@ -86,11 +86,13 @@ void write_triangles(const BlockGrid& grid, std::int32_t index, const std::vecto
 /// interpolated.
 std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
   if (input.options.text("crossings") == "samples") return std::nullopt;
-  const PolygonMesh& source =
-      polygons_at_isovalue(input, "marching-cubes was asked for exact crossings", "-o crossings=samples");
-  Represented data =
-      through(Representation::directed, NormalCodeId::octahedral,
-              sample_polygons(input.level_set, input.isovalue, source, input.context), input.context);
+  const auto sampled = [&] {
+    if (input.hermite && input.isovalue == 0.0) return *input.hermite;
+    const PolygonMesh& source =
+        polygons_at_isovalue(input, "marching-cubes was asked for exact crossings", "-o crossings=samples");
+    return sample_polygons(input.level_set, input.isovalue, source, input.context);
+  };
+  Represented data = through(Representation::directed, NormalCodeId::octahedral, sampled(), input.context);
   report_figures(data, input.level_set, input.context);
   return std::move(data.hermite);
 }

@@ -1,0 +1,84 @@
+#include "algorithms/hermite/lost_slivers.h"
+
+#include <algorithm>
+
+namespace hermesh {
+namespace {
+
+constexpr double kRounding = 1e-3;  // voxels
+
+struct Sliver {
+  double length, middle;  ///< along the edge
+};
+
+/// Between the crossings of an edge whose first sample is in one operand and not in the other, as the
+/// intersection or the union has them: [offset of the one that ends, offset of the one that begins] is inside
+/// neither, and the reverse both.
+Sliver between(bool unites, double ends, double begins) {
+  return {unites ? begins - ends : ends - begins, 0.5 * (ends + begins)};
+}
+
+class Counter {
+ public:
+  Counter(Boolean boolean, const FloatHermite& a, const FloatHermite& b)
+      : unites_(boolean == Boolean::unite), turns_b_(boolean == Boolean::subtract), a_(a), b_(b) {}
+
+  LostSlivers run() {
+    std::size_t j = 0;
+    for (std::size_t i = 0; i < a_.leaves.size(); ++i) {
+      while (j < b_.leaves.size() && b_.leaves[j].lower < a_.leaves[i].lower) ++j;
+      if (j == b_.leaves.size()) break;
+      if (b_.leaves[j].lower == a_.leaves[i].lower) add(i, j);
+    }
+    result_.volume = *std::ranges::max_element(along_axis_);
+    return result_;
+  }
+
+ private:
+  void add(std::size_t i, std::size_t j) {
+    const SignLeaf &leaf_a = a_.leaves[i], &leaf_b = b_.leaves[j];
+    const std::array<BlockMask, 3> edges_a = crossing_edges(leaf_a), edges_b = crossing_edges(leaf_b);
+    const EdgeCrossing *of_a = a_.crossings_of(i).data(), *of_b = b_.crossings_of(j).data();
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int x = 0; x < 8; ++x) {
+        const std::uint64_t turned = turns_b_ ? ~std::uint64_t{0} : 0;
+        std::uint64_t both =
+            edges_a[axis][x] & edges_b[axis][x] & (leaf_a.inside[x] ^ leaf_b.inside[x] ^ turned);
+        for (; both != 0; both &= both - 1) {
+          const int sample = 64 * x + std::countr_zero(both);
+          const double at_a = of_a[rank_in(edges_a[axis], sample)].offset;
+          const double at_b = of_b[rank_in(edges_b[axis], sample)].offset;
+          const Sliver sliver =
+              test(leaf_a.inside, sample) ? between(unites_, at_a, at_b) : between(unites_, at_b, at_a);
+          if (sliver.length > kRounding) add(leaf_a, axis, sample, sliver);
+        }
+      }
+      of_a += count(edges_a[axis]);
+      of_b += count(edges_b[axis]);
+    }
+  }
+
+  void add(const SignLeaf& leaf, int axis, int sample, const Sliver& sliver) {
+    ++result_.edges;
+    along_axis_[static_cast<std::size_t>(axis)] += sliver.length;
+    if (sliver.length <= result_.longest) return;
+    result_.longest = sliver.length;
+    Eigen::Vector3d index(sample >> 6, (sample >> 3) & 7, sample & 7);
+    index[axis] += sliver.middle;
+    for (int i = 0; i < 3; ++i) index[i] += leaf.lower[i] - a_.placement.base[i];
+    result_.place = a_.placement.origin + a_.placement.local(index);
+  }
+
+  const bool unites_, turns_b_;
+  const FloatHermite &a_, &b_;
+  LostSlivers result_;
+  std::array<double, 3> along_axis_{};
+};
+
+}  // namespace
+
+LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b) {
+  return Counter(boolean, a, b).run();
+}
+
+}  // namespace hermesh

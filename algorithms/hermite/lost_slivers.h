@@ -1,0 +1,27 @@
+// What a Boolean combination of Hermite data loses between samples (trap T10, boolean_rule.h).
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "algorithms/hermite/boolean_rule.h"
+#include "algorithms/hermite/sparse_hermite.h"
+
+namespace hermesh {
+
+/// Parts of edges that both operands cross against each other, between the two crossings: of an intersection
+/// or a difference slivers of material that are lost, of a union gaps that are filled. No sample lies in
+/// them.
+struct LostSlivers {
+  std::size_t edges = 0;  ///< with such a part
+  double volume = 0.0;    ///< cubic voxels, about: what the lattice lines along that axis find that find most
+  double longest =
+      0.0;  ///< voxels, of the longest part: the thickness there if the edge is at right angles to it
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< of the longest part's middle, world units
+};
+
+/// Of two operands on one lattice, as combine() takes them. Parts of less than a thousandth of a voxel are
+/// taken for rounding, and do not count. Symmetric in the operands of a union and an intersection.
+LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b);
+
+}  // namespace hermesh

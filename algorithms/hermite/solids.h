@@ -1,0 +1,49 @@
+// Booleans of polygonal solids: both on one lattice, as level sets for the signs and with their exact Hermite
+// data, which keep the operands' creases and those where their surfaces meet.
+#pragma once
+
+#include <functional>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/hermite/boolean_rule.h"
+#include "algorithms/hermite/samplers.h"
+
+namespace hermesh {
+
+/// The samples of a lattice at origin + voxel_size · (i, j, k), world units.
+struct SharedLattice {
+  double voxel_size = 1.0;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+};
+
+/// About choose_origin() of the box about both, so that it does not matter which comes first, and near the
+/// world's zero samples lie at multiples of the voxel size.
+SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size);
+
+struct SampledSolid {
+  LevelSet level_set;    ///< on the shared lattice
+  FloatHermite hermite;  ///< of its crossing edges, from the polygons
+  PolygonSampling sampling;
+};
+
+/// Makes a level set of polygons with samples at multiples of the voxel size from the mesh's origin.
+using VoxelizeMesh = std::function<LevelSet(const PolygonMesh&)>;
+
+/// Voxelizes a mesh where it lies near the lattice's origin as it is, and elsewhere about a sample nearby, so
+/// that single precision is lost by no more than 2⁻¹³ voxels.
+/// @throws Error for a mesh of more than 2³⁰ voxels' distance; if the level set has no sample inside.
+SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
+                          RunContext& context);
+
+/// Signs and crossings of the result, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
+/// operands' signs, and the edges with crossings are those whose ends differ. The level set's values are the
+/// minima (maxima) of the operands'. Of a union and an intersection the same bytes whichever operand comes
+/// first.
+struct CombinedSolid {
+  LevelSet level_set;
+  FloatHermite hermite;
+};
+CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid& b, RunContext& context);
+
+}  // namespace hermesh

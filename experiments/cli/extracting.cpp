@@ -1,0 +1,42 @@
+#include "experiments/cli/extracting.h"
+
+#include <CLI/CLI.hpp>
+
+#include "experiments/cli/format.h"
+#include "experiments/cli/signals.h"
+#include "experiments/cli/validators.h"
+#include "experiments/cli/voxelizing.h"
+#include "experiments/harness.h"
+
+namespace hermesh::cli {
+
+void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback) {
+  arguments.extractor = fallback;
+  command.add_option("--extractor", arguments.extractor,
+                     "Name of the extractor, see hermesh list (default: " + arguments.extractor + ")");
+  command.add_option("-o", arguments.options, "key=value, an option of the extractor; may be repeated")
+      ->allow_extra_args(false)
+      ->check(key_value());
+}
+
+ChosenExtractor choose_extractor(const ExtractorArguments& arguments) {
+  return as_usage([&] {
+    const Extractor extractor = find_variant(all_extractors(), arguments.extractor);
+    return ChosenExtractor{extractor, parse_options(extractor.name, extractor.options, arguments.options)};
+  });
+}
+
+void print_extracted(const Session& session, const PolygonMesh& mesh, const std::string& extractor,
+                     double seconds) {
+  print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
+                             std::to_string(mesh.triangles.size()) + " triangles, " +
+                             std::to_string(mesh.quads.size()) + " quads, " + extractor + ", " +
+                             seconds_text(seconds));
+}
+
+void save(const std::string& path, const PolygonMesh& mesh, Session& session) {
+  write_mesh(path, mesh, session.context);
+  work_is_finished();
+}
+
+}  // namespace hermesh::cli

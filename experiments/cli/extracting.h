@@ -1,0 +1,35 @@
+// What the commands share that make meshes of volumes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "algorithms/core/mesh_file.h"
+#include "algorithms/core/variant.h"
+#include "experiments/cli/session.h"
+
+namespace hermesh::cli {
+
+struct ExtractorArguments {
+  std::string extractor;             ///< set by add_extractor_options()
+  std::vector<std::string> options;  ///< key=value
+};
+
+/// A variant that was looked up, with its options checked.
+struct ChosenExtractor {
+  Extractor extractor;
+  Options options;
+};
+
+void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);
+
+/// @throws UsageError
+ChosenExtractor choose_extractor(const ExtractorArguments& arguments);
+
+void print_extracted(const Session& session, const PolygonMesh& mesh, const std::string& extractor,
+                     double seconds);
+
+/// Writes the mesh; from then on a signal is too late.
+void save(const std::string& path, const PolygonMesh& mesh, Session& session);
+
+}  // namespace hermesh::cli
