@@ -180,8 +180,6 @@ class Pairs {
                  common = judged(Boolean::intersect, *a, *b, counts);
     const double without_b = judged(Boolean::subtract, *a, *b, counts),
                  without_a = judged(Boolean::subtract, *b, *a, counts);
-    for (const Boolean boolean : {Boolean::unite, Boolean::intersect})
-      EXPECT_EQ(contour(boolean, *a, *b), contour(boolean, *b, *a)) << "depends on which comes first";
     if (!pair_.adds_up) return;
     const double of_a = volume(pair_.a), of_b = volume(pair_.b);
     const auto expect_sum = [&](double parts, double whole) {
@@ -216,6 +214,9 @@ class Pairs {
   }
   double judged(Boolean boolean, const SampledSolid& a, const SampledSolid& b, Counts& counts) {
     const PolygonMesh mesh = contour(boolean, a, b);
+    if (boolean != Boolean::subtract) {
+      EXPECT_EQ(mesh, contour(boolean, b, a)) << "depends on which comes first";
+    }
     ++(mesh.empty() ? counts.empty : counts.written);
     if (mesh.empty()) return 0.0;
     const auto report = validation::judge(to_mesh_file(mesh), {.libraries = false}, context_);

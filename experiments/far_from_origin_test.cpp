@@ -89,7 +89,7 @@ class Files {
   std::filesystem::path folder_;
 };
 
-TEST(FarFromOrigin, FilesKeepThePromises) { Files().expect_no_defect(0, 24, 6.0, 11.0); }
+TEST(FarFromOrigin, FilesKeepThePromises) { Files().expect_no_defect(0, 16, 6.0, 11.0); }
 
 TEST(FarFromOrigin, StlKeepsThemWhereItsPrecisionIsJustEnough) {
   // 10³ away a number of single precision is rounded by up to 3·10⁻⁵, and voxels are about 0.1.
