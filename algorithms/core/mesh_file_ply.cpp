@@ -18,15 +18,15 @@ class AsciiValues {
   AsciiValues(std::string_view bytes, std::size_t start, const MeshBuilder& builder)
       : cursor_(bytes, builder.file(), start) {}
   void begin_element() {
-    skip_comments();
-    wrapped_at_.reset();
+    wrapped_at_ = 0;
+    const char first = cursor_.peek();
+    if (first < '+' || first > '9') skip_comments();  // it is no number
   }
   /// Words behind the last value are passed over, unless the element began on an earlier line: then it cannot
   /// be told whether they belong to it or to the next.
   void end_element() {
-    cursor_.skip_blanks();
-    if (cursor_.at_line_end()) return cursor_.skip_line_end();
-    if (wrapped_at_) cursor_.fail_at(*wrapped_at_, "the line has fewer values than the header declares");
+    if (!cursor_.skip_blanks_to_word()) return cursor_.skip_line_end();
+    if (wrapped_at_ > 0) cursor_.fail_at(wrapped_at_, "the line has fewer values than the header declares");
     if (long_lines_++ == 0) first_long_line_ = cursor_.offset();
     cursor_.rest_of_line();
   }
@@ -79,15 +79,16 @@ class AsciiValues {
     }
   }
   /// Long lists may go on on the next line.
-  void to_value() {
-    cursor_.skip_blanks();
-    if (!cursor_.at_line_end()) return;
-    if (!wrapped_at_) wrapped_at_ = cursor_.offset();
+  [[gnu::always_inline]] void to_value() {
+    if (!cursor_.skip_blanks_to_word()) to_next_line();
+  }
+  [[gnu::noinline]] void to_next_line() {
+    if (wrapped_at_ == 0) wrapped_at_ = cursor_.offset();
     cursor_.skip_space();
   }
 
   TextCursor cursor_;
-  std::optional<std::size_t> wrapped_at_;  ///< where the first line of an element of several ends
+  std::size_t wrapped_at_ = 0;  ///< where the first line of an element of several ends; 0 is in the header
   std::size_t long_lines_ = 0, first_long_line_ = 0;
 };
 

@@ -27,7 +27,7 @@ std::string clean_name(std::string_view name);
 
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
-inline bool is_space(char c) { return is_line_end(c) || is_blank(c); }
+inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }  // both of these
 /// What may follow the data of a file without being data: white space, zeros up to the end of a block, and
 /// Ctrl-Z, with which CP/M and DOS end a text.
 inline bool is_padding(char c) { return is_space(c) || c == '\0' || c == '\x1a'; }
@@ -79,6 +79,16 @@ class TextCursor {
   void skip_blanks() {
     while (at_ != end_ && is_blank(*at_)) ++at_;
   }
+  /// Over blanks; whether the line goes on behind them. For the innermost loops: mostly one blank, then a word.
+  [[gnu::always_inline]] bool skip_blanks_to_word() {
+    for (; at_ != end_; ++at_) {
+      if (*at_ > ' ') return true;
+      if (*at_ == ' ') continue;
+      if (is_line_end(*at_)) return false;
+      if (!is_blank(*at_)) return true;
+    }
+    return false;
+  }
   void skip_word() {
     while (at_ != end_ && !is_space(*at_)) ++at_;
   }
@@ -109,7 +119,7 @@ class TextCursor {
   }
   /// Behind the end of the line, if the cursor stands before it.
   void skip_line_end() {
-    if (peek() == '\r') ++at_;
+    if (at_ != end_ && *at_ == '\r') ++at_;
     if (at_ != end_ && *at_ == '\n') ++at_;
   }
   /// What is left of the line, without its end and the blanks before that; moves behind it.
@@ -189,7 +199,7 @@ class TextCursor {
   /// What stands behind a number and is no space: what else may end a word, or the rest of a name that old C
   /// libraries of Windows give to what is not finite, such as 1.#IND.
   template <class T>
-  bool take_odd_end(T& value) {
+  [[gnu::noinline]] bool take_odd_end(T& value) {
     if constexpr (std::is_floating_point_v<T>)
       if (const std::optional<double> named = take_windows_name(value < T(0))) {
         value = static_cast<T>(*named);
