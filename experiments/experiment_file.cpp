@@ -32,7 +32,7 @@ std::string option_text(const Section& section, const std::string& key, const to
   } else if (const auto* flag = node.as_boolean()) {
     text << (flag->get() ? "true" : "false");
   } else {
-    section.fail(node.source().begin.line, "the option \"" + key + "\" must be a text or a number");
+    section.fail(node.source().begin.line, "the option \"" + shown(key) + "\" must be a text or a number");
   }
   return text.str();
 }
@@ -50,7 +50,8 @@ VariantEntry read_variant(const Section& file, const toml::node& node, const std
       std::find_if(table.begin(), table.end(), [&](const Entry& each) { return each.name == entry.name; });
   if (known == table.end())
     section.fail_at("name",
-                    "there is no " + kind + " \"" + entry.name + "\"; there are " + joined(names_of(table)));
+                    "there is no " + kind + " \"" + shown(entry.name) + "\"; there are " +
+                        joined(likest_first(names_of(table), entry.name)));
   entry.label = section.text_or("label", entry.name);
   entry.uniform = section.text_or("uniform", "");
   const toml::table* options = section.optional_table("options");
@@ -61,7 +62,7 @@ VariantEntry read_variant(const Section& file, const toml::node& node, const std
     try {
       Options(entry.name, known->options, {{name, entry.options[name]}});
     } catch (const Error& error) {
-      section.fail(key.source().begin.line, error.what());
+      section.fail(key.source().begin.line, shown(error.what(), 200));
     }
   }
   return entry;
@@ -76,10 +77,10 @@ std::vector<VariantEntry> read_variants(const Section& file, const std::string& 
     variants.push_back(read_variant(file, node, kind, table));
     if (const std::string& uniform = variants.back().uniform; !uniform.empty() && !labels.contains(uniform))
       file.fail(node.source().begin.line,
-                "there is no " + kind + " with the label \"" + uniform + "\" above, as uniform has it");
+                "there is no " + kind + " with the label \"" + shown(uniform) + "\" above, as uniform has it");
     if (!labels.insert(variants.back().label).second)
       file.fail(node.source().begin.line,
-                "the label \"" + variants.back().label + "\" is used twice; a row is known by it");
+                "the label \"" + shown(variants.back().label) + "\" is used twice; a row is known by it");
   }
   return variants;
 }
@@ -142,7 +143,8 @@ JudgedBy read_judged(const Section& section, const std::vector<std::string>& cas
   judged.to_boundary = section.flag_or("to_boundary", false);
   judged.solid = section.text_or("solid", "");
   if (!judged.solid.empty() && std::find(cases.begin(), cases.end(), judged.solid) == cases.end())
-    section.fail_at("solid", "there is no case \"" + judged.solid + "\"; there are " + joined(cases));
+    section.fail_at("solid", "there is no case \"" + shown(judged.solid) + "\"; there are " +
+                                 joined(likest_first(cases, judged.solid)));
   return judged;
 }
 
@@ -177,7 +179,8 @@ CaseEntry read_case(const Section& file, const toml::node& node, ExperimentKind 
   CaseEntry entry;
   entry.name = section.text("name");
   if (std::find(cases.begin(), cases.end(), entry.name) == cases.end())
-    section.fail_at("name", "there is no case \"" + entry.name + "\"; there are " + joined(cases));
+    section.fail_at("name", "there is no case \"" + shown(entry.name) + "\"; there are " +
+                                joined(likest_first(cases, entry.name)));
   if (section.has("voxel_sizes")) {
     if (section.has("resolutions"))
       section.fail_at("resolutions", "a case has either \"resolutions\" or \"voxel_sizes\"");
@@ -224,7 +227,8 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
                          const std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), name) == names.end())
       section.fail_at(key,
-                      "there is no " + std::string(key == "case" ? "case" : "column") + " \"" + name + "\"");
+                      "there is no " + std::string(key == "case" ? "case" : "column") + " \"" + shown(name) + "\"; there are " +
+                               joined(likest_first(names, name)));
     return name;
   };
   Plot plot;
@@ -262,7 +266,7 @@ Tier read_parameters(const Section& file, const std::string& name, const toml::t
   try {
     Options(measurement.name, measurement.parameters, tier.parameters);
   } catch (const Error& error) {
-    section.fail(section.line(), error.what());
+    section.fail(section.line(), shown(error.what(), 200));
   }
   return tier;
 }

@@ -64,12 +64,32 @@ int exit_code(const std::vector<Json>& rows) {
   return code;
 }
 
-std::filesystem::path make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw Error("cannot make the folder " + folder.string() + ": " + error.message());
-  return folder;
-}
+/// A folder for results. If nothing came into it, the destructor removes it again with those above that were made for it.
+class ResultFolder {
+ public:
+  explicit ResultFolder(std::filesystem::path folder) : folder_(std::move(folder)) {
+    std::error_code error;
+    for (std::filesystem::path at = std::filesystem::absolute(folder_).lexically_normal(); !at.empty() && !exists(at, error);
+         at = at.parent_path())
+      if (at.has_filename()) made_.push_back(at);
+    std::filesystem::create_directories(folder_, error);
+    if (!error) return;
+    remove_empty();
+    throw Error("cannot make the folder " + folder_.string() + ": " + error.message());
+  }
+  ~ResultFolder() { remove_empty(); }
+  ResultFolder(const ResultFolder&) = delete;
+  ResultFolder& operator=(const ResultFolder&) = delete;
+  const std::filesystem::path& path() const { return folder_; }
+
+ private:
+  void remove_empty() const {
+    std::error_code not_empty;
+    for (const std::filesystem::path& made : made_) std::filesystem::remove(made, not_empty);
+  }
+  std::filesystem::path folder_;
+  std::vector<std::filesystem::path> made_;  ///< the innermost first
+};
 
 /// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one
 /// starts.
@@ -83,7 +103,8 @@ class Run {
         experiment_(read_experiment(settings.experiment, {tables.extractors, tables.voxelizers, tables.cases,
                                                           column_names(), tables.measurements})),
         tier_(find_tier(experiment_, settings.tier)),
-        out_(make_folder(settings.out)),
+        folder_(settings.out),
+        out_(folder_.path()),
         head_(run_head(experiment_, settings)) {}
 
   int run() {
@@ -214,7 +235,8 @@ class Run {
   std::ostream& table_;
   Experiment experiment_;
   const Tier& tier_;
-  std::filesystem::path out_;
+  ResultFolder folder_;
+  const std::filesystem::path& out_;
   Json head_;
   std::vector<Json> rows_;
 };

@@ -13,13 +13,38 @@
 #include <vector>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/shown.h"
 
 namespace hermesh {
 
+/// With commas between them, as many as fit a sentence, and the number of those that do not.
 inline std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t kLongest = 120;
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (text.size() + names[i].size() > kLongest && i > 0) return text + " and " + std::to_string(names.size() - i) + " more";
+    text += (text.empty() ? "" : ", ") + shown(names[i]);
+  }
   return text;
+}
+
+/// Those most like `name` first (by the number of letters to change, insert or leave out).
+inline std::vector<std::string> likest_first(std::vector<std::string> names, const std::string& name) {
+  const auto distance = [&](const std::string& other) {
+    std::vector<std::size_t> row(other.size() + 1);
+    for (std::size_t j = 0; j < row.size(); ++j) row[j] = j;
+    for (std::size_t i = 0; i < std::min<std::size_t>(name.size(), 100); ++i) {
+      std::size_t diagonal = row[0]++;
+      for (std::size_t j = 1; j < row.size(); ++j) {
+        const std::size_t changed = diagonal + (name[i] != other[j - 1]);
+        diagonal = row[j];
+        row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+      }
+    }
+    return row.back();
+  };
+  std::ranges::stable_sort(names, {}, distance);
+  return names;
 }
 
 /// A table of the file that insists on every key being known and asked for. Its messages begin with
@@ -31,7 +56,8 @@ class Section {
     for (const auto& [key, value] : table_)
       if (std::find(known.begin(), known.end(), key.str()) == known.end())
         fail(key.source().begin.line,
-             "unknown key \"" + std::string(key.str()) + "\" in " + what_ + "; it takes " + joined(known));
+             "unknown key \"" + shown(key.str()) + "\" in " + what_ + "; it takes " +
+                 joined(likest_first(known, std::string(key.str()))));
   }
 
   [[noreturn]] void fail(toml::source_index line, const std::string& sentence) const {
@@ -47,8 +73,9 @@ class Section {
 
   std::string text(const std::string& key) const {
     const toml::node& node = required(key);
-    if (const auto* value = node.as_string(); value && !value->get().empty()) return value->get();
-    fail(node.source().begin.line, "\"" + key + "\" must be a text that is not empty");
+    // What is in a file is printed, and so must not control a terminal.
+    if (const auto* value = node.as_string(); value && !value->get().empty() && is_plain(value->get())) return value->get();
+    fail(node.source().begin.line, "\"" + key + "\" must be a text that is not empty and holds no control characters");
   }
   std::string text_or(const std::string& key, const std::string& fallback) const {
     return has(key) ? text(key) : fallback;
@@ -103,9 +130,9 @@ class Section {
       const std::string name = value->get();
       if (std::find(known.begin(), known.end(), name) == known.end())
         fail(node.source().begin.line,
-             "there is no " + kind + " \"" + name + "\"; there are " + joined(known));
+             "there is no " + kind + " \"" + shown(name) + "\"; there are " + joined(likest_first(known, name)));
       if (std::find(result.begin(), result.end(), name) != result.end())
-        fail(node.source().begin.line, "the " + kind + " \"" + name + "\" is named twice");
+        fail(node.source().begin.line, "the " + kind + " \"" + shown(name) + "\" is named twice");
       result.push_back(name);
     }
     return result;
@@ -126,6 +153,10 @@ class Section {
     return *node;
   }
 
+  static bool is_plain(const std::string& text) {
+    return std::ranges::none_of(text, [](unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') || c == 0x7f; });
+  }
+
   std::string file_;
   const toml::table& table_;
   std::string what_;
@@ -141,7 +172,7 @@ inline toml::table parse_toml(const std::filesystem::path& path) {
     return toml::parse_file(path.string());
   } catch (const toml::parse_error& error) {
     throw Error(file + ":" + std::to_string(std::max<toml::source_index>(error.source().begin.line, 1)) +
-                ": " + std::string(error.description()));
+                ": " + shown(error.description(), 150));
   }
 }
 

@@ -213,11 +213,19 @@ PolygonMesh cgal_surface_mesher(const ExtractionInput& input) {
     const Criteria criteria(input.options, voxel);
     Triangulation triangulation;
     insert_seeds(triangulation, grid, frame, input);
-    if (triangulation.dimension() < 3) return mesh;
+    if (triangulation.number_of_vertices() > 0 && triangulation.dimension() < 3)
+      throw Error("cgal-surface-mesher: the surface crosses the grid's edges in too few points; try smaller voxels, or "
+                  "another extractor");
+    if (triangulation.number_of_vertices() == 0) return mesh;
     Complex complex(triangulation);
     Mesher mesher(complex, surface, oracle, criteria);
     refine(mesher, triangulation, input);
     mesh = to_mesh(complex, field);
+    // Its facets are those that a segment between two cells' centres pierces once; both ends of such a segment lie
+    // outside where the solid is thin against the distances of the points.
+    if (mesh.triangles.empty())
+      throw Error("cgal-surface-mesher: none of its triangles separates inside from outside: the solid is thinner than "
+                  "its points are apart; try -o seed_spacing=1 and a smaller facet_size, or another extractor");
   } catch (const CGAL::Failure_exception& failure) {
     std::string reason = failure.message();
     reason.resize(reason.find_last_not_of(". \n") + 1);

@@ -1,6 +1,7 @@
 #include "algorithms/core/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -60,6 +61,18 @@ fs::path temporary_name(const fs::path& target) {
          (".hermesh-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + tail);
 }
 
+/// Makes something new beside `target`: calls `make` with one name after the other until there was nothing of that name.
+/// What a killed process left stands in the way of another one with its number, and in a container all have the same.
+/// @returns the name; `error` is why there is nothing, if it is not 0.
+template <class Make>
+fs::path make_beside(const fs::path& target, int& error, Make&& make) {
+  while (true) {
+    const fs::path name = temporary_name(target);
+    error = make(name) ? 0 : errno;
+    if (error != EEXIST) return name;
+  }
+}
+
 /// What to write instead of `target`: through a link to the file itself, which a rename would otherwise leave
 /// behind.
 fs::path checked_target(const fs::path& target) {
@@ -77,18 +90,15 @@ fs::path checked_target(const fs::path& target) {
 
 }  // namespace
 
-AtomicFile::AtomicFile(fs::path target)
-    : target_(checked_target(target)), temporary_(temporary_name(target_)) {
+AtomicFile::AtomicFile(fs::path target) : target_(checked_target(target)) {
   const std::lock_guard lock(unfinished().mutex);
+  int error = 0;
+  temporary_ = make_beside(target_, error, [](const fs::path& name) {
+    const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    return file >= 0 && ::close(file) == 0;
+  });
+  if (error != 0) throw Error("cannot write '" + target.string() + "': " + std::strerror(error));
   unfinished().paths.insert(temporary_.string());
-  const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (file >= 0) {
-    ::close(file);
-    return;
-  }
-  const std::string reason = std::strerror(errno);
-  unfinished().paths.erase(temporary_.string());
-  throw Error("cannot write '" + target.string() + "': " + reason);
 }
 
 AtomicFile::~AtomicFile() {
@@ -116,12 +126,12 @@ AtomicFolder::AtomicFolder(fs::path target) : target_(std::move(target)) {
   const fs::file_status status = fs::status(target_, error);
   if (!target_.has_filename() || (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target_, error))))
     throw Error("cannot write to '" + target_.string() + "': it is there already and no empty folder; name a new one");
-  temporary_ = temporary_name(target_);
   const std::lock_guard lock(unfinished().mutex);
+  int failure = 0;
+  temporary_ =
+      make_beside(target_, failure, [](const fs::path& name) { return ::mkdir(name.c_str(), 0777) == 0; });
+  if (failure != 0) throw Error("cannot write to '" + target_.string() + "': " + std::strerror(failure));
   unfinished().paths.insert(temporary_.string());
-  if (fs::create_directory(temporary_, error)) return;
-  unfinished().paths.erase(temporary_.string());
-  throw Error("cannot write to '" + target_.string() + "': " + error.message());
 }
 
 AtomicFolder::~AtomicFolder() {
@@ -145,11 +155,14 @@ void AtomicFolder::commit() {
 void commit_together(AtomicFile& first, AtomicFile& second) {
   // Held all the time, so that a signal's end of the process comes before or after both.
   const std::lock_guard lock(unfinished().mutex);
-  const fs::path older = temporary_name(first.target_);
-  std::error_code no_links;
   const bool replaces = fs::exists(first.target_);
-  if (replaces) fs::create_hard_link(first.target_, older, no_links);
-  if (no_links) fs::copy_file(first.target_, older);
+  fs::path older;
+  if (replaces) {
+    int no_links = 0;
+    older = make_beside(first.target_, no_links,
+                        [&](const fs::path& name) { return ::link(first.target_.c_str(), name.c_str()) == 0; });
+    if (no_links != 0) fs::copy_file(first.target_, older);
+  }
   try {
     first.rename();
     second.rename();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <fstream>
@@ -85,6 +86,27 @@ TEST_F(AtomicFileTest, TheTargetAppearsOnCommitOnly) {
   { AtomicFile file(folder / "a.txt"); }
   EXPECT_EQ(files().at("a.txt"), "new");
   EXPECT_EQ(files().size(), 1u);
+}
+
+/// A process that was killed had this one's number, as in a container, where all have the same.
+TEST_F(AtomicFileTest, WhatAKilledProcessLeftIsNotInTheWay) {
+  std::string name;
+  { name = AtomicFile(folder / "a.txt").path().filename().string(); }
+  const std::string head = ".hermesh-" + std::to_string(getpid()) + "-";
+  ASSERT_TRUE(name.starts_with(head)) << name;
+  const unsigned long next = std::stoul(name.substr(head.size())) + 1;
+  for (unsigned long i = next; i < next + 5; ++i) write(folder / (head + std::to_string(i) + "-a.txt"), "left");
+  for (unsigned long i = next + 6; i < next + 9; ++i)
+    fs::create_directory(folder / (head + std::to_string(i) + "-out"));
+  AtomicFile file(folder / "a.txt");
+  std::ofstream(file.path()) << "new";
+  file.commit();
+  EXPECT_EQ(files().at("a.txt"), "new");
+  AtomicFolder open(folder / "out");
+  write(open.path() / "b.txt", "b");
+  open.commit();
+  EXPECT_TRUE(fs::exists(folder / "out" / "b.txt"));
+  EXPECT_EQ(files().size(), 6u);  // what was left is not ours to remove
 }
 
 TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {

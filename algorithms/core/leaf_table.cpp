@@ -14,6 +14,7 @@
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/memory_estimate.h"
 #include "algorithms/core/parallel.h"
 
 namespace hermesh {
@@ -31,6 +32,47 @@ constexpr std::array<float, 512> kNoSamples = make_no_samples();
 
 /// To wait for one leaf after the other, and for the samples that it points to, would take longer than all the rest.
 constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
+
+/// Of what extractors hold for two blocks whose 64 common edges the surface crosses: leaves, their copies, a crossing edge
+/// each, and a polygon.
+constexpr double kBytesOfTilePair = 15e3;
+
+/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which there is a tile
+/// whose value `wanted` takes: the first block within, the first beyond, and the width in samples. Squares are as large as
+/// the tiles beyond.
+template <class Wanted, class F>
+void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::CoordBBox& tile, Wanted&& wanted, F&& f) {
+  using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
+  using Node = LargeNode::ChildNodeType;
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree> access(tree);
+  const int size = tile.dim().x();
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto square = [&](auto&& self, Coord own, Coord there, int width) -> void {
+      const bool divided = width > int(Node::DIM) ? access.probeConstNode<LargeNode>(there) != nullptr
+                           : width > 8            ? access.probeConstNode<Node>(there) != nullptr
+                                                  : access.probeConstLeaf(there) != nullptr;
+      if (!divided) {
+        if (wanted(access.getValue(there))) f(own, there, axis, width);
+        return;
+      }
+      if (width == 8) return;
+      const int part = width > int(Node::DIM) ? int(Node::DIM) : 8;
+      for (int a = 0; a < width; a += part)
+        for (int b = 0; b < width; b += part) {
+          Coord from = own, to = there;
+          from[u] += a, from[v] += b, to[u] += a, to[v] += b;
+          self(self, from, to, part);
+        }
+    };
+    for (const int side : {-1, 1}) {
+      Coord own = tile.min(), there = tile.min();
+      if (side > 0) own[axis] += size - 8;
+      there[axis] += side > 0 ? size : -8;
+      square(square, own, there, size);
+    }
+  }
+}
 
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
@@ -61,23 +103,25 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
   it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
     if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
+  std::vector<double> pairs(tiles.size());
+  const auto bordering = [&](std::size_t i, auto&& f) {
+    for_each_bordering_tile(tree, tiles[i], [&](float value) { return is_inside(value) == background; }, f);
+  };
+  parallel_blocks(tiles.size(), context, [&](std::size_t i) {
+    bordering(i, [&](const Coord&, const Coord&, int, int width) { pairs[i] += double(width / 8) * (width / 8); });
+  });
+  check_fits_memory(kBytesOfTilePair * std::accumulate(pairs.begin(), pairs.end(), 0.0),
+                    "the volume has tiles of one sign beside tiles of the other, a surface that");
   std::vector<std::vector<Coord>> found(tiles.size());
   parallel_blocks(tiles.size(), context, [&](std::size_t i) {
-    Accessor access(tree);
-    const Coord size = tiles[i].dim();
-    for (int axis = 0; axis < 3; ++axis)
-      for (const int side : {-1, 1})
-        for (int a = 0; a < size[(axis + 1) % 3]; a += 8)
-          for (int b = 0; b < size[(axis + 2) % 3]; b += 8) {
-            Coord own = tiles[i].min();
-            own[(axis + 1) % 3] += a, own[(axis + 2) % 3] += b;
-            if (side > 0) own[axis] += size[axis] - 8;
-            Coord there = own;
-            there[axis] += 8 * side;
-            if (access.probeConstLeaf(there) || is_inside(access.getValue(there)) != background) continue;
-            found[i].push_back(own);
-            found[i].push_back(there);
+    bordering(i, [&](const Coord& own, const Coord& there, int axis, int width) {
+      for (int a = 0; a < width; a += 8)
+        for (int b = 0; b < width; b += 8)
+          for (Coord block : {own, there}) {
+            block[(axis + 1) % 3] += a, block[(axis + 2) % 3] += b;
+            found[i].push_back(block);
           }
+    });
   });
   std::vector<Coord> all;
   for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());

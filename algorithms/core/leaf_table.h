@@ -214,7 +214,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid);
 /// The rule for a grid. @throws Error if the isovalue or the background is not finite.
 InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue);
 
-/// Tiles, as origins of 8³ blocks, that meet a sample of the other sign in another tile.
+/// Tiles, as origins of 8³ blocks, that meet a sample of the other sign in another tile. @throws Error: beyond memory.
 std::vector<openvdb::Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
                                                 RunContext& context);
 

@@ -1,5 +1,6 @@
 #include "algorithms/core/memory_estimate.h"
 
+#include <sys/resource.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -185,6 +186,15 @@ std::optional<std::uint64_t> left_in_group(const std::string& limit_file, const 
   return *limit > used ? *limit - used : 0;
 }
 
+/// What a limit of this process leaves; `use` is the line of /proc/self/status that counts against it.
+std::optional<std::uint64_t> left_of_limit(int resource, const std::string& use) {
+  struct rlimit limit = {};
+  if (getrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
+    return std::nullopt;
+  const std::uint64_t used = 1024 * field_of("/proc/self/status", use).value_or(0);
+  return limit.rlim_cur > used ? limit.rlim_cur - used : 0;
+}
+
 void check_arguments(double voxel_size, double exterior_band, double interior_band) {
   if (!std::isfinite(voxel_size) || voxel_size <= 0.0)
     throw Error("The voxel size must be a finite number above 0, not " + format("%g", voxel_size) + ".");
@@ -245,9 +255,17 @@ std::optional<std::uint64_t> available_memory() {
   for (const auto& left :
        {left_in_group(root + "memory.max", root + "memory.current", root + "memory.stat", "inactive_file"),
         left_in_group(root + "memory/memory.limit_in_bytes", root + "memory/memory.usage_in_bytes",
-                      root + "memory/memory.stat", "total_inactive_file")})
+                      root + "memory/memory.stat", "total_inactive_file"),
+        left_of_limit(RLIMIT_AS, "VmSize"), left_of_limit(RLIMIT_DATA, "VmData")})
     if (left && (!available || *left < *available)) available = left;
   return available;
+}
+
+void check_fits_memory(double bytes, const std::string& what) {
+  const std::optional<std::uint64_t> available = available_memory();
+  if (available && bytes > double(*available))
+    throw Error(what + " would need about " + gibibytes(bytes) + " of memory, and " + gibibytes(double(*available)) +
+                " are available");
 }
 
 void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "algorithms/core/polygon_mesh.h"
 
@@ -26,9 +27,12 @@ struct BandEstimate {
 BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                            double interior_band);
 
-/// Bytes that this process could still take: the machine's available memory or what its control group has
-/// left, whichever is less. Nothing when the system does not say.
+/// Bytes that this process could still take: the machine's available memory, what its control group has left, or what its
+/// own limits (ulimit -v, -d) leave, whichever is less. Nothing when the system does not say.
 std::optional<std::uint64_t> available_memory();
+
+/// @throws Error "WHAT would need about …" for more bytes than are available.
+void check_fits_memory(double bytes, const std::string& what);
 
 /// Refuses what cannot be voxelized.
 /// @throws Error for a voxel size that is not finite, not positive or below what OpenVDB's transforms take; a

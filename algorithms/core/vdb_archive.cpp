@@ -1,16 +1,15 @@
 #include "algorithms/core/vdb_archive.h"
 
-#include <openvdb/io/Archive.h>
-#include <openvdb/io/GridDescriptor.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
-#include <cstring>
+#include <cmath>
 #include <fstream>
-#include <map>
 
 #include "algorithms/core/atomic_file.h"
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/memory_estimate.h"
 
 namespace hermesh {
 namespace {
@@ -101,142 +100,73 @@ bool check_seal(const fs::path& path) {
   return true;
 }
 
-/// Steps through a file and refuses lengths that it cannot hold. OpenVDB believes them: it makes strings of up to 4 GiB
-/// and reads as many nodes as a damaged number says, long after the file has ended.
-class LengthCheck {
- public:
-  LengthCheck(std::istream& in, const fs::path& path) : in_(in), path_(path.string()), size_(fs::file_size(path)) {}
-
-  std::uint32_t number() {
-    std::uint32_t value = 0;
-    if (!in_.read(reinterpret_cast<char*>(&value), sizeof value)) damaged();
-    return value;
+/// @throws Error unless what the transform does can be undone. OpenVDB stores inverses beside what they are inverses of.
+void check_transform(const openvdb::math::Transform& transform, const std::string& what) {
+  const auto fail = [&] { throw Error(what + " has a transform that is not finite or cannot be inverted"); };
+  const openvdb::Vec3d size = transform.voxelSize();
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(std::isfinite(size[axis]) && size[axis] > 0.0)) fail();
+  if (!transform.isLinear()) return;  // its inverse is made of it
+  for (const openvdb::Vec3d index : {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),
+                                     openvdb::Vec3d(0, 0, 100), openvdb::Vec3d(-70, 20, 50)}) {
+    const openvdb::Vec3d world = transform.indexToWorld(index);
+    // What is lost far from the origin, in voxels.
+    const double rounding = 1e-12 * world.length() / std::min({size.x(), size.y(), size.z()});
+    if (!((transform.worldToIndex(world) - index).length() < 1e-3 + rounding)) fail();
   }
-  void skip(std::uint64_t bytes) {
-    need(bytes);
-    in_.seekg(static_cast<std::streamoff>(bytes), std::ios::cur);
-  }
-  std::string text() {
-    const std::uint32_t length = number();
-    need(length);
-    std::string result(length, ' ');
-    in_.read(result.data(), length);
-    return result;
-  }
-  void metadata() {
-    for (std::uint32_t left = number(); left > 0; --left) {
-      text();
-      const bool delayed = text() == "__delayedload";
-      const std::uint32_t bytes = number();
-      need(bytes);
-      const std::streampos start = in_.tellg();
-      if (delayed && bytes > 0) delayed_load();
-      in_.seekg(start);
-      skip(bytes);
-    }
-  }
-  /// From the root's background, of `value_bytes`, on. A child has two masks of 32³ bits at least.
-  void root(std::uint64_t value_bytes) {
-    skip(sizeof(std::int32_t) + value_bytes);
-    const std::uint64_t tiles = number(), children = number();
-    need(tiles * (13 + value_bytes) + children * (12 + 2 * 4096));
-  }
-
- private:
-  /// Lengths within what OpenVDB keeps for reading leaves later: their number, masks and compressed sizes.
-  void delayed_load() {
-    const std::uint64_t leaves = number(), mask_bytes = number();
-    need(leaves * 64);
-    skip(mask_bytes > 0 ? mask_bytes : leaves);
-    const std::uint32_t size_bytes = number();
-    if (size_bytes != ~std::uint32_t{0}) need(size_bytes > 0 ? size_bytes : leaves * 8);
-  }
-  void need(std::uint64_t bytes) {
-    const std::streamoff at = in_.tellg();
-    if (!in_ || at < 0 || bytes > size_ || static_cast<std::uint64_t>(at) > size_ - bytes) damaged();
-  }
-  [[noreturn]] void damaged() const {
-    throw Error(path_ + " is damaged or truncated: it speaks of more than it holds");
-  }
-
-  std::istream& in_;
-  std::string path_;
-  std::uint64_t size_;
-};
-
-/// Size of a value in a file, or 0 where it is not known here.
-std::uint64_t value_bytes(const std::string& grid_type) {
-  static const std::map<std::string, std::uint64_t> known = {{"bool", 1},
-                                                             {"float", 4},
-                                                             {"int32", 4},
-                                                             {"double", 8},
-                                                             {"int64", 8},
-                                                             {"vec3s", 12},
-                                                             {"vec3i", 12},
-                                                             {"vec3d", 24},
-                                                             {"hermite_float", 52},
-                                                             {"hermite_directed", 12},
-                                                             {"hermite_thesis", 10},
-                                                             {"hermite_fixed", 10}};
-  const std::string prefix = "Tree_", suffix = "_5_4_3";
-  if (!grid_type.starts_with(prefix) || !grid_type.ends_with(suffix)) return 0;
-  const auto it = known.find(grid_type.substr(5, grid_type.size() - prefix.size() - suffix.size()));
-  return it == known.end() ? 0 : it->second;
 }
-
-/// Reads what stands before the grids, which names where each of them ends, and looks into the beginning of each.
-class GridEnds : public openvdb::io::Archive {
- public:
-  void check(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    LengthCheck lengths(in, path);
-    readHeader(in);
-    openvdb::io::setVersion(in, libraryVersion(), fileVersion());  // the descriptors are read by it
-    if (fileVersion() < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
-      throw Error(path.string() + " is of a version of .vdb files older than OpenVDB 2, or damaged");
-    lengths.metadata();
-    if (!inputHasGridOffsets()) return;
-    for (std::int32_t left = readGridCount(in); left > 0; --left) check_grid(in, lengths, path);
-  }
-
- private:
-  static void check_grid(std::istream& in, LengthCheck& lengths, const fs::path& path) {
-    const std::streampos start = in.tellg();
-    for (int names = 0; names < 3; ++names) lengths.text();  // of the grid, its type, and whose tree it shares
-    in.seekg(start);
-    openvdb::io::GridDescriptor descriptor;
-    descriptor.read(in);
-    if (!in || descriptor.getEndPos() > static_cast<std::int64_t>(fs::file_size(path)))
-      throw Error(path.string() + " is truncated: a grid ends beyond the end of the file");
-    descriptor.seekToGrid(in);
-    lengths.number();  // compression
-    lengths.metadata();
-    const std::streampos transform = in.tellg();
-    lengths.text();
-    in.seekg(transform);
-    openvdb::math::Transform().read(in);
-    const std::uint64_t bytes = value_bytes(descriptor.gridType());
-    if (bytes > 0 && !descriptor.isInstance()) lengths.root(bytes);
-    descriptor.seekToEnd(in);
-  }
-};
 
 }  // namespace
 
-void open_vdb(openvdb::io::File& file, const fs::path& path) {
+VdbReader::VdbReader(const fs::path& path) : path_(path), file_(path.string()) {
   initialize_openvdb();
   check_is_vdb(path);
   const bool sealed = check_seal(path);
-  GridEnds().check(path);
-  file.open(/*delayLoad=*/false);
-  if (!sealed && (*file.getMetadata())[kSealKey])
+  structure_ = std::make_unique<VdbStructure>(path);
+  file_.open(/*delayLoad=*/false);
+  if (!sealed && (*file_.getMetadata())[kSealKey])
     throw Error(path.string() + " is damaged or truncated: its checksum is missing");
 }
 
-std::string grid_names(const openvdb::io::File& file) {
-  std::string names;
-  for (auto it = file.beginName(); it != file.endName(); ++it) names += (names.empty() ? "" : ", ") + *it;
+std::vector<std::string> VdbReader::names() const {
+  std::vector<std::string> names;
+  for (auto it = file_.beginName(); it != file_.endName(); ++it) names.push_back(*it);
   return names;
+}
+
+std::string VdbReader::joined_names() const {
+  std::string joined;
+  for (const std::string& name : names()) joined += (joined.empty() ? "" : ", ") + shown(name, 30);
+  return shown(joined, 120);
+}
+
+const std::vector<const VdbDescriptor*> VdbReader::found(const std::string& name) const {
+  const auto grids = structure_->find(name);
+  if (grids.empty())
+    throw Error(path_.string() + " has no grid named '" + shown(name) + "'; it has " +
+                (structure_->grids().empty() ? "none" : joined_names()));
+  return grids;
+}
+
+bool VdbReader::can_read(const std::string& name) const {
+  return std::ranges::all_of(found(name), [](const VdbDescriptor* grid) { return VdbStructure::is_known(grid->type); });
+}
+
+openvdb::GridBase::Ptr VdbReader::with_good_transform(const std::string& name, openvdb::GridBase::Ptr grid) const {
+  check_transform(grid->transform(), "the grid '" + shown(name) + "' of " + path_.string());
+  return grid;
+}
+
+openvdb::GridBase::Ptr VdbReader::read(const std::string& name) {
+  double bytes = 0.0;
+  for (const VdbDescriptor* grid : found(name)) bytes = std::max(bytes, structure_->check_tree(*grid));
+  check_fits_memory(bytes, path_.string() + ": the grid '" + shown(name) + "'");
+  return with_good_transform(name, file_.readGrid(name));
+}
+
+openvdb::GridBase::Ptr VdbReader::read_metadata(const std::string& name) {
+  for (const VdbDescriptor* grid : found(name)) structure_->check_metadata(*grid);
+  return with_good_transform(name, file_.readGridMetadata(name));
 }
 
 void write_sealed(const fs::path& file, const openvdb::GridCPtrVec& grids, const fs::path& named) {

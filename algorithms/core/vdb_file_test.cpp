@@ -1,8 +1,10 @@
 #include "algorithms/core/vdb_file.h"
 
 #include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <fstream>
 
 #include "algorithms/core/level_set_grid.h"
@@ -85,6 +87,15 @@ TEST_F(VdbFile, HalfWholeNumbersAndTruthsBecomeFloat) {
   auto truth = openvdb::BoolGrid::create(false);
   truth->tree().setValue(at, true);
   EXPECT_EQ(value_of(truth), 1.0f);
+  auto mask = openvdb::MaskGrid::create(false);
+  mask->tree().setValueOn(at);
+  mask->tree().addTile(2, openvdb::Coord(128, 0, 0), true, true);
+  EXPECT_EQ(value_of(mask), 1.0f);
+  const LevelSet from_mask = read_level_set(folder_ / "g.vdb", "", context_);
+  EXPECT_EQ(from_mask.active_voxels(), 1u + 128 * 128 * 128);
+  EXPECT_EQ(from_mask.grid().grid->tree().getValue(openvdb::Coord(200, 5, 6)), 1.0f);
+  EXPECT_EQ(from_mask.grid().grid->tree().getValue(openvdb::Coord(2, 2, 3)), 0.0f);
+  EXPECT_EQ(from_mask.background(), 0.0);
   auto vectors = openvdb::Vec3SGrid::create();
   vectors->tree().setValue(at, openvdb::Vec3s(1));
   EXPECT_THROW(value_of(vectors), Error);
@@ -145,6 +156,96 @@ TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
   }
 }
 #endif
+
+// What another program wrote has no checksum; every length in it is one that OpenVDB would believe.
+TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
+  initialize_openvdb();
+  for (const std::uint32_t compression :
+       {std::uint32_t(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK), std::uint32_t(openvdb::io::COMPRESS_ZIP)}) {
+    auto grid = openvdb::FloatGrid::create(1.0f);
+    grid->setName("sdf");
+    for (int i = 0; i < 300; ++i) grid->tree().setValue(openvdb::Coord(i % 8, i / 8 % 8, i / 64), 0.01f * float(i));
+    openvdb::io::File file((folder_ / "long.vdb").string());
+    file.setCompression(compression);
+    file.write({grid});
+    file.close();
+    std::ifstream in(folder_ / "long.vdb", std::ios::binary);
+    const std::string good((std::istreambuf_iterator<char>(in)), {});
+    // The last block of values: its length in 64 bits before it, a multiple of what a byte holds.
+    int refused = 0;
+    for (std::size_t at = good.size() - 2100; at + 8 < good.size(); ++at) {
+      std::int64_t length = 0;
+      std::memcpy(&length, good.data() + at, sizeof length);
+      if (length != std::int64_t(good.size() - at - 8)) continue;
+      for (const std::int64_t claimed : {-length, std::int64_t{-4096}, length + 1, std::int64_t{1} << 40, std::int64_t{0}}) {
+        std::string bad = good;
+        std::memcpy(bad.data() + at, &claimed, sizeof claimed);
+        std::ofstream(folder_ / "bad.vdb", std::ios::binary) << bad;
+        EXPECT_NE(error_of(folder_ / "bad.vdb").find("is damaged or truncated"), std::string::npos) << claimed;
+        ++refused;
+      }
+    }
+    EXPECT_EQ(refused, 5) << compression;
+  }
+}
+
+TEST_F(VdbFile, GridsThatShareATreeAndStreamsAreRead) {
+  initialize_openvdb();
+  const openvdb::FloatGrid::Ptr first = openvdb::ConstPtrCast<openvdb::FloatGrid>(ramp().grid().grid)->deepCopy();
+  const auto second = openvdb::FloatGrid::create(first->treePtr());
+  first->setName("a"), second->setName("b");
+  second->setTransform(openvdb::math::Transform::createLinearTransform(2.0));
+  openvdb::io::File((folder_ / "shared.vdb").string()).write({first, second});
+  EXPECT_EQ(read_level_set(folder_ / "shared.vdb", "b", context_).active_voxels(), 7u);
+  EXPECT_DOUBLE_EQ(read_level_set(folder_ / "shared.vdb", "b", context_).voxel_size(), 2.0);
+  {
+    std::ofstream out(folder_ / "stream.vdb", std::ios::binary);
+    openvdb::io::Stream(out).write({first});
+  }
+  EXPECT_EQ(read_level_set(folder_ / "stream.vdb", "", context_).active_voxels(), 7u);
+}
+
+/// Grids of points have leaves of another structure; OpenVDB knows the type, so that they can be stepped over.
+TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
+  const std::string type = "Tree_float_5_4_3", other = "Tree_ptidx32_5_4_3";
+  openvdb::io::File((folder_ / "p.vdb").string()).write({ramp().grid().grid});
+  std::ifstream in(folder_ / "p.vdb", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const std::size_t at = bytes.find(type);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at - 4] = static_cast<char>(other.size());
+  bytes.replace(at, type.size(), other);
+  for (std::size_t i = 0; i < 3; ++i) {  // where the grid, its values and its end are, behind an empty name
+    std::int64_t place = 0;
+    char* const stored = bytes.data() + at + other.size() + 4 + 8 * i;
+    std::memcpy(&place, stored, sizeof place);
+    place += std::int64_t(other.size() - type.size());
+    std::memcpy(stored, &place, sizeof place);
+  }
+  std::ofstream(folder_ / "p.vdb", std::ios::binary) << bytes;
+  const auto grids = describe_vdb(folder_ / "p.vdb");
+  ASSERT_EQ(grids.size(), 1u);
+  EXPECT_FALSE(grids[0].is_read);
+  EXPECT_EQ(grids[0].value_type, other);
+  EXPECT_NE(error_of(folder_ / "p.vdb").find("a scalar grid is needed"), std::string::npos) << error_of(folder_ / "p.vdb");
+}
+
+TEST_F(VdbFile, ATransformThatCannotBeInvertedIsRefused) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setName("sdf");
+  grid->tree().setValue(openvdb::Coord(0), 0.5f);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.3));
+  openvdb::io::File((folder_ / "t.vdb").string()).write({grid});
+  std::ifstream in(folder_ / "t.vdb", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const double scale = 0.3, wrong = std::nan("");
+  const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&scale), sizeof scale));
+  ASSERT_NE(at, std::string::npos);
+  std::memcpy(bytes.data() + at, &wrong, sizeof wrong);
+  std::ofstream(folder_ / "t.vdb", std::ios::binary) << bytes;
+  EXPECT_NE(error_of(folder_ / "t.vdb").find("transform"), std::string::npos);
+}
 
 TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
   initialize_openvdb();

@@ -47,12 +47,19 @@ void note_missing(std::size_t missing, const std::string& name, RunContext& cont
     context.note(std::to_string(missing) + " points lie beyond the active voxels of the grid " + name);
 }
 
+/// Zero unless the grid holds positions of ours.
+openvdb::Vec3d zero_of_positions(const openvdb::GridBase& grid) {
+  const auto zero = grid.getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions);
+  return zero ? zero->value() : openvdb::Vec3d(0.0);
+}
+
 /// Components of the grid into those from `first` on of the attribute.
 template <class Grid>
 void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attribute, int first, int components,
                  RunContext& context) {
   std::vector<float>& values = std::get<std::vector<float>>(attribute.values);
   std::atomic<std::size_t> missing{0};
+  const openvdb::Vec3d zero = zero_of_positions(grid);
   parallel_blocks((mesh.points.size() + 1023) / 1024, context, [&](std::size_t block) {
     typename Grid::ConstAccessor access = grid.getConstAccessor();
     const std::size_t end = std::min(mesh.points.size(), 1024 * (block + 1));
@@ -67,7 +74,7 @@ void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attri
       if (weights <= 0.0) ++missing;
       for (int i = 0; i < components; ++i)
         values[point * std::size_t(attribute.components) + std::size_t(first + i)] =
-            weights > 0.0 ? static_cast<float>(sums[i] / weights) : 0.0f;
+            weights > 0.0 ? static_cast<float>(zero[i] + sums[i] / weights) : 0.0f;
     }
   });
   note_missing(missing, grid.getName(), context);
@@ -159,16 +166,15 @@ bool can_be_sampled(const openvdb::GridBase& grid) {
 }
 
 /// What "all" stands for. @throws Error
-std::vector<std::string> all_attributes(openvdb::io::File& file, const std::filesystem::path& path) {
+std::vector<std::string> all_attributes(VdbReader& file, const std::filesystem::path& path) {
   std::vector<std::string> names;
-  for (auto it = file.beginName(); it != file.endName(); ++it) {
-    const std::string name = *it;
+  for (const std::string& name : file.names()) {
     if (name == "sdf" || name == "udf" || name == "fog") continue;
-    if (name.ends_with("-alpha") && file.hasGrid(name.substr(0, name.size() - 6))) continue;
-    const openvdb::GridBase::Ptr grid = file.readGridMetadata(name);
+    if (name.ends_with("-alpha") && file.has(name.substr(0, name.size() - 6))) continue;
+    const openvdb::GridBase::Ptr grid = file.read_metadata(name);
     if (can_be_sampled(*grid) && grid->getGridClass() != openvdb::GRID_LEVEL_SET) names.push_back(name);
   }
-  if (names.empty()) throw Error(path.string() + " has no attributes; it has the grids " + grid_names(file));
+  if (names.empty()) throw Error(path.string() + " has no attributes; it has the grids " + file.joined_names());
   return names;
 }
 
@@ -178,16 +184,13 @@ std::vector<std::string> sample_attributes(PolygonMesh& mesh, const std::filesys
                                            const std::vector<std::string>& names, RunContext& context) {
   const Stage stage(context, "attributes");
   return about_vdb_file(vdb, [&] {
-    openvdb::io::File file(vdb.string());
-    open_vdb(file, vdb);
+    VdbReader file(vdb);
     const std::vector<std::string> chosen = names == std::vector<std::string>{"all"} ? all_attributes(file, vdb) : names;
     for (const std::string& name : chosen) {
-      if (!file.hasGrid(name))
-        throw Error(vdb.string() + " has no grid named '" + name + "'; it has " + grid_names(file));
       const std::string alpha_name = name + "-alpha";
       openvdb::FloatGrid::Ptr alpha;
-      if (file.hasGrid(alpha_name)) alpha = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(alpha_name));
-      mesh.attributes.push_back(sample_grid(file.readGrid(name), alpha, mesh, context));
+      if (file.has(alpha_name)) alpha = openvdb::gridPtrCast<openvdb::FloatGrid>(file.read(alpha_name));
+      mesh.attributes.push_back(sample_grid(file.read(name), alpha, mesh, context));
     }
     return chosen;
   });

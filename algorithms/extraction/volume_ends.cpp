@@ -1,5 +1,7 @@
 #include "algorithms/extraction/volume_ends.h"
 
+#include <openvdb/tools/SignedFloodFill.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -152,6 +154,13 @@ openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid, co
   return copy;
 }
 
+/// The inactive samples get the signs of the active ones beside them. The background must be above 0.
+LevelSet with_flooded_signs(const openvdb::FloatGrid& grid) {
+  const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
+  openvdb::tools::signedFloodFill(copy->tree());
+  return make_level_set(copy);
+}
+
 }  // namespace
 
 bool DataEnds::any() const {
@@ -172,12 +181,18 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   const InsideRule inside = inside_rule(grid, isovalue);
   EndRule rule;
   if (!find_rule(grid, isovalue, rule)) return {level_set, {}};
-  std::vector<EndEdge> edges;
-  {
-    const LeafTable table(level_set, isovalue, context);
-    edges = EndFinder(table, rule).find(context);
-  }
+  const auto edges_of = [&](const LevelSet& volume) {
+    return EndFinder(LeafTable(volume, isovalue, context), rule).find(context);
+  };
+  const std::vector<EndEdge> edges = edges_of(level_set);
   if (edges.empty()) return {level_set, {}};
+  if (rule.level_set && grid.background() > 0.0f) {
+    const LevelSet flooded = with_flooded_signs(grid);
+    if (edges_of(flooded).empty()) {
+      context.note("the level set's inactive samples had no signs (its inside was not flooded): they got those of the band");
+      return {flooded, {}};
+    }
+  }
   const openvdb::CoordBBox active = rule.level_set ? active_box(grid.tree()) : rule.box;
   return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active)};
 }

@@ -13,6 +13,8 @@
 //   can from one sample to the next. A narrow band whose background has the right signs has no end; a level set that was
 //   clipped through its surface or its inside has one. Bands of a voxel and less are told apart by the same rule, down to
 //   clips at which the rise is none too large; those are closed without a flat cap, as if the background were data.
+//   A band that is whole, but whose inactive samples inside have the background of outside (nobody flooded its inside),
+//   ends nowhere once they have the signs of the band: it gets them, and a note.
 // - Of any other volume at the box of its active voxels. But sparse fog, whose active voxels do not fill their box, is
 //   known everywhere, for its background is the density of empty space.
 #pragma once

@@ -136,13 +136,13 @@ void read_crossings(const Int32Tree& tree, LargeArray<PackedCrossing>& crossings
 }
 
 template <class Grid>
-typename Grid::Ptr read_grid(openvdb::io::File& file, const char* name) {
-  auto grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
+typename Grid::Ptr read_grid(VdbReader& file, const char* name) {
+  auto grid = openvdb::gridPtrCast<Grid>(file.read(name));
   if (!grid) throw Error("the grid '" + std::string(name) + "' has values of another type");
   return grid;
 }
 
-PackedHermite read_packed(openvdb::io::File& file, RunContext& context) {
+PackedHermite read_packed(VdbReader& file, RunContext& context) {
   const auto signs = read_grid<openvdb::BoolGrid>(file, kSigns);
   const auto crossings = read_grid<openvdb::Int32Grid>(file, kCrossings);
   const auto is_inside = [](bool inside) { return inside; };
@@ -174,8 +174,8 @@ bool read_dense_as(const openvdb::GridBase::Ptr& grid, RunContext& context, std:
   return true;
 }
 
-AnyHermite read_dense(openvdb::io::File& file, RunContext& context) {
-  const openvdb::GridBase::Ptr grid = file.readGrid(kDense);
+AnyHermite read_dense(VdbReader& file, RunContext& context) {
+  const openvdb::GridBase::Ptr grid = file.read(kDense);
   std::optional<AnyHermite> result;
   if (!(read_dense_as<FixedVoxel>(grid, context, result) || read_dense_as<ThesisVoxel>(grid, context, result) ||
         read_dense_as<DirectedVoxel>(grid, context, result) || read_dense_as<FloatVoxel>(grid, context, result)))
@@ -183,10 +183,10 @@ AnyHermite read_dense(openvdb::io::File& file, RunContext& context) {
   return *std::move(result);
 }
 
-AnyHermite read_any(openvdb::io::File& file, RunContext& context) {
-  if (file.hasGrid(kDense)) return read_dense(file, context);
-  if (file.hasGrid(kSigns) && file.hasGrid(kCrossings)) return read_packed(file, context);
-  const std::string names = grid_names(file);
+AnyHermite read_any(VdbReader& file, RunContext& context) {
+  if (file.has(kDense)) return read_dense(file, context);
+  if (file.has(kSigns) && file.has(kCrossings)) return read_packed(file, context);
+  const std::string names = file.joined_names();
   throw Error("there are no Hermite data, but " + (names.empty() ? "nothing" : "the grids " + names));
 }
 
@@ -224,8 +224,7 @@ void write_hermite(const fs::path& path, const FloatHermite& hermite, RunContext
 AnyHermite read_hermite(const fs::path& path, RunContext& context) {
   Stage stage(context, "read Hermite data");
   return about_vdb_file(path, [&] {
-    openvdb::io::File file(path.string());
-    open_vdb(file, path);
+    VdbReader file(path);
     try {
       return read_any(file, context);
     } catch (const Error& e) {

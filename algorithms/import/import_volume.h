@@ -32,8 +32,10 @@ struct ImportOptions {
 bool is_nifti_path(const std::filesystem::path& path);
 
 /// NIfTI-1 in one file (.nii) or two (.hdr and .img, either of which may be named), either order of bytes, each file also
-/// gzipped; integers of 1 to 8 bytes, float32 and float64; scl_slope and scl_inter are applied. The transform is the
-/// file's sform, else its qform, else the sizes of its voxels alone; a unit of length other than millimetres is converted.
+/// gzipped; integers of 1 to 8 bytes, float32 and float64, which the datatype decides, whatever bitpix says. scl_slope and
+/// scl_inter are applied; a slope that is not finite, as one of 0, means that samples are not scaled. The transform is the
+/// file's sform, else (where it is empty or singular, too) its qform, else the sizes of its voxels alone; a unit of length
+/// other than millimetres is converted. What was forgiven is a note.
 /// @throws Error, one sentence that names the file, for one that is missing, truncated, damaged, no NIfTI-1 (ANALYZE 7.5
 /// and NIfTI-2 are named), of colours, complex or 128-bit numbers, with a singular transform, with more samples than the
 /// file can hold (before anything is allocated) or memory can; for a frame that there is not, and for samples that are not

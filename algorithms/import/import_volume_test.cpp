@@ -177,7 +177,6 @@ TEST_F(Import, LyingDimensionsAreRefusedBeforeAnythingIsAllocated) {
 
 TEST_F(Import, DamagedHeadersAreNamed) {
   const float nan = std::nanf("");
-  EXPECT_NE(error_of(small().type(4, 8).bytes()).find("have 8 bits"), std::string::npos);
   EXPECT_NE(error_of(small().type(128, 24).bytes()).find("NIfTI type 128"), std::string::npos);
   EXPECT_NE(error_of(small().put<std::int32_t>(0, 540).bytes()).find("NIfTI-2"), std::string::npos);
   EXPECT_NE(error_of(small().put<std::int32_t>(0, 347).bytes()).find("not a NIfTI-1"), std::string::npos);
@@ -185,10 +184,45 @@ TEST_F(Import, DamagedHeadersAreNamed) {
   EXPECT_NE(error_of(small().put<float>(108, nan).bytes()).find("offset of the samples"), std::string::npos);
   EXPECT_NE(error_of(small().put<float>(108, -352.0f).bytes()).find("cannot start at"), std::string::npos);
   EXPECT_NE(error_of(small().put<float>(108, 1e12f).bytes()).find("too short"), std::string::npos);
-  EXPECT_NE(error_of(small().put<float>(112, nan).bytes()).find("scl_slope"), std::string::npos);
+  EXPECT_NE(error_of(small().put<float>(112, 2.0f).put<float>(116, nan).bytes()).find("scl_inter"), std::string::npos);
   EXPECT_NE(error_of(small().put<float>(80, nan).bytes()).find("size of voxels"), std::string::npos);
-  EXPECT_NE(error_of(small().put<std::int16_t>(254, 1).bytes()).find("singular"), std::string::npos);
+  const NiftiBytes flat = small().put<std::int16_t>(254, 1).put<float>(280, 1.0f).put<float>(300, 1.0f);
+  EXPECT_NE(error_of(flat.bytes()).find("singular"), std::string::npos);
   EXPECT_NE(error_of(small().put<std::int16_t>(252, 1).put<float>(256, 2.0f).bytes()).find("quaternion"), std::string::npos);
+}
+
+/// What programs write, and what every reader forgives.
+TEST_F(Import, TheTypeDecidesHowManyBitsASampleHas) {
+  const LevelSet volume = nifti(small().type(4, 8).bytes());
+  EXPECT_EQ(at(volume, 2, 3, 4), 60.0f);
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_NE(context.notes[0].find("have 8 bits; the type decides: 16"), std::string::npos) << context.notes[0];
+}
+
+TEST_F(Import, ASlopeThatIsNotFiniteScalesNothing) {
+  for (const float slope : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
+    context.notes.clear();
+    const LevelSet volume = nifti(small().put<float>(112, slope).put<float>(116, std::nanf("")).bytes());
+    EXPECT_EQ(value_range(volume), std::pair(1.0f, 60.0f));
+    EXPECT_EQ(context.notes.size(), 1u);
+  }
+}
+
+TEST_F(Import, AnEmptySformGivesWayToTheNextTransform) {
+  const auto corner = [&](const NiftiBytes& file) {
+    const openvdb::Vec3d p = nifti(file.bytes()).grid().grid->indexToWorld(openvdb::Vec3d(1, 2, 3));
+    return Eigen::Vector3d(p.x(), p.y(), p.z());
+  };
+  NiftiBytes file = small().put<float>(80, 2.0f).put<float>(84, 3.0f).put<float>(88, 4.0f).put<std::int16_t>(254, 1);
+  EXPECT_LT((corner(file) - Eigen::Vector3d(2, 6, 12)).norm(), 1e-9);  // the sizes of voxels
+  EXPECT_EQ(context.notes.size(), 1u);
+  // A half turn about z: (x, y) to (−x, −y), then a shift.
+  file.put<std::int16_t>(252, 1).put<float>(264, 1.0f).put<float>(268, 10.0f);
+  EXPECT_LT((corner(file) - Eigen::Vector3d(10 - 2, -6, 12)).norm(), 1e-5);
+  file.put<float>(280, std::nanf(""));  // not finite
+  EXPECT_LT((corner(file) - Eigen::Vector3d(10 - 2, -6, 12)).norm(), 1e-5);
+  file.put<float>(280, 1.0f);  // singular
+  EXPECT_LT((corner(file) - Eigen::Vector3d(10 - 2, -6, 12)).norm(), 1e-5);
 }
 
 TEST_F(Import, NoByteOfTheHeaderDoesHarm) {
@@ -261,7 +295,8 @@ TEST(SampleFormat, NamesAreReadBack) {
                            "float32le", "float64be"})
     EXPECT_EQ(name_of(parse_sample_format(name)), name);
   EXPECT_EQ(parse_sample_format("float32"), (hermesh::SampleFormat{SampleType::float32, false}));
-  for (const char* name : {"", "int", "int8le", "int16xe", "float16"}) EXPECT_THROW(parse_sample_format(name), Error) << name;
+    for (const char* name : {"uint8le", "uint8be"}) EXPECT_EQ(name_of(parse_sample_format(name)), "uint8");
+  for (const char* name : {"", "int", "int16xe", "float16"}) EXPECT_THROW(parse_sample_format(name), Error) << name;
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ class Header {
   bool swap_ = false;
 };
 
-SampleFormat format_of(const Header& header) {
+SampleFormat format_of(const Header& header, RunContext& context) {
   const int code = header.number<std::int16_t>(70), bits = header.number<std::int16_t>(72);
   constexpr std::array<std::pair<int, SampleType>, 10> kCodes = {{{2, SampleType::uint8},
                                                                  {4, SampleType::int16},
@@ -86,9 +86,10 @@ SampleFormat format_of(const Header& header) {
   if (found == kCodes.end())
     header.fail("holds samples of the NIfTI type " + std::to_string(code) +
                 ", which is not one real number of up to 64 bits; convert it to a scalar type");
-  if (bits != 8 * int(size_of(found->second)))
-    header.fail("is damaged: it says that samples of the NIfTI type " + std::to_string(code) + " have " +
-                std::to_string(bits) + " bits");
+  const int own_bits = 8 * int(size_of(found->second));
+  if (bits != own_bits)
+    context.note(header.file() + " says that samples of the NIfTI type " + std::to_string(code) + " have " +
+                 std::to_string(bits) + " bits; the type decides: " + std::to_string(own_bits));
   return {found->second, header.big_endian()};
 }
 
@@ -149,28 +150,46 @@ Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3
   return form;
 }
 
-Eigen::Matrix4d affine_form(const Header& header) {
+/// Nothing where it is not finite.
+std::optional<Eigen::Matrix4d> affine_form(const Header& header) {
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t column = 0; column < 4; ++column)
-      form(Eigen::Index(row), Eigen::Index(column)) = header.real(280 + 16 * row + 4 * column, "sform");
-  return form;
+      form(Eigen::Index(row), Eigen::Index(column)) = header.number<float>(280 + 16 * row + 4 * column);
+  return form.allFinite() ? std::optional(form) : std::nullopt;
 }
 
+bool is_singular(const Eigen::Matrix4d& form) {
+  const Eigen::Matrix3d linear = form.topLeftCorner<3, 3>();
+  const double scale = linear.colwise().norm().prod();
+  return !(scale > 0.0) || !(std::fabs(linear.determinant()) > 1e-6 * scale);
+}
+
+/// The sform, else the qform, else the sizes of voxels alone. Programs write an sform of zeros, or one that is not
+/// finite, with a code that says that it counts; then the next one does.
 Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
+  const bool has_qform = header.number<std::int16_t>(252) > 0;
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
+  bool found = false;
   if (header.number<std::int16_t>(254) > 0) {
-    form = affine_form(header);
-  } else {
+    const std::optional<Eigen::Matrix4d> affine = affine_form(header);
+    const bool empty = !affine || affine->topLeftCorner<3, 3>().isZero(0.0);
+    if (affine) form = *affine;
+    found = affine && !is_singular(form);
+    if (!found && !empty && !has_qform) found = true;  // it is the complaint below
+    if (!found)
+      context.note(header.file() + " has an sform that is " + (empty ? "empty" : "singular") + "; its " +
+                   (has_qform ? "qform was" : "sizes of voxels were") + " taken");
+  }
+  if (!found) {
     const std::array<double, 3> sizes = voxel_sizes(header, context);
-    if (header.number<std::int16_t>(252) > 0)
+    form = Eigen::Matrix4d::Identity();
+    if (has_qform)
       form = quaternion_form(header, sizes);
     else
       for (int axis = 0; axis < 3; ++axis) form(axis, axis) = sizes[axis];
   }
-  const Eigen::Matrix3d linear = form.topLeftCorner<3, 3>();
-  const double scale = linear.colwise().norm().prod();
-  if (!(scale > 0.0) || !(std::fabs(linear.determinant()) > 1e-6 * scale))
+  if (is_singular(form))
     header.fail("has a singular transform, which puts all voxels into a plane; set its sform or qform");
   form.topRows<3>() *= unit_of(header);
   return form;
@@ -216,11 +235,12 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const fs::path header_path = unpacked_name(path).second == ".img" ? companion(path, ".hdr") : path;
   ByteSource first(header_path);
   const Header header(first, header_path.string(), context);
-  SampleBox box{.file = header_path.string(), .format = format_of(header), .offset = samples_offset(header)};
+  SampleBox box{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
   const std::int64_t frames = read_dims(header, box);
   const double slope = header.number<float>(112);
-  if (slope != 0.0) {  // 0: the samples are not scaled
-    box.slope = header.real(112, "scl_slope");
+  if (!std::isfinite(slope)) context.note(header.file() + " has a scl_slope that is not finite; its samples were not scaled");
+  if (std::isfinite(slope) && slope != 0.0) {  // 0: the samples are not scaled
+    box.slope = slope;
     box.intercept = header.real(116, "scl_inter");
   }
   box.to_world = transform_of(header, context);

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/shown.h"
 
 namespace hermesh {
 namespace {
@@ -66,11 +67,11 @@ std::string name_of(SampleFormat format) {
 SampleFormat parse_sample_format(const std::string& name) {
   for (const Entry& entry : kTypes)
     for (const std::string_view suffix : {"", "le", "be"})
-      if (name == std::string(entry.name) + std::string(suffix) && (suffix.empty() || entry.size > 1))
-        return {entry.type, suffix == "be"};
+      if (name == std::string(entry.name) + std::string(suffix))
+        return {entry.type, suffix == "be" && entry.size > 1};  // a single byte has no order
   std::string names;
   for (const Entry& entry : kTypes) names += (names.empty() ? "" : ", ") + std::string(entry.name);
-  throw Error("there is no type of samples '" + name + "'; choose of " + names +
+  throw Error("there is no type of samples '" + shown(name) + "'; choose of " + names +
               ", with le or be behind for the order of the bytes");
 }
 

@@ -20,8 +20,8 @@ struct SampleFormat {
 std::size_t size_of(SampleType type);  ///< bytes
 std::string name_of(SampleFormat format);  ///< "int16le", "uint8"
 
-/// From uint8, int8, or one of uint16, int16, uint32, int32, uint64, int64, float32 and float64 with le (least significant
-/// byte first; also where nothing follows) or be behind. @throws Error that lists what there is.
+/// From uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le (least significant byte
+/// first; also where nothing follows) or be behind. @throws Error that lists what there is.
 SampleFormat parse_sample_format(const std::string& name);
 
 /// What became of samples on their way into single precision.

@@ -7,6 +7,7 @@
 
 #include "algorithms/core/error.h"
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/vdb_archive.h"
 
 namespace hermesh {
 namespace {
@@ -77,20 +78,15 @@ GridFrame grid_frame(const openvdb::math::Transform& transform) {
 }
 
 GridFrame read_grid_frame(const std::filesystem::path& path) {
-  initialize_openvdb();
-  try {
-    openvdb::io::File file(path.string());
-    file.open(false);
-    for (auto name = file.beginName(); name != file.endName(); ++name) {
-      const openvdb::GridBase::Ptr grid = file.readGridMetadata(name.gridName());
-      if (grid && grid->isType<openvdb::FloatGrid>()) return grid_frame(grid->transform());
+  return about_vdb_file(path, [&] {
+    VdbReader file(path);
+    for (const std::string& name : file.names()) {
+      const openvdb::GridBase::Ptr grid = file.read_metadata(name);
+      if (!grid->isType<openvdb::FloatGrid>()) continue;
+      return about_file(path.string(), [&] { return grid_frame(grid->transform()); });
     }
-  } catch (const openvdb::Exception& e) {
-    throw Error(path.string() + " cannot be read as a volume (" + e.what() + ")");
-  } catch (const Error& e) {
-    throw Error(path.string() + ": " + e.what());
-  }
-  throw Error(path.string() + " holds no float grid whose lattice could be taken");
+    throw Error(path.string() + " holds no float grid whose lattice could be taken");
+  });
 }
 
 FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame) {
@@ -119,13 +115,17 @@ void out_of_frame(const std::vector<openvdb::GridBase::Ptr>& grids, const GridFr
   const openvdb::Coord by(first[0], first[1], first[2]);
   const Vector3d moved = frame.voxel_size * Vector3d(first[0], first[1], first[2]);
   for (const openvdb::GridBase::Ptr& grid : grids) {
-    if (const auto points = openvdb::gridPtrCast<openvdb::Vec3DGrid>(grid))
+    if (const auto zero = grid->getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions)) {
+      const auto points = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
       for (auto value = points->beginValueOn(); value; ++value) {
-        const Vector3d world = frame.offset + frame.rotation * (to_eigen(*value) + moved);
-        value.setValue({world.x(), world.y(), world.z()});
+        const Vector3d turned = frame.rotation * to_eigen(*value);
+        value.setValue(openvdb::Vec3s(openvdb::Vec3d(turned.x(), turned.y(), turned.z())));
       }
+      const Vector3d world = frame.offset + frame.rotation * (to_eigen(zero->value()) + moved);
+      points->insertMeta(kZeroOfPositions, openvdb::Vec3DMetadata({world.x(), world.y(), world.z()}));
+    }
     if (by != openvdb::Coord(0, 0, 0))
-      grid->apply<openvdb::TypeList<openvdb::FloatGrid, openvdb::Int32Grid, openvdb::Vec3DGrid>>(
+      grid->apply<openvdb::TypeList<openvdb::FloatGrid, openvdb::Int32Grid, openvdb::Vec3SGrid>>(
           [&](auto& typed) { move_tree(typed.tree(), by); });
     grid->setTransform(transform_of(frame));
   }

@@ -49,12 +49,14 @@ std::vector<openvdb::GridBase::Ptr> voxelized(const Vector3d& low, const Vector3
                          .grids;
   out_of_frame(grids, frame, framed.first);
   const auto sdf = openvdb::gridPtrCast<openvdb::FloatGrid>(grids[0]);
-  const auto points = openvdb::gridPtrCast<openvdb::Vec3DGrid>(grids[2])->getConstAccessor();
+  const auto closest = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids[2]);
+  const auto points = closest->getConstAccessor();
+  const auto zero = closest->metaValue<openvdb::Vec3d>("hermesh_origin");
   EXPECT_GT(sdf->activeVoxelCount(), 5000u);
   for (auto value = sdf->cbeginValueOn(); value; ++value) {
     const openvdb::Vec3d world = transform->indexToWorld(value.getCoord());
     const Vector3d at(world[0], world[1], world[2]);
-    const openvdb::Vec3d& p = points.getValue(value.getCoord());
+    const openvdb::Vec3d p = zero + openvdb::Vec3d(points.getValue(value.getCoord()));
     EXPECT_NEAR(*value, to_box(at, low, high), tolerance);
     EXPECT_NEAR(to_box({p[0], p[1], p[2]}, low, high), 0.0, tolerance);
     EXPECT_NEAR((p - world).length(), std::abs(*value), tolerance);

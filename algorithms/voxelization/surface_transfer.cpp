@@ -9,6 +9,7 @@
 #include <span>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/core/vdb_archive.h"
 #include "algorithms/voxelization/index_soup.h"
 
 namespace hermesh {
@@ -143,15 +144,13 @@ struct NamedLayer {
 
 openvdb::Vec3d to_vec3d(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-NamedLayer closest_point_layer(const PolygonMesh& mesh, const openvdb::Int32Grid& nearest) {
-  const auto position = [origin = mesh.origin](const Foot& foot) {
-    return to_vec3d(origin + foot.point.position);
-  };
+NamedLayer closest_point_layer(const openvdb::Int32Grid& nearest) {
+  const auto position = [](const Foot& foot) { return openvdb::Vec3s(to_vec3d(foot.point.position)); };
   return {"closest-point",
           openvdb::VEC_CONTRAVARIANT_ABSOLUTE,
           true,
           {},
-          make_layer<openvdb::Vec3DGrid>(nearest, openvdb::Vec3d(0.0), position)};
+          make_layer<openvdb::Vec3SGrid>(nearest, openvdb::Vec3s(0.0f), position)};
 }
 
 std::string grid_name(const MeshAttribute& attribute) {
@@ -285,7 +284,7 @@ std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mes
                                                           RunContext& context) {
   const Stage stage(context, "values from the surface");
   std::vector<NamedLayer> layers;
-  if (request.closest_point) layers.push_back(closest_point_layer(mesh, nearest));
+  if (request.closest_point) layers.push_back(closest_point_layer(nearest));
   for (const MeshAttribute* attribute : request.attributes) {
     context.check();
     check(mesh, *attribute);
@@ -302,6 +301,7 @@ std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mes
   });
   std::vector<openvdb::GridBase::Ptr> grids;
   for (NamedLayer& layer : layers) grids.push_back(finish(layer));
+  if (request.closest_point) grids.front()->insertMeta(kZeroOfPositions, openvdb::Vec3DMetadata(to_vec3d(mesh.origin)));
   return grids;
 }
 

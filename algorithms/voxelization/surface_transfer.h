@@ -30,9 +30,8 @@ TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, 
 /// none, −1, stay inactive), in the order of the request and with its transform, which is the voxel size and
 /// the mesh's origin:
 ///
-/// - "closest-point": world coordinates in double precision, computed relative to the mesh's origin, so that
-/// far from
-///   the origin as little is lost as the mesh lost.
+/// - "closest-point" (vec3s): relative to the mesh's origin, which is the grid's metadata "hermesh_origin" (vec3d), so
+///   that far from the world's origin as little is lost as the mesh lost.
 /// - Each attribute under its name ("attribute-NAME" where an output of the voxelizer is called NAME): floats
 /// of points
 ///   and corners with the closest point's barycentric weights, whole numbers from the corner with the largest

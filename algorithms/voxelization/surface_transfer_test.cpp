@@ -130,7 +130,7 @@ Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 TEST(SurfaceTransfer, AttributesOfASphere) {
   const PolygonMesh mesh = sphere_with_attributes();
   const VolumeOutputs outputs = make(mesh, 0.04, "sdf,closest-point,triangle-id,attributes");
-  const auto closest = find<openvdb::Vec3DGrid>(outputs, "closest-point");
+  const auto closest = find<openvdb::Vec3SGrid>(outputs, "closest-point");
   const auto normal = find<openvdb::Vec3SGrid>(outputs, "normal"),
              colour = find<openvdb::Vec3SGrid>(outputs, "colour"),
              uv = find<openvdb::Vec3SGrid>(outputs, "uv");

@@ -130,7 +130,7 @@ double bytes_of_outputs(const VolumeRequest& request, const std::vector<const Me
                         double leaves) {
   std::size_t bytes = (request.udf ? 4 : 0) + (request.fog ? 4 : 0) +
                       (request.hermite ? sizeof(FloatVoxel) : 0) +
-                      (request.closest_point ? sizeof(openvdb::Vec3d) : 0);
+                      (request.closest_point ? sizeof(openvdb::Vec3s) : 0);
   for (const MeshAttribute* attribute : attributes) bytes += bytes_per_voxel(*attribute);
   if (request.triangle_id || request.closest_point || !attributes.empty()) bytes += 4;
   return 512.0 * leaves * double(bytes);

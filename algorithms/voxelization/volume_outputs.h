@@ -41,7 +41,7 @@ VolumeRequest parse_volume_request(const std::string& list);
 struct VolumeOutputs {
   /// Standard types only, each with the voxel size and the mesh's origin as transform: float "sdf" (level
   /// set), "udf" and "fog" (fog volume, background 0, active where above 0), int32 "triangle-id" (−1 where only the
-  /// cap of a hole is near), vec3d
+  /// cap of a hole is near), vec3s
   /// "closest-point", attributes.
   std::vector<openvdb::GridBase::Ptr> grids;
   std::optional<FloatHermite> hermite;

@@ -135,7 +135,7 @@ TEST_F(VolumeOutputsTest, DistancesOfATorus) {
   const PolygonMesh mesh = torus(256, 128);
   const VolumeOutputs outputs = make(mesh, 0.05, "sdf,udf,closest-point,triangle-id");
   const auto sdf = find<openvdb::FloatGrid>(outputs, "sdf"), udf = find<openvdb::FloatGrid>(outputs, "udf");
-  const auto closest = find<openvdb::Vec3DGrid>(outputs, "closest-point");
+  const auto closest = find<openvdb::Vec3SGrid>(outputs, "closest-point");
   const auto id = find<openvdb::Int32Grid>(outputs, "triangle-id");
   ASSERT_TRUE(sdf && udf && closest && id);
   EXPECT_EQ(outputs.active_voxels, sdf->activeVoxelCount());
@@ -157,6 +157,26 @@ TEST_F(VolumeOutputsTest, DistancesOfATorus) {
   }
   EXPECT_EQ(closest->activeVoxelCount(), sdf->activeVoxelCount());
   EXPECT_EQ(id->activeVoxelCount(), sdf->activeVoxelCount());
+}
+
+/// Without an inside all is outside, whether it was asked for or found.
+TEST_F(VolumeOutputsTest, UnsignedDistancesAreAsWideAsTheExteriorBand) {
+  PolygonMesh sheet;
+  sheet.points = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  RunContext context;
+  for (const auto& [exterior, interior] : {std::pair(2.0, 5.0), {5.0, 2.0}, {2.0, 30.0}})
+    for (const SignRule signs : {SignRule::none, SignRule::automatic}) {
+      const Voxelization made = voxelize(
+          sheet, {.voxel_size = 0.1, .exterior_band = exterior, .interior_band = interior, .signs = signs}, context);
+      if (made.is_signed) continue;
+      EXPECT_NEAR(made.distance->background(), 0.1 * exterior, 1e-6);
+      for (auto voxel = made.distance->cbeginValueOn(); voxel; ++voxel) ASSERT_LT(*voxel, 0.1 * exterior + 1e-6);
+      // A column over the middle: 0, ±1, … samples nearer than the band is wide.
+      int column = 0;
+      for (int z = -40; z <= 40; ++z) column += made.distance->tree().isValueOn(openvdb::Coord(0, 0, z));
+      EXPECT_EQ(column, 2 * (int(exterior) - 1) + 1);
+    }
 }
 
 TEST_F(VolumeOutputsTest, TriangleIdIsTheNearest) {

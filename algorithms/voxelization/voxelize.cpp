@@ -261,16 +261,16 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
   initialize_openvdb();
-  const BandWidths wide{options.exterior_band, options.interior_band};
-  if (options.signs == SignRule::none || std::max(wide.exterior, wide.interior) <= kWide)
-    return voxelize_within(mesh, options, wide, context);
-  Voxelization result = voxelize_within(
-      mesh, options, {std::min(wide.exterior, kNear), std::min(wide.interior, kNear)}, context);
-  if (result.is_signed) return result;
-  // Without an inside there is one width for all.
-  VoxelizeOptions unsigned_options = options;
-  unsigned_options.signs = SignRule::none;
-  return voxelize_within(mesh, unsigned_options, wide, context);
+  VoxelizeOptions outside_only = options;
+  outside_only.signs = SignRule::none;
+  outside_only.interior_band = options.exterior_band;
+  const BandWidths wide{options.exterior_band, options.interior_band}, exterior{wide.exterior, wide.exterior};
+  if (options.signs == SignRule::none) return voxelize_within(mesh, outside_only, exterior, context);
+  const bool is_wide = std::max(wide.exterior, wide.interior) > kWide;
+  const BandWidths near = is_wide ? BandWidths{std::min(wide.exterior, kNear), std::min(wide.interior, kNear)} : wide;
+  Voxelization result = voxelize_within(mesh, options, near, context);
+  if (result.is_signed || (!is_wide && wide.interior == wide.exterior)) return result;
+  return voxelize_within(mesh, outside_only, exterior, context);
 }
 
 }  // namespace hermesh

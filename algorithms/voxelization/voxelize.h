@@ -40,9 +40,9 @@ struct Voxelization {
 
 /// A voxel on a polygon is on the side that sample_side.h gives it; inside, its distance is kLeastDepth voxels, so that it
 /// carries a sign. Every voxel nearer to the surface than the band is wide is active, no other, and its value is the distance
-/// to the nearest triangle that bounds the solid, right to 1e-5 voxel. Polygons may come in any order and
-/// orientation, twice, degenerate, intersecting, open. The same bytes at any thread count and any level of
-/// vector code.
+/// to the nearest triangle that bounds the solid, right to 1e-5 voxel. Without signs the exterior band's width counts.
+/// Polygons may come in any order and orientation, twice, degenerate, intersecting, open. The same bytes at any thread count
+/// and any level of vector code.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context);
 

@@ -72,6 +72,23 @@ void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
                                                 : "closed half a voxel beyond its last samples; see --ends"));
 }
 
+/// Why a mesh is empty. `source`: the polygons that the volume was made from in the same run, if it was.
+std::string no_surface(const LevelSet& level_set, const PolygonMesh* source, const ChosenExtractor& chosen,
+                       const ExtractArguments& arguments) {
+  const auto [lowest, highest] = value_range(level_set);
+  const double isovalue = arguments.isovalue;
+  const std::string values = "its values go from " + exact_text(lowest) + " to " + exact_text(highest) + ", and " +
+                             exact_text(level_set.background()) + " beyond";
+  const std::string nothing = "there is no surface at the isovalue " + text(isovalue) + ", nothing was written: ";
+  if (double(lowest) < isovalue && isovalue < std::max(double(highest), level_set.background()))
+    return nothing + chosen.extractor.name + " found none, although the volume has samples on both sides (" + values +
+           "); try another --extractor or smaller voxels";
+  if (source && isovalue == 0.0 && lowest >= 0.0f)
+    return nothing + "no voxel is inside, for the polygons enclose nothing, cancel one another, or are thinner than a voxel; " +
+           "give a sheet a thickness with --signs unsigned and an --isovalue above 0";
+  return nothing + "the volume has no sample inside, or none outside; " + values;
+}
+
 /// `paths.in`: the file that it is about.
 PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
                     const ChosenExtractor& chosen, const ExtractArguments& arguments, Session& session) {
@@ -97,13 +114,7 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
   // No reader takes a mesh file without polygons, ours included.
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
     throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
-  if (mesh.empty()) {
-    const auto [lowest, highest] = value_range(level_set);
-    throw Error("'" + input + "': there is no surface at the isovalue " + text(arguments.isovalue) +
-                ", nothing was written: the volume has no sample inside, or none outside; its values go from " +
-                exact_text(lowest) + " to " + exact_text(highest) + ", and " + exact_text(level_set.background()) +
-                " beyond");
-  }
+  if (mesh.empty()) throw Error("'" + input + "': " + no_surface(level_set, source, chosen, arguments));
   note_ends(ended.ends, treatment, session);
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "algorithms/core/mesh_file.h"
+#include "algorithms/core/shown.h"
 #include "algorithms/core/vdb_file.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "experiments/cli/format.h"
@@ -33,12 +34,16 @@ void print_mesh(const std::filesystem::path& path, RunContext& context) {
 }
 
 void print_grid(const GridSummary& grid) {
-  std::cout << "grid           " << grid.name << "\n  values       " << grid.value_type;
+  std::cout << "grid           " << shown(grid.name) << "\n  values       " << grid.value_type;
   std::cout << "\n  class        " << grid.grid_class << '\n';
   const auto& [x, y, z] = grid.voxel_size;
   const bool cubes = std::max({x, y, z}) - std::min({x, y, z}) < 1e-6 * x;
-  std::cout << "  voxel size   " << (cubes ? text(x) : text(Eigen::Vector3d(x, y, z))) << "\n  active       "
-            << grid.active_voxels << " voxels";
+  std::cout << "  voxel size   " << (cubes ? text(x) : text(Eigen::Vector3d(x, y, z)));
+  if (!grid.is_read) {
+    std::cout << "\n  voxels       not read: this program knows no values of this type\n";
+    return;
+  }
+  std::cout << "\n  active       " << grid.active_voxels << " voxels";
   if (grid.active_voxels > 0)
     std::cout << ", indices " << index_text(grid.lower) << " to " << index_text(grid.upper);
   if (grid.background) std::cout << "\n  background   " << text(*grid.background);

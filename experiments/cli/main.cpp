@@ -1,5 +1,5 @@
 // The program `hermesh`. What it does on the command line, its exit codes and its output are a contract for
-// scripts: results on stdout, everything else on stderr, a failure is one line there.
+// scripts: results on stdout, everything else on stderr, a failure is one line there, the last, after the notes.
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
@@ -8,6 +8,7 @@
 #include <new>
 #include <thread>
 
+#include "algorithms/core/shown.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/terminal_progress.h"
@@ -15,20 +16,31 @@
 namespace hermesh::cli {
 namespace {
 
-int fail(int exit_code, std::string sentence) {
-  // Messages of libraries may hold line breaks, and names of files anything that a terminal obeys; scripts rely on one line.
-  std::ranges::replace_if(sentence, [](char c) { return (c >= '\0' && c < ' ') || c == '\x7f'; }, ' ');
-  std::cerr << "hermesh: " << sentence << std::endl;
+/// Of an error or a note, in bytes. What is quoted from files is shorter; the names of files may be long.
+constexpr std::size_t kLongest = 1500;
+
+int fail(int exit_code, const std::string& sentence) {
+  // Messages of libraries may hold line breaks, and names of files what controls a terminal; scripts rely on one line.
+  std::cerr << "hermesh: " << shown(sentence, kLongest, true) << std::endl;
   return exit_code;
 }
 
+void print_notes(Session& session) {
+  if (!session.quiet)
+    for (const std::string& note : session.context.notes) std::cerr << "note: " << shown(note, kLongest, true) << '\n';
+  session.context.notes.clear();
+}
+
+/// TBB reserves memory for as many as it is told that there may be.
+constexpr int kMostThreads = 1024;
+
 void add_common_options(CLI::App& app, Session& session) {
-  app.add_option("--threads", session.threads, "Number of threads, at least 1 (default: all of the machine)")
+  app.add_option("--threads", session.threads, "Number of threads, 1 to 1024 (default: all of the machine)")
       ->check([](const std::string& given) {
         int count = 0;
-        return CLI::detail::lexical_cast(given, count) && count >= 1
+        return CLI::detail::lexical_cast(given, count) && count >= 1 && count <= kMostThreads
                    ? std::string()
-                   : "must be a whole number of at least 1, not '" + given + "'";
+                   : "must be a whole number from 1 to " + std::to_string(kMostThreads) + ", not '" + given + "'";
       });
   app.add_flag("--quiet", session.quiet, "Print results and errors only: no progress, notes or summaries");
 }
@@ -48,6 +60,7 @@ int run_to_exit_code(Session& session) {
   } catch (const std::exception& error) {
     // Whatever a library throws while the user is waiting for the end, it ends because the user said so.
     if (const int exit_code = signal_exit_code()) end_process(exit_code);
+    print_notes(session);
     if (dynamic_cast<const UsageError*>(&error)) return fail(kUsage, error.what());
     if (dynamic_cast<const std::bad_alloc*>(&error))
       return fail(kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory");
@@ -97,8 +110,7 @@ int run_program(int argc, char** argv) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   const int exit_code = run_to_exit_code(session);
   work_is_finished();
-  if (!session.quiet && (exit_code == kDone || exit_code == kNotMet))
-    for (const std::string& note : session.context.notes) std::cerr << "note: " << note << '\n';
+  print_notes(session);
   return exit_code;
 }
 

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <pty.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -68,6 +69,11 @@ void ProgramTest::execute(std::vector<std::string> words, int err) const {
   dup2(open_or_exit(streams_ / "out", O_WRONLY | O_CREAT | O_TRUNC), STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
   if (chdir(folder_.c_str()) != 0) _exit(126);
+  for (const auto& [resource, value] : limits_) {
+    const struct rlimit limit = {value, value};
+    if (setrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0) _exit(126);
+  }
+  for (const int number : {SIGHUP, SIGPIPE, SIGXCPU}) ::signal(number, SIG_DFL);  // whoever runs the test may ignore them
   execv(argv[0], argv.data());
   _exit(127);
 }

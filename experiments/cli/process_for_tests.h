@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace hermesh::cli {
@@ -33,6 +35,9 @@ class ProgramTest : public testing::Test {
   /// stdin.
   Outcome run(const std::vector<std::string>& arguments, std::optional<Interruption> interruption = {});
 
+  /// A limit (RLIMIT_…) for the programs that are run from now on.
+  void limit(int resource, std::uint64_t value) { limits_.emplace_back(resource, value); }
+
   std::filesystem::path path(const std::string& name) const { return folder_ / name; }
   /// The same with a terminal for stderr; returns all that the terminal was sent.
   std::string terminal_output(const std::vector<std::string>& arguments);
@@ -52,6 +57,7 @@ class ProgramTest : public testing::Test {
   [[noreturn]] void execute(std::vector<std::string> words, int err) const;
 
   std::filesystem::path folder_, streams_;
+  std::vector<std::pair<int, std::uint64_t>> limits_;
 };
 
 }  // namespace hermesh::cli

@@ -81,6 +81,13 @@ const std::atomic<bool>& handle_signals() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  for (const int number : {SIGHUP, SIGPIPE, SIGXCPU}) {
+    struct sigaction before = {};
+    sigaction(number, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);
+  }
+  // A write beyond the limit of a file's size then fails as one to a full disk does.
+  std::signal(SIGXFSZ, SIG_IGN);
   return cancel_flag;
 }
 

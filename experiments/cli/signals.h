@@ -1,14 +1,15 @@
-// SIGINT and SIGTERM: ask the work to stop, and see to it that the process ends.
+// Signals that end a program (SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXCPU): ask the work to stop, and see to it that the
+// process ends.
 #pragma once
 
 #include <atomic>
 
 namespace hermesh::cli {
 
-/// Handles SIGINT and SIGTERM from now on: the returned flag is set, and a watchdog thread ends the process
+/// Handles these signals from now on: the returned flag is set, and a watchdog thread ends the process
 /// 50 ms later, because a library's loop may never look at the flag. It removes unfinished files first. Call
-/// once, before the work starts. A signal that the caller had ignored is handled, too: who sends it wants the
-/// end.
+/// once, before the work starts. A SIGINT or SIGTERM that the caller had ignored is handled, too: who sends it wants the
+/// end. The others stay ignored then, as nohup has it. Files that become too large (SIGXFSZ) are errors.
 const std::atomic<bool>& handle_signals();
 
 /// The work is done and its output stands under its name: a signal from now on changes nothing. Does not

@@ -1,0 +1,180 @@
+// What comes from outside, damaged or odd: the program's answer to single files, its limits and signals.
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/vdb_file.h"
+#include "experiments/cli/process_for_tests.h"
+
+namespace hermesh::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+
+class DamageTest : public ProgramTest {
+ protected:
+  /// A file that lies beside this one.
+  std::string input(const std::string& name) {
+    const fs::path target = path(name);
+    fs::copy_file(fs::path(HERMESH_TEST_INPUTS) / name, target);
+    return name;
+  }
+  /// One short line without control characters that ends the run, after notes if need be.
+  void expect_refusal(int exit_code, const Arguments& arguments, const std::vector<std::string>& words) {
+    std::string command = "hermesh";
+    for (const std::string& argument : arguments) command += " " + argument;
+    SCOPED_TRACE(command.substr(0, 200));
+    const std::set<std::string> before = files();
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    const std::size_t line = outcome.err.rfind("hermesh: ");
+    ASSERT_NE(line, std::string::npos) << outcome.err;
+    EXPECT_TRUE(line == 0 || outcome.err[line - 1] == '\n');
+    EXPECT_EQ(std::count(outcome.err.begin() + std::ptrdiff_t(line), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_LE(outcome.err.size() - line, 300u) << outcome.err;
+    EXPECT_TRUE(std::ranges::none_of(outcome.err, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; }));
+    for (const std::string& word : words) EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before);
+  }
+  nlohmann::json judged(const std::string& mesh) { return nlohmann::json::parse(run({"validate", mesh, "--json"}).out); }
+};
+
+TEST_F(DamageTest, ABlockOfValuesThatIsLongerThanItsPlace) {
+  const std::string file = input("damaged-chunk.vdb");
+  for (const Arguments& arguments : {Arguments{"info", file}, {"extract", file, "out.ply"}, {"fracture", file, "out"}})
+    expect_refusal(1, arguments, {file, "damaged"});
+}
+
+TEST_F(DamageTest, ATileOf4096CubedIsWeighedBeforeItIsMade) {
+  const std::string file = input("one-tile-4096.vdb");
+  EXPECT_NE(run({"info", file}).out.find(std::to_string(4096LL * 4096 * 4096) + " voxels"), std::string::npos);
+  // With less memory than its surface of 100 million cells takes, on any machine.
+  limit(RLIMIT_AS, rlim_t{3} << 30);
+  for (const char* extractor : {"dual-contouring", "marching-cubes", "manifold-dual-contouring"})
+    expect_refusal(1, {"extract", file, "out.ply", "--extractor", extractor}, {file, "GiB"});
+}
+
+TEST_F(DamageTest, NiftiThatOthersRead) {
+  for (const auto& [file, values] : {std::pair("nan-slope.nii.gz", "values 76.6"), {"bitpix.nii.gz", "values 76.6"}}) {
+    const Outcome outcome = run({"import", input(file), "out.vdb"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find(values), std::string::npos) << outcome.out;
+    EXPECT_NE(outcome.out.find("to 99.1"), std::string::npos) << outcome.out;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(outcome.err.rfind("note: ", 0), 0u) << outcome.err;
+  }
+}
+
+TEST_F(DamageTest, SingleBytesHaveNoOrder) {
+  write("a.raw", std::string(8, '\x05') + std::string(19, '\x02'));
+  for (const char* type : {"uint8", "uint8le", "int8be"})
+    EXPECT_EQ(run({"import", "a.raw", "a.vdb", "--dims", "3,3,3", "--type", type}).exit_code, 0) << type;
+}
+
+TEST_F(DamageTest, DamagedExperimentsLeaveNoFolder) {
+  for (int i = 1; i <= 4; ++i)
+    expect_refusal(1, {"run", input("damaged-experiment-" + std::to_string(i) + ".toml"), "--out", "a/b/rows"}, {"damaged-experiment"});
+  write("good.toml",
+        "question = \"Q?\"\nvoxelizers = [\"hermesh\"]\ncolumns = [\"triangles\"]\n[[variants]]\nname = \"marching-cubes\"\n"
+        "[quick]\ncases = [{ name = \"sphere\", resolutions = [8] }]\n");
+  expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--filter", "no such cell"}, {"no cell"});
+  expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--tier", "full"}, {"full"});
+}
+
+TEST_F(DamageTest, AMaskIsInsideWhereItIsActive) {
+  initialize_openvdb();
+  auto mask = openvdb::MaskGrid::create(false);
+  mask->fill(openvdb::CoordBBox(openvdb::Coord(1), openvdb::Coord(10, 20, 30)), true);
+  mask->setName("mask");
+  openvdb::io::File(path("mask.vdb")).write({mask});
+  ASSERT_EQ(run({"extract", "mask.vdb", "a.obj", "--isovalue", "0.5", "--extractor", "marching-cubes"}).exit_code, 0);
+  const nlohmann::json report = judged("a.obj");
+  EXPECT_EQ(report.at("components"), 1);
+  EXPECT_EQ(report.at("euler_characteristic"), 2);
+  // A box of 10 x 20 x 30 voxels whose edges and corners marching cubes cuts: off an edge a prism of 1/8 voxel a voxel of
+  // its length, off a corner a pyramid of 1/48, where the prisms of three edges would meet in 3 · 1/16 of a voxel.
+  EXPECT_LT(report.at("volume").get<double>(), 6000.0);
+  EXPECT_GT(report.at("volume").get<double>(), 6000.0 - 4 * 60 / 8.0 - 1e-3);
+}
+
+/// The inside of a level set with the background of outside, as programs leave it that do not flood it.
+TEST_F(DamageTest, AnUnfloodedLevelSetIsFlooded) {
+  initialize_openvdb();
+  const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(10.0f, openvdb::Vec3f(0.3f), 0.5f);
+  grid->setName("sdf");
+  openvdb::io::File(path("flooded.vdb")).write({grid});
+  const auto unflooded = openvdb::FloatGrid::create(grid->background());
+  unflooded->setGridClass(openvdb::GRID_LEVEL_SET);
+  unflooded->setTransform(grid->transformPtr());
+  unflooded->setName("sdf");
+  for (auto it = grid->cbeginValueOn(); it; ++it) unflooded->tree().setValue(it.getCoord(), *it);
+  openvdb::io::File(path("unflooded.vdb")).write({unflooded});
+  for (const std::string name : {"flooded", "unflooded"}) {
+    const Outcome outcome = run({"extract", name + ".vdb", name + ".ply"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("not flooded") != std::string::npos, name == "unflooded") << outcome.err;
+  }
+  EXPECT_TRUE(read("flooded.ply") == read("unflooded.ply"));
+  EXPECT_EQ(judged("unflooded.ply").at("components"), 1);
+}
+
+TEST_F(DamageTest, NamesThatControlATerminalDoNot) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setName("\x1b[2J" + std::string(2'000'000, 'n'));
+  grid->tree().setValue(openvdb::Coord(0), -1.0f);
+  openvdb::io::File(path("name.vdb")).write({grid, openvdb::BoolGrid::create()});
+  const Outcome outcome = run({"info", "name.vdb"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_LT(outcome.out.size(), 2000u);
+  EXPECT_EQ(outcome.out.find('\x1b'), std::string::npos);
+  expect_refusal(1, {"extract", "name.vdb", "out.ply"}, {"name.vdb", "--grid"});
+  expect_refusal(1, {"extract", "name.vdb", "out.ply", "--grid", "\x1b[2Jother"}, {"name.vdb", "?[2Jother"});
+  expect_refusal(1, {"info", "\x1b[2J.vdb"}, {"?[2J.vdb"});
+}
+
+TEST_F(DamageTest, ThreadsHaveAnEnd) {
+  for (const char* threads : {"2147483647", "1025", "0", "99999999999"})
+    expect_refusal(2, {"--threads", threads, "info", "none.vdb"}, {"--threads", "1024"});
+  write_cube();
+  EXPECT_EQ(run({"remesh", "cube.off", "a.ply", "--resolution", "20", "--threads", "1024"}).exit_code, 0);
+  EXPECT_EQ(run({"remesh", "cube.off", "b.ply", "--resolution", "20", "--threads", "1"}).exit_code, 0);
+  EXPECT_TRUE(read("a.ply") == read("b.ply"));
+}
+
+TEST_F(DamageTest, NotesAreThereBeforeAnError) {
+  // Two sheets on each other, turned against each other: they cancel.
+  write("sheets.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n");
+  const Outcome outcome = run({"remesh", "sheets.obj", "out.ply", "--resolution", "10"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("enclose nothing"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("--signs unsigned"), std::string::npos) << outcome.err;
+}
+
+TEST_F(DamageTest, AHangUpLeavesNothingHalfWritten) {
+  write_sphere();
+  for (const int signal : {SIGHUP, SIGXCPU, SIGPIPE}) {
+    const Outcome outcome = run({"remesh", "sphere.off", "out.ply", "--resolution", "1500"}, Interruption{signal, {}});
+    EXPECT_EQ(outcome.exit_code, 128 + signal) << outcome.err;
+    EXPECT_EQ(files(), std::set<std::string>{"sphere.off"});
+  }
+}
+
+TEST_F(DamageTest, AFileThatMayNotGrowIsRemoved) {
+  write_sphere();
+  limit(RLIMIT_FSIZE, 10000);
+  for (const char* out : {"out.ply", "out.stl", "out.obj"})
+    EXPECT_EQ(run({"remesh", "sphere.off", out, "--resolution", "60"}).exit_code, 1) << out;
+  EXPECT_EQ(run({"voxelize", "sphere.off", "out.vdb", "--resolution", "60"}).exit_code, 1);
+  EXPECT_EQ(files(), std::set<std::string>{"sphere.off"});
+}
+
+}  // namespace
+}  // namespace hermesh::cli
