@@ -37,7 +37,7 @@ class FreeCells {
   Eigen::Vector3i size_ = Eigen::Vector3i::Zero();
   enum : std::uint8_t { kUnseen, kBlocked, kFree };
   std::uint8_t state_at(const Eigen::Vector3d& point) const {
-    return state_.empty() ? kBlocked : state_[index(cell_of(point))];
+    return state_.empty() ? std::uint8_t(kBlocked) : state_[index(cell_of(point))];
   }
   std::vector<std::uint8_t> state_;
 };

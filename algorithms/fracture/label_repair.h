@@ -9,12 +9,10 @@
 //
 // **What labels and sheets must fulfil.** A piece is bounded by the polygons of the lattice edges of which
 // one end is in it. It is closed and manifold if all of this holds:
-//   1. The two cells beside a face draw the same lines on it. Of the face's edges that bound the piece none,
-//   two
-//      or four do. Two hang together by the lines, four are paired by two segments.
+//   1. The two cells beside a face draw the same lines on it. None, two or four of the face's edges bound the
+//      piece. Two hang together by the lines, four are paired by two segments.
 //   2. Where four do, the segments end in different sheets of one of the two cells, or the polygons are held
-//   to
-//      them (uniform_mesh.h, sheet_trials.h).
+//      to them (uniform_mesh.h, sheet_trials.h).
 //   3. Each sheet of a cell bounds the piece in one loop at most.
 // Two polygons of the piece share the segment between the points of two cells if they belong to two edges
 // that bound it in the cells' common face, so by 1 and 2 each such segment has two of them: the piece is
@@ -28,8 +26,7 @@
 // corners cut off on either side.
 //   Joints: 2 and 3 are what makes them simple; where the other cell is none, it can be held.
 //   A cell without a cut has the loops of cell_sheets.h. What hangs together of its inside corners by edges
-//   is of
-// one piece. But a loop goes around what hangs together by edges *and across ambiguous faces whose inside is
+// is of one piece. But a loop goes around what hangs together by edges *and across ambiguous faces whose inside is
 // joined*, as normals may have it. The two corners of such a face may well be of two pieces without a cut
 // anywhere near: a thin plate aslant in the lattice holds samples that are neighbours across faces only. One
 // loop would bound both pieces then, and each of them would be open. So only faces whose inside corners are

@@ -104,8 +104,13 @@ bool keeps_promises(const std::string& file, const Promises& promises, Session& 
   const validation::MeshReport report =
       validation::judge(read_mesh_file(file, session.context), {.libraries = false}, session.context);
   const PromiseCheck check = check_promises(promises, report);
-  std::cout << promise_verdict(promises, check) << '\n';
-  for (const std::string& line : report.sentences()) std::cout << line << '\n';
+  std::vector<std::string> lines = report.sentences();
+  lines.insert(lines.begin(), promise_verdict(promises, check));
+  for (const std::string& line : lines)
+    if (session.json)
+      session.context.note(line);
+    else
+      std::cout << line << '\n';
   return check.broken.empty();
 }
 
@@ -152,6 +157,7 @@ void add_combine(CLI::App& app, Session& session) {
   command->add_option("A", arguments->first, kMeshIn)->required();
   command->add_option("B", arguments->second, kMeshIn)->required();
   command->add_option("OUT", arguments->out, kMeshOut)->required();
+  add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option("--resolution")->description("Voxels along the longest side of the larger solid");
   add_extractor_options(*command, arguments->extracting, "manifold-dual-contouring");

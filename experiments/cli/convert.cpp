@@ -165,6 +165,7 @@ void add_conversions(CLI::App& app, Session& session) {
 
   CLI::App* command = add_command(app, session, "extract", "A volume to a mesh");
   add_paths(*command, arguments->paths, "Volume: .vdb", kMeshOut);
+  add_json_option(*command, session);
   add_extract_options(*command, arguments->extracting, "dual-contouring");
   command->add_option("--grid", arguments->extracting.grid,
                       "Name of the grid (default: sdf, or the only scalar grid there is)");
@@ -186,6 +187,7 @@ void add_conversions(CLI::App& app, Session& session) {
   arguments = std::make_shared<Arguments>();
   command = add_command(app, session, "remesh", "Polygons to a level set and back to a mesh");
   add_paths(*command, arguments->paths, kMeshIn, kMeshOut);
+  add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing);
   add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
   command->callback([arguments, &session] {

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <new>
 #include <thread>
 
@@ -45,9 +46,19 @@ void add_common_options(CLI::App& app, Session& session) {
   app.add_flag("--quiet", session.quiet, "Print results and errors only: no progress, notes or summaries");
 }
 
+void print_json(const Session& session) {
+  nlohmann::json json{{"notes", session.context.notes}, {"figures", nlohmann::json::object()}};
+  for (const auto& [name, value] : session.context.figures) json["figures"][name] = value;
+  for (const auto& [stage, seconds] : session.context.stage_seconds)
+    json["stage_seconds"].push_back({{"stage", stage}, {"seconds", seconds}});
+  // A file's name need not be UTF-8, JSON must.
+  std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+}
+
 int run_command(Session& session) {
   const TerminalProgress progress(session.context, !session.quiet);
   const int exit_code = session.command();
+  if (session.json) print_json(session);
   std::cout.flush();
   if (!std::cout) throw Error("cannot write to the standard output");
   return exit_code;
@@ -120,6 +131,10 @@ CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, 
   CLI::App* command = app.add_subcommand(name, summary);
   add_common_options(*command, session);
   return command;
+}
+
+void add_json_option(CLI::App& command, Session& session) {
+  command.add_flag("--json", session.json, "Print what was done as JSON: notes, figures, times of stages");
 }
 
 }  // namespace hermesh::cli

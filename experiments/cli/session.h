@@ -36,6 +36,7 @@ auto as_usage(Check check) {
 struct Session {
   RunContext context;
   bool quiet = false;
+  bool json = false;             ///< what was done as one JSON object instead of summaries
   std::optional<int> threads;    ///< none: as many as the machine has
   std::function<int()> command;  ///< the one that was asked for; returns an ExitCode
 };
@@ -50,6 +51,9 @@ void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_experiments(CLI::App& app, Session& session);  ///< run, report
+
+/// Lets a command that makes volumes or surfaces print what it did as JSON: its notes, figures and times of stages.
+void add_json_option(CLI::App& command, Session& session);
 
 /// A subcommand with the options that all of them take.
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary);

@@ -130,6 +130,7 @@ void add_voxelize(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
   add_paths(*command, arguments->paths, kMeshIn, "Volumes: .vdb");
+  add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing, true);
   command->add_option(
       "--grids", arguments->grids,

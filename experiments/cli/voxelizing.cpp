@@ -128,12 +128,14 @@ void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const
                        Session& session) {
   const LostSurface lost =
       find_lost_surface(mesh, level_set, leaves_out_inner_polygons(chosen.voxelizer), session.context);
+  session.context.figure("lost_surface_share", lost.share());
+  session.context.figure("lost_surface_thickness", lost.thickness);
   const std::string note = lost_surface_note(lost, level_set.voxel_size());
   if (!note.empty()) session.context.note(note);
 }
 
 void print_summary(const Session& session, const std::string& line) {
-  if (session.quiet) return;
+  if (session.quiet || session.json) return;
   std::cout << line << '\n';
 }
 
