@@ -164,7 +164,6 @@ TEST_F(VolumeOutputsTest, UnsignedDistancesAreAsWideAsTheExteriorBand) {
   PolygonMesh sheet;
   sheet.points = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
-  RunContext context;
   for (const auto& [exterior, interior] : {std::pair(2.0, 5.0), {5.0, 2.0}, {2.0, 30.0}})
     for (const SignRule signs : {SignRule::none, SignRule::automatic}) {
       const Voxelization made = voxelize(
