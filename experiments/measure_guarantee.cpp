@@ -353,6 +353,7 @@ class SubjectMeasurement {
     if (tolerance.value_or(0.0) > 0 && subject.certify && !written.points.empty() &&
         !reference_.points.empty()) {
       options.reference = &reference_;
+      options.reference_quads = validation::QuadRule::as_given;
       options.certify = true;
       options.certify_gap = kGap * subject.voxel_size;
     }

@@ -129,7 +129,7 @@ TEST_F(Measurements, PlotsTakeATableAndItsColumns) {
 }
 
 TEST_F(Measurements, MistakesInTheFileNameTheirLine) {
-  EXPECT_EQ(complaint("points = 3"), "x.toml:6: unknown key \"points\" in [quick]; it takes base, mode");
+  EXPECT_EQ(complaint("points = 3"), "x.toml:6: unknown key \"points\" in [quick]; it takes mode, base");
   EXPECT_EQ(complaint("base = 11").substr(0, 8), "x.toml:5");
   EXPECT_NE(complaint("", "columns = [\"seconds\"]").find("x.toml:4: \"columns\" has no place"),
             std::string::npos);

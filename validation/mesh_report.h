@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algorithms/core/mesh_file.h"
+#include "validation/quad_cut.h"
 
 namespace hermesh::validation {
 
@@ -133,6 +134,8 @@ struct JudgeOptions {
   bool self_intersections = true;
   bool libraries = true;                ///< let OpenMesh and CGAL count, too
   const MeshFile* reference = nullptr;  ///< for the distances
+  /// As given for a mesh that was proved as it is cut, such as an extractor's own uniform one.
+  QuadRule reference_quads = QuadRule::better;
   std::int64_t samples = 200'000;       ///< on each surface, by area, besides every point of it
   bool certify = false;                 ///< certified Hausdorff bound, both ways
   std::int64_t solid_samples = 100'000;  ///< to compare the solid with the reference's; 0 = not at all

@@ -11,8 +11,8 @@ using Eigen::Vector3d;
 
 /// Beyond rounding, of a cosine and of a ratio of squared lengths.
 constexpr double kAlike = 1e-9;
-/// How far from plane a plane quad may be in a file of five digits, of its longest side.
-constexpr double kPlane = 1e-4;
+/// How far from plane a plane quad may be in a file of single precision, of its longest side.
+constexpr double kPlane = 1e-6;
 
 bool is_plane(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   const Vector3d u = b - a, v = c - a, w = d - a;

@@ -12,16 +12,12 @@ namespace hermesh::validation {
 /// which of two surfaces it is. But a plane one has one surface only, which in a concave quad is cut along
 /// the diagonal inside it, wherever the file starts.
 enum class QuadRule {
-  /// For the mesh that is judged: a–c, unless a half of that faces against the quad as a whole, or has no
-  /// area, and no
-  /// half of b–d does.
+  /// For the mesh that is judged: a–c, unless it is plane, a half by a–c faces against the quad as a whole or has no
+  /// area, and no half by b–d does.
   as_given,
-  /// For a reference from elsewhere, whose order means nothing. The same without asking whether it is plane, and then
-  /// the diagonal across which the
-  /// quad bends
-  /// less; if they bend alike, the shorter one; and if they are equally long, the one with the lowest point
-  /// number.
-  /// This is how hermesh reads such a file when it makes a volume of it.
+  /// For a reference from elsewhere, whose order means nothing. The same without asking whether it is plane, and then the
+  /// diagonal across which the quad bends less; if they bend alike, the shorter one; and if they are equally long, the
+  /// one with the lowest point number. This is how hermesh reads such a file when it makes a volume of it.
   better,
 };
 

@@ -48,7 +48,7 @@ void count_with_libraries(const MeshFile& mesh, double unit, MeshReport& report,
 
 void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const JudgeOptions& options,
                        MeshReport& report, RunContext& context) {
-  const TriangleSoup reference(*options.reference, QuadRule::better);
+  const TriangleSoup reference(*options.reference, options.reference_quads);
   const TriangleTree reference_tree(reference);
   {
     const Stage stage(context, "distances");
