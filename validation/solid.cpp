@@ -197,6 +197,7 @@ bool Solid::leads_to(const Eigen::Vector3d& point,
                      bool (FreeCells::*kind)(const Eigen::Vector3d&) const) const {
   if ((free_cells_.*kind)(point)) return true;
   const double step = 0.5 * free_cells_.cell();
+  if (!(step > 0.0)) return false;  // there are no cells, of which a way could meet one
   for (int way = 0; way < kWays; ++way) {
     const Eigen::Vector3d& direction = directions_[std::size_t(way)];
     double hit = 1.0;

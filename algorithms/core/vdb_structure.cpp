@@ -59,9 +59,9 @@ void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked
   if (packed < 16 || header.size() < 16) file.damaged("a block of packed values is too short");
   std::array<std::uint32_t, 3> sizes;
   std::memcpy(sizes.data(), header.data() + 4, sizeof sizes);
-  // OpenVDB fills what is shorter up to this length before it packs it.
+  // OpenVDB fills what is shorter up to this length before it packs it, and reads into as much.
   constexpr std::uint64_t kLeast = 128;
-  if (sizes[0] != std::max(unpacked, kLeast) || sizes[2] > packed) file.damaged("a block of packed values is not as long as it says");
+  if (sizes[0] > std::max(unpacked, kLeast) || sizes[2] > packed) file.damaged("a block of packed values is not as long as it says");
 }
 
 /// What OpenVDB keeps for reading leaves later: their number, masks and packed sizes (io/DelayedLoadMetadata.cc).
