@@ -48,7 +48,7 @@ class DamageTest : public ProgramTest {
 
 TEST_F(DamageTest, ABlockOfValuesThatIsLongerThanItsPlace) {
   const std::string file = input("damaged-chunk.vdb");
-  for (const Arguments& arguments : {Arguments{"info", file}, {"extract", file, "out.ply"}, {"fracture", file, "out"}})
+  for (const Arguments& arguments : {Arguments{"info", file}, {"extract", file, "out.ply"}, {"fracture", file, "out", "--cutters", "planes:1"}})
     expect_refusal(1, arguments, {file, "damaged"});
 }
 
@@ -83,7 +83,7 @@ TEST_F(DamageTest, DamagedExperimentsLeaveNoFolder) {
     expect_refusal(1, {"run", input("damaged-experiment-" + std::to_string(i) + ".toml"), "--out", "a/b/rows"}, {"damaged-experiment"});
   write("good.toml",
         "question = \"Q?\"\nvoxelizers = [\"hermesh\"]\ncolumns = [\"triangles\"]\n[[variants]]\nname = \"marching-cubes\"\n"
-        "[quick]\ncases = [{ name = \"sphere\", resolutions = [8] }]\n");
+        "[quick]\ncases = [{ name = \"uv-sphere\", resolutions = [8] }]\n");
   expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--filter", "no such cell"}, {"no cell"});
   expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--tier", "full"}, {"full"});
 }
