@@ -32,7 +32,7 @@ constexpr double kOff = 1e-3, kLeastOff = 1e-5;
 constexpr double kSmall = 0.5;
 /// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
 /// microseconds each.
-constexpr std::size_t kMostFaces = 1 << 16, kFacesPerSample = 1, kFacesPerTriangle = 16;
+constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
 
 using Voxel = std::array<std::int32_t, 3>;
 
@@ -105,56 +105,73 @@ class Suspicion {
   BlockFinder finder_;
 };
 
+/// A face of a triangle, and what is known about it.
+struct Sheet {
+  std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
+  std::uint32_t face = 0;
+  Side side = Side::unknown;
+  std::array<Side, 2> sides{Side::unknown, Side::unknown};  ///< of that alone: along the normal, against it
+
+  void conclude() {
+    if (sides[0] == Side::outer || sides[1] == Side::outer)
+      side = Side::outer;
+    else if (sides[0] == Side::inner && sides[1] == Side::inner)
+      side = Side::inner;
+  }
+};
+
+/// Places off the middle of a face on both of its sides.
+std::array<Vector3d, 2> places_beside(const TriangleFace& face, const Vector3d& place, const Vector3d& normal) {
+  const double off = std::clamp(0.05 * face.room_at(face.middle()), kLeastOff, kOff);
+  return {place + off * normal, place - off * normal};
+}
+
 /// What a thread asks about faces.
 class Prober {
  public:
   Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const std::vector<VoxelBits>& inside, const Suspects& suspects, const WindingNumber* winding)
-      : probe_(soup, bins, inside, winding), suspicion_(suspects, band, bins.blocks()) {}
+         const std::vector<VoxelBits>& inside, const Suspects& suspects)
+      : probe_(soup, bins, inside), suspicion_(suspects, band, bins.blocks()) {}
 
   /// All places of a whole face have the same around them, so that one that sees something tells. It is outer where one
   /// of its sides is; of a face that is not whole, all places have to agree that it is inner.
-  Side side(const TriangleFace& face, const Vector3d& normal) {
-    if (!suspicion_.touches(face.corners)) return Side::outer;
-    const Vector3d middle = face.middle();
-    const double off = off_at(face, middle);
-    Side sides[2] = {Side::unknown, Side::unknown};
-    const auto look_from = [&](const Vector3d& q) {
-      bool sees_both = true;
-      for (int i = 0; i < 2; ++i) {
-        const Side seen = probe_.seen_from(q + (i == 0 ? off : -off) * normal);
-        if (seen == Side::outer) return Side::outer;
-        if (seen == Side::inner) sides[i] = seen;
-        sees_both &= seen == Side::inner;
-      }
-      return sees_both ? Side::inner : Side::unknown;
-    };
-    const Side seen = look_from(middle);
-    const bool one_tells = face.whole ? face.size() <= kSmall : seen == Side::unknown;
-    if (seen == Side::outer || one_tells) return seen;
-    for (const Vector3d& corner : face.corners) {
-      const Side there = look_from(0.8 * corner + 0.2 * middle);
-      if (there == Side::outer || (!face.whole && there == Side::unknown)) return there;
+  void look(const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
+    if (!suspicion_.touches(face.corners)) {
+      sheet.side = Side::outer;
+      return;
     }
-    return sides[0] == Side::inner && sides[1] == Side::inner ? Side::inner : Side::unknown;
+    const Vector3d middle = face.middle();
+    bool agree = look_from(middle, face, normal, sheet);
+    const bool one_tells = face.whole ? face.size() <= kSmall : !agree;
+    if (!one_tells)
+      for (const Vector3d& corner : face.corners) {
+        if (sheet.side == Side::outer || (!face.whole && !agree)) break;
+        agree &= look_from(0.8 * corner + 0.2 * middle, face, normal, sheet);
+      }
+    if (!face.whole && !agree && sheet.side == Side::inner) sheet.side = Side::unknown;
   }
 
-  /// The same with all means, from the face's middle.
-  Side searched_side(const TriangleFace& face, const Vector3d& normal, bool follow_spaces) {
-    const Vector3d middle = face.middle();
-    const double off = off_at(face, middle);
-    for (const double step : {off, -off}) {
-      const Vector3d p = middle + step * normal;
-      Side side = probe_.seen_from(p);
-      if (side == Side::unknown) side = probe_.searched_from(p, normal, follow_spaces);
-      if (side != Side::inner) return side;
-    }
-    return Side::inner;
+  /// Looks farther where nothing was seen, from the face's middle.
+  void follow_spaces(const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
+    const std::array<Vector3d, 2> places = places_beside(face, face.middle(), normal);
+    for (std::size_t i = 0; i < 2; ++i)
+      if (sheet.sides[i] == Side::unknown) sheet.sides[i] = probe_.followed_from(places[i], normal);
+    sheet.conclude();
   }
 
  private:
-  static double off_at(const TriangleFace& face, const Vector3d& place) {
-    return std::clamp(0.05 * face.room_at(place), kLeastOff, kOff);
+  /// Whether it is inner at that place for certain.
+  bool look_from(const Vector3d& place, const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
+    bool inner = true;
+    const std::array<Vector3d, 2> places = places_beside(face, place, normal);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Side seen = probe_.seen_from(places[i]);
+      if (seen != Side::unknown) sheet.sides[i] = seen;
+      inner &= seen == Side::inner;
+      if (seen == Side::outer) break;
+    }
+    sheet.conclude();
+    return inner;
   }
 
   SurfaceProbe probe_;
@@ -188,13 +205,6 @@ void for_each_beside(const TriangleTree& tree, const Facet& facet, double margin
     }
   }
 }
-
-/// A face of a triangle, and what is known about it.
-struct Sheet {
-  std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
-  std::uint32_t face = 0;
-  Side side = Side::unknown;
-};
 
 class Finder {
  public:
@@ -471,7 +481,9 @@ class Finder {
       for_each_beside(cap_tree, facet, kMargin, [&](std::uint32_t cap) { cutter.add(Facet(caps_[cap])); });
       if (!cutter.has_cuts()) return;
       Suspicion& suspicion = suspicions.local();
-      faces_[i] = cutter.faces(kFacesPerTriangle + std::size_t(most * (own_area / area)),
+      // One half to all alike, the other by area.
+      const double share = 0.5 / double(triangles_.size()) + 0.5 * own_area / area;
+      faces_[i] = cutter.faces(kFacesPerTriangle + std::size_t(most * share),
                                [&](const TriangleFace& face) { return suspicion.touches(face.corners); });
     });
     for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
@@ -491,11 +503,8 @@ class Finder {
     return Facet(soup_.corners(triangles_[sheet.triangle])).normal().normalized();
   }
 
-  /// Calls f(sheet, prober) for some of the sheets, given by number, in parallel.
-  template <class F>
-  void for_each_sheet(const std::vector<std::uint32_t>& some, const WindingNumber* winding, double done,
-                      double to, F&& f) {
-    // Block by block, so that a neighbourhood is looked up once.
+  /// Some of the sheets, given by number, block by block, so that a neighbourhood is looked up once.
+  std::vector<std::pair<BlockAt, std::uint32_t>> by_block(const std::vector<std::uint32_t>& some) const {
     std::vector<std::pair<BlockAt, std::uint32_t>> order(some.size());
     parallel_blocks(some.size(), context_, [&](std::size_t i) {
       const Vector3d middle = face(sheets_[some[i]]).middle();
@@ -503,8 +512,15 @@ class Finder {
       order[i].second = some[i];
     });
     std::sort(order.begin(), order.end());
+    return order;
+  }
+
+  /// Calls f(sheet, prober) for some of the sheets in parallel.
+  template <class F>
+  void for_each_sheet(const std::vector<std::uint32_t>& some, double done, double to, F&& f) {
+    const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(some);
     tbb::enumerable_thread_specific<Prober> probers(
-        [&] { return Prober(soup_, bins_, band_, inside_, suspects_, winding); });
+        [&] { return Prober(soup_, bins_, band_, inside_, suspects_); });
     in_parts(order.size(), done, to,
              [&](std::size_t i) { f(sheets_[order[i].second], probers.local()); });
   }
@@ -512,8 +528,8 @@ class Finder {
   void find_sides() {
     std::vector<std::uint32_t> all(sheets_.size());
     std::iota(all.begin(), all.end(), 0u);
-    for_each_sheet(all, nullptr, 0.6, 0.8, [&](Sheet& sheet, Prober& prober) {
-      sheet.side = prober.side(face(sheet), unit_normal(sheet));
+    for_each_sheet(all, 0.6, 0.8, [&](Sheet& sheet, Prober& prober) {
+      prober.look(face(sheet), unit_normal(sheet), sheet);
     });
     std::size_t crowded = 0;
     double largest = 0;
@@ -563,8 +579,36 @@ class Finder {
     if (!quick && inner_triangles < kTheRule * doubtful_triangles) return;
     const OrientedWinding winding(soup_);
     if (!winding.usable()) return;
-    for_each_sheet(doubtful, &winding.number(), 0.8, 1.0, [&](Sheet& sheet, Prober& prober) {
-      sheet.side = prober.searched_side(face(sheet), unit_normal(sheet), doubtful.size() <= kFew);
+    if (doubtful.size() <= kFew)
+      for_each_sheet(doubtful, 0.8, 0.9, [&](Sheet& sheet, Prober& prober) {
+        prober.follow_spaces(face(sheet), unit_normal(sheet), sheet);
+      });
+    wind(doubtful, winding.number());
+  }
+
+  /// Asks the winding numbers about sides of which nothing is known. Outside of all that is closed the number is 0,
+  /// whatever the orientation of each.
+  void wind(const std::vector<std::uint32_t>& doubtful, const WindingNumber& winding) {
+    const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(doubtful);
+    constexpr std::size_t kTogether = 256;  // two places each
+    std::vector<std::size_t> first;         // of those that are asked together, of one block
+    for (std::size_t i = 0; i < order.size(); ++i)
+      if (i == 0 || order[i].first != order[i - 1].first || i - first.back() == kTogether) first.push_back(i);
+    first.push_back(order.size());
+    in_parts(first.size() - 1, 0.9, 1.0, [&](std::size_t k) {
+      std::vector<Vector3d> places;
+      for (std::size_t i = first[k]; i < first[k + 1]; ++i) {
+        const Sheet& sheet = sheets_[order[i].second];
+        const TriangleFace of = face(sheet);
+        for (const Vector3d& place : places_beside(of, of.middle(), unit_normal(sheet))) places.push_back(place);
+      }
+      std::vector<float> numbers(places.size());
+      winding.at(places, numbers);
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        Side& side = sheets_[order[first[k] + i / 2].second].sides[i % 2];
+        if (side == Side::unknown) side = std::abs(numbers[i]) > 0.5f ? Side::inner : Side::outer;
+      }
+      for (std::size_t i = first[k]; i < first[k + 1]; ++i) sheets_[order[i].second].conclude();
     });
   }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/core/sample_side.h"
@@ -35,6 +36,21 @@ struct Pocket {
   std::vector<std::uint32_t> blocks;  ///< numbers of those that hold them
 };
 
+/// The voxels of a block that are at most `far` from a voxel on each axis, as bits.
+VoxelBits cube_bits(const BlockAt& block, const Voxel& middle, std::int32_t far) {
+  std::int32_t first[3], last[3];
+  for (std::size_t a = 0; a < 3; ++a) {
+    first[a] = std::max(middle[a] - far - 8 * block[a], 0);
+    last[a] = std::min(middle[a] + far - 8 * block[a], 7);
+    if (first[a] > last[a]) return {};
+  }
+  std::uint64_t layer = 0;
+  const std::uint64_t row = (std::uint64_t(2) << last[2]) - (std::uint64_t(1) << first[2]);
+  for (std::int32_t y = first[1]; y <= last[1]; ++y) layer |= row << (8 * y);
+  VoxelBits bits{};
+  for (std::int32_t x = first[0]; x <= last[0]; ++x) bits[std::size_t(x)] = layer;
+  return bits;
+}
 
 class PocketOpener {
  public:
@@ -57,6 +73,7 @@ class PocketOpener {
       std::vector<std::uint32_t> asked = closed_ones(open);
       // A crevice may hold several pockets, one behind the other.
       for (bool first = true; !asked.empty(); first = false) {
+        mark_goals(first);
         const std::vector<char> sees = look(asked);
         if (first) goals_.assign(regions_.count, 0);
         for (const std::uint32_t pocket : opened_) goals_[pockets_[pocket].region] = 0;
@@ -108,6 +125,29 @@ class PocketOpener {
   static void sort_and_unify(std::vector<std::uint32_t>& numbers) {
     std::sort(numbers.begin(), numbers.end());
     numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  }
+
+  /// Puts the voxels of all goals into `goal_bits_`, or those of the pockets that were opened in the last round.
+  void mark_goals(bool all) {
+    if (all) {
+      goal_bits_.assign(blocks_.size(), VoxelBits{});
+      for (std::size_t i = 0; i < blocks_.size(); ++i)
+        for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
+          if (goals_[regions_.components[c].region])
+            for (std::size_t x = 0; x < 8; ++x) goal_bits_[i][x] |= regions_.components[c].voxels[x];
+      all_marked_ = true;
+      return;
+    }
+    if (std::exchange(all_marked_, false)) goal_bits_.assign(blocks_.size(), VoxelBits{});
+    for (const std::uint32_t block : marked_blocks_) goal_bits_[block] = {};
+    marked_blocks_.clear();
+    for (const std::uint32_t pocket : opened_)
+      for (const Voxel& voxel : pockets_[pocket].voxels) {
+        const std::uint32_t block = bins_.blocks().find(tile_of(voxel));
+        const unsigned place = place_in_tile(voxel);
+        goal_bits_[block][place >> 6] |= std::uint64_t(1) << (place & 63);
+        marked_blocks_.push_back(block);
+      }
   }
 
   /// Which of these pockets see a goal.
@@ -231,22 +271,35 @@ class PocketOpener {
     while (!(regions_.components[c].voxels[place >> 6] >> (place & 63) & 1)) ++c;  // each voxel is in one
     return regions_.components[c].region;
   }
-  bool is_goal(const Voxel& voxel) const {
-    const std::uint32_t region = region_of(voxel);
-    return region != BlockTable::kNone && goals_[region];
-  }
 
   bool sees_goal(const Voxel& voxel, CellObstacles& obstacles) const {
-    const Vector3d from = side_place(voxel);
+    std::vector<std::uint32_t> near;  // blocks with goals
+    BlockAt low, high;
+    for (std::size_t a = 0; a < 3; ++a) low[a] = (voxel[a] - far_) >> 3, high[a] = (voxel[a] + far_) >> 3;
+    for (std::int32_t x = low[0]; x <= high[0]; ++x)
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t z = low[2]; z <= high[2]; ++z)
+          if (const std::uint32_t block = bins_.blocks().find({x, y, z});
+              block != BlockTable::kNone && goal_bits_[block] != VoxelBits{})
+            near.push_back(block);
     // Near ones first.
     for (std::int32_t far = 1; far <= far_; ++far)
-      for (std::int32_t x = -far; x <= far; ++x)
-        for (std::int32_t y = -far; y <= far; ++y)
-          for (std::int32_t z = -far; z <= far; ++z) {
-            if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != far) continue;
-            const Voxel other{voxel[0] + x, voxel[1] + y, voxel[2] + z};
-            if (is_goal(other) && is_free(from, side_place(other), obstacles)) return true;
-          }
+      for (const std::uint32_t block : near)
+        if (sees_goal_in(block, voxel, far, obstacles)) return true;
+    return false;
+  }
+
+  /// At that distance, the largest of the three axes'.
+  bool sees_goal_in(std::uint32_t block, const Voxel& voxel, std::int32_t far, CellObstacles& obstacles) const {
+    const BlockAt& at = blocks_[block];
+    const VoxelBits within = cube_bits(at, voxel, far), nearer = cube_bits(at, voxel, far - 1);
+    for (std::int32_t x = 0; x < 8; ++x)
+      for (std::uint64_t bits = goal_bits_[block][std::size_t(x)] & within[std::size_t(x)] & ~nearer[std::size_t(x)];
+           bits; bits &= bits - 1) {
+        const int place = __builtin_ctzll(bits);
+        const Voxel other{at[0] * 8 + x, at[1] * 8 + place / 8, at[2] * 8 + place % 8};
+        if (is_free(side_place(voxel), side_place(other), obstacles)) return true;
+      }
     return false;
   }
 
@@ -265,6 +318,9 @@ class PocketOpener {
   std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< by block
   std::vector<std::uint32_t> opened_;                   ///< in the last round
   std::int32_t far_ = 0;
+  std::vector<VoxelBits> goal_bits_;  ///< voxels of the goals, by block
+  bool all_marked_ = false;                  ///< not those that were opened last alone
+  std::vector<std::uint32_t> marked_blocks_;  ///< otherwise
   std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };
 

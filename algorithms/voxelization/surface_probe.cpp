@@ -34,18 +34,8 @@ CellObstacles::Voxel corner(const CellObstacles::Voxel& cell, unsigned i) {
 }  // namespace
 
 SurfaceProbe::SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins,
-                           const std::vector<VoxelBits>& inside, const WindingNumber* winding)
-    : inside_(inside),
-      winding_(winding),
-      finder_(bins.blocks()),
-      obstacles_(soup, bins, kKept) {}
-
-Side SurfaceProbe::searched_from(const Vector3d& p, const Vector3d& normal, bool follow_space) {
-  if (follow_space && obstacles_.triangles_in(cell_of(p)).size() <= kCrowded)
-    if (const Side found = follow(p, normal); found != Side::unknown) return found;
-  if (!winding_) return Side::unknown;
-  return is_wound_about(p) ? Side::inner : Side::outer;
-}
+                           const std::vector<VoxelBits>& inside)
+    : inside_(inside), finder_(bins.blocks()), obstacles_(soup, bins, kKept) {}
 
 /// 0 or 1, or 2 where there is no block.
 int SurfaceProbe::inside_at(const Voxel& voxel) {
@@ -90,7 +80,8 @@ double SurfaceProbe::centre(Vector3d& p, const Vector3d& normal) {
 /// From p, where the gap between the sheet below and another is too narrow to see a voxel from, on to where
 /// it is wider, as long as it widens. Every step is free of triangles, so that what is seen in the end is on
 /// the same side of all of them as p is.
-Side SurfaceProbe::follow(Vector3d p, const Vector3d& normal) {
+Side SurfaceProbe::followed_from(Vector3d p, const Vector3d& normal) {
+  if (obstacles_.triangles_in(cell_of(p)).size() > kCrowded) return Side::unknown;
   const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   double width = centre(p, normal);
   for (int step = 0;; ++step) {
@@ -113,11 +104,6 @@ Side SurfaceProbe::follow(Vector3d p, const Vector3d& normal) {
     width = widest;
     p = widest_at;
   }
-}
-
-/// Outside of all that is closed the number is 0, whatever the orientation of each.
-bool SurfaceProbe::is_wound_about(const Vector3d& p) const {
-  return std::abs(winding_->at(p)) > 0.5;
 }
 
 }  // namespace hermesh

@@ -5,7 +5,6 @@
 
 #include "algorithms/voxelization/cell_obstacles.h"
 #include "algorithms/voxelization/regions.h"
-#include "algorithms/voxelization/winding_number.h"
 
 namespace hermesh {
 
@@ -16,15 +15,14 @@ enum class Side { outer, inner, unknown };
 /// Looks around among the triangles; each thread has its own, since it keeps what it looked up.
 class SurfaceProbe {
  public:
-  /// Keeps references. `inside`: the voxels inside each block of the bins. `winding` may be null.
-  SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside,
-               const WindingNumber* winding);
+  /// Keeps references. `inside`: the voxels inside each block of the bins.
+  SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside);
 
   /// What is around a place off the surface, by straight ways to the corners of the cell that it is in.
   Side seen_from(const Eigen::Vector3d& p);
   /// The same of a place next to a sheet with this unit normal from which nothing is seen: follows the narrow space to
-  /// where it is wider, if it is to, and asks the winding numbers about one that does not widen.
-  Side searched_from(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, bool follow_space);
+  /// where it is wider, as long as it widens.
+  Side followed_from(Eigen::Vector3d p, const Eigen::Vector3d& normal);
 
  private:
   using Voxel = CellObstacles::Voxel;
@@ -32,11 +30,8 @@ class SurfaceProbe {
   int inside_at(const Voxel& voxel);
   void enter(const Voxel& cell);
   double centre(Eigen::Vector3d& p, const Eigen::Vector3d& normal);
-  Side follow(Eigen::Vector3d p, const Eigen::Vector3d& normal);
-  bool is_wound_about(const Eigen::Vector3d& p) const;
 
   const std::vector<VoxelBits>& inside_;
-  const WindingNumber* winding_;
   BlockFinder finder_;
   CellObstacles obstacles_;
   /// The cell that was looked into last.
