@@ -72,7 +72,7 @@ std::span<const Column> all_columns() {
        "/report/features/corner_to_mesh/mean", Unit::kVoxel},
       {"corner_max", "corner max [vx]", "largest distance from the input's corners to the mesh, in voxels",
        "/report/features/corner_to_mesh/max", Unit::kVoxel},
-      {"solid", "solid", "whether the mesh bounds the solid of the input: same, differs, or unknown of the input",
+      {"solid", "solid", "whether the mesh bounds the solid of the input, within √3 voxels: same, differs, or unknown of the input",
        "/report/solid/verdict"},
       {"solid_difference", "△ [%]",
        "volume of the symmetric difference of the two solids, of the input's volume, where both are known",

@@ -282,7 +282,11 @@ class SubjectMeasurement {
     if (!input_.parameters.is("largest_cube", "8"))
       subject.label += ", cubes of " + input_.parameters.text("largest_cube");
     if (input_.parameters.is("representation", "sparse")) subject.label += ", packed";
-    source_ = subject.source ? std::optional(to_mesh_file(*subject.source)) : std::nullopt;
+    source_.reset();
+    if (judged_ && subject.source) {
+      RunContext child = child_context(input_.context, false);
+      source_.emplace(to_mesh_file(*subject.source), child);
+    }
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
@@ -359,7 +363,7 @@ class SubjectMeasurement {
     }
     const validation::MeshReport report = validation::judge(written, options, context);
     set_counts(values, report);
-    if (source_) compare_with_source(values, written, subject, context);
+    if (source_) compare_with_source(values, written, subject, tolerance.value_or(0.0), context);
     if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
       values["to_upper"] = to->upper / subject.voxel_size;
@@ -376,9 +380,10 @@ class SubjectMeasurement {
   }
 
   /// The promise is about the level set; whether that has the solid of the polygons is a figure.
-  void compare_with_source(Json& values, const MeshFile& written, const Subject& subject, RunContext& context) const {
-    set_solid(values, validation::compare_solids(
-                          written, *source_, {.samples = kSolidSamples, .voxel_size = subject.voxel_size}, context));
+  void compare_with_source(Json& values, const MeshFile& written, const Subject& subject, double tolerance,
+                           RunContext& context) const {
+    const double explained = (1.0 + tolerance) * subject.voxel_size;
+    set_solid(values, source_->compare(written, {.samples = kSolidSamples, .voxel_size = explained}, context));
   }
 
   void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
@@ -401,7 +406,7 @@ class SubjectMeasurement {
   const MeasurementInput& input_;
   const std::vector<double> tolerances_;
   const bool judged_;
-  std::optional<MeshFile> source_;  ///< the polygons of a model
+  std::optional<validation::SolidReference> source_;  ///< the polygons of a model
   MeshFile reference_;  ///< the subject's uniform mesh
   std::optional<validation::MeshReport> reference_report_;
 };

@@ -5,7 +5,7 @@
 namespace hermesh {
 
 std::vector<MeasuredColumn> solid_columns() {
-  return {{"solid", "solid", "whether the mesh bounds the solid of the input: same, differs, or unknown of the input"},
+  return {{"solid", "solid", "whether the mesh bounds the solid of the input, within √3 voxels: same, differs, or unknown of the input"},
           {"solid_difference", "△ [%]",
            "volume of the symmetric difference of the two solids, of the input's volume, where both are known"},
           {"false_area", "false [%]", "area that follows what bounds no solid in the input, of the mesh's"}};

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "algorithms/core/disjoint_sets.h"
-#include "validation/self_intersection.h"
+#include "validation/near_pairs.h"
 
 namespace hermesh::validation {
 namespace {
@@ -50,7 +50,7 @@ class Finder {
   }
 
   OuterBoundary find() {
-    pairs_ = intersecting_pairs(soup_, tree_, context_);
+    pairs_ = near_pairs(soup_, tree_, 2.0 * step_, context_);
     group();
     roles_.assign(soup_.triangles.size(), Role::inner);
     tbb::parallel_for(std::size_t(0), speakers_.size(), [&](std::size_t i) {

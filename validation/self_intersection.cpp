@@ -3,7 +3,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 
@@ -108,13 +107,6 @@ struct Found {
   }
 };
 
-// All of them.
-struct Pairs {
-  std::vector<std::array<std::uint32_t, 2>> list;
-
-  void add(PairKind, const Offence& offence) { list.push_back({offence.first, offence.second}); }
-};
-
 class Search {
  public:
   Search(const TriangleSoup& soup, const TriangleTree& tree)
@@ -127,7 +119,6 @@ class Search {
     });
   }
 
-  template <class Found>
   void search_leaf(std::size_t leaf, Found& found) const {
     const std::size_t begin = tree_.first_slot(leaf), end = tree_.first_slot(leaf + 1);
     tree_.for_each_overlapping_leaf(leaf, [&](std::size_t other) {
@@ -142,7 +133,6 @@ class Search {
   }
 
  private:
-  template <class Found>
   void test(std::size_t i, std::size_t j, Found& found) const {
     const std::uint32_t a = tree_.triangle(i), b = tree_.triangle(j);
     const PairKind kind =
@@ -189,26 +179,6 @@ SelfIntersections find_self_intersections(const TriangleSoup& soup, const Triang
   for (const Offence& o : found.offences)
     add_place(result.places, o.point, soup.polygon(o.first), soup.polygon(o.second));
   return result;
-}
-
-std::vector<std::array<std::uint32_t, 2>> intersecting_pairs(const TriangleSoup& soup, const TriangleTree& tree,
-                                                             const RunContext& context) {
-  const Search search(soup, tree);
-  const auto search_range = [&](const tbb::blocked_range<std::size_t>& range, Pairs found) {
-    for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
-      context.check();
-      search.search_leaf(leaf, found);
-    }
-    return found;
-  };
-  const auto join = [](Pairs left, const Pairs& right) {
-    left.list.insert(left.list.end(), right.list.begin(), right.list.end());
-    return left;
-  };
-  const tbb::blocked_range<std::size_t> all(0, tree.leaves(), 256);
-  Pairs found = tbb::parallel_deterministic_reduce(all, Pairs{}, search_range, join);
-  tbb::parallel_sort(found.list.begin(), found.list.end());
-  return std::move(found.list);
 }
 
 }  // namespace hermesh::validation

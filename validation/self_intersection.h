@@ -29,8 +29,4 @@ PairKind classify_pair(const TriangleSoup& soup, std::size_t a, std::size_t b);
 SelfIntersections find_self_intersections(const TriangleSoup& soup, const TriangleTree& tree,
                                           RunContext& context);
 
-/// The same pairs as triangles' numbers, the smaller one first, in increasing order.
-std::vector<std::array<std::uint32_t, 2>> intersecting_pairs(const TriangleSoup& soup, const TriangleTree& tree,
-                                                             const RunContext& context);
-
 }  // namespace hermesh::validation

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -129,19 +130,34 @@ double area_of(const MeshFile& mesh) {
   return area;
 }
 
-class Comparison {
+}  // namespace
+
+/// What does not depend on the mesh.
+struct SolidReference::Parts {
+  Body body;
+  OuterBoundary boundary;
+  Surface bounding, possible;
+
+  Parts(MeshFile welded, const RunContext& context)
+      : body(std::move(welded), Solid::Reading::by_any_rule, context),
+        boundary(outer_boundary(body.soup, body.tree, body.solid, context)),
+        bounding(boundary.bounding),
+        possible(boundary.possible) {}
+};
+
+class SolidReference::Comparison {
  public:
-  Comparison(const Body& mesh, const Body& reference, const SolidOptions& options, const RunContext& context)
+  Comparison(const Body& mesh, const Parts& reference, const SolidOptions& options, const RunContext& context)
       : mesh_(mesh),
-        reference_(reference),
+        reference_(reference.body),
+        boundary_(reference.boundary),
+        bounding_(reference.bounding),
+        possible_(reference.possible),
         options_(options),
         context_(context),
-        boundary_(outer_boundary(reference.soup, reference.tree, reference.solid, context)),
         pieces_(options.pieces ? outer_boundary(mesh.soup, mesh.tree, mesh.solid, context).bounding
                                : MeshFile{}),
-        ours_(options.pieces ? pieces_ : mesh.mesh),
-        bounding_(boundary_.bounding),
-        possible_(boundary_.possible) {}
+        ours_(options.pieces ? pieces_ : mesh.mesh) {}
 
   SolidComparison run(const SolidComparison& known) {
     result_ = known;
@@ -241,13 +257,22 @@ class Comparison {
     result_.difference.upper = volume(at_most).upper;
   }
 
-  /// How many along each side, so that they are about cubes and about as many as samples.
+  /// How many along each side, so that they are about cubes and about as many as samples: 1 where the box is
+  /// thin.
   Eigen::Vector3d strata_along(const Eigen::Vector3d& size) const {
-    const double longest = size.maxCoeff();
-    const Eigen::Vector3d shape = (size / longest).cwiseMax(1e-6);
-    const double scale = std::cbrt(double(options_.samples) / shape.prod());
-    Eigen::Vector3d strata;
-    for (int axis = 0; axis < 3; ++axis) strata[axis] = std::max(1.0, std::round(scale * shape[axis]));
+    Eigen::Vector3d strata = Eigen::Vector3d::Ones();
+    std::array<bool, 3> thin{size.x() <= 0.0, size.y() <= 0.0, size.z() <= 0.0};
+    for (int round = 0; round < 3; ++round) {
+      double product = 1.0;
+      int thick = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        if (!thin[axis]) product *= size[axis], ++thick;
+      const double side = std::pow(product / double(options_.samples), 1.0 / std::max(1, thick));
+      for (int axis = 0; axis < 3; ++axis) {
+        strata[axis] = thin[axis] ? 1.0 : std::max(1.0, std::round(size[axis] / side));
+        thin[axis] = thin[axis] || size[axis] < side;
+      }
+    }
     return strata;
   }
 
@@ -279,28 +304,39 @@ class Comparison {
   }
 
   const Body &mesh_, &reference_;
+  const OuterBoundary& boundary_;
+  const Surface &bounding_, &possible_;
   const SolidOptions& options_;
   const RunContext& context_;
-  OuterBoundary boundary_;
   MeshFile pieces_;  ///< without their seams; empty for a mesh that is one
-  Surface ours_, bounding_, possible_;
+  Surface ours_;
   SolidComparison result_;
 };
 
-}  // namespace
+SolidReference::SolidReference(const MeshFile& reference, RunContext& context) {
+  const Stage stage(context, "reference's solid");
+  MeshFile welded = welded_triangles(reference, QuadRule::better);
+  if (!welded.triangles.empty()) parts_ = std::make_unique<const Parts>(std::move(welded), context);
+}
 
-SolidComparison compare_solids(const MeshFile& mesh, const MeshFile& reference, const SolidOptions& options,
-                               RunContext& context) {
+SolidReference::~SolidReference() = default;
+
+SolidComparison SolidReference::compare(const MeshFile& mesh, const SolidOptions& options,
+                                        RunContext& context) const {
   const Stage stage(context, "solids");
   SolidComparison result;
   result.samples = options.samples;
   result.mesh_components = count_components(mesh);
   result.mesh_area = area_of(mesh);
-  MeshFile ours = welded_triangles(mesh), theirs = welded_triangles(reference, QuadRule::better);
-  if (ours.triangles.empty() || theirs.triangles.empty()) return result;
-  const Body body(std::move(ours), Solid::Reading::by_orientation, context);
-  const Body reference_body(std::move(theirs), Solid::Reading::by_any_rule, context);
-  return Comparison(body, reference_body, options, context).run(result);
+  MeshFile welded = welded_triangles(mesh);
+  if (!parts_ || welded.triangles.empty()) return result;
+  const Body body(std::move(welded), Solid::Reading::by_orientation, context);
+  return Comparison(body, *parts_, options, context).run(result);
+}
+
+SolidComparison compare_solids(const MeshFile& mesh, const MeshFile& reference, const SolidOptions& options,
+                               RunContext& context) {
+  return SolidReference(reference, context).compare(mesh, options, context);
 }
 
 }  // namespace hermesh::validation

@@ -1,7 +1,7 @@
 // Whether a mesh bounds the solid of a reference: what a soup's inner walls hide from distances.
 #pragma once
 
-#include <optional>
+#include <memory>
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/core/run_context.h"
@@ -35,7 +35,23 @@ struct SolidOptions {
 /// each as the lower end of its interval. What is unknown of the reference counts for neither. If that is
 /// more than half of it, or the reference bounds nothing, the verdict is `unknown`, unless they differ for
 /// certain.
-/// @throws Cancelled; Error like judge().
+/// All of it throws Cancelled. Points must be finite, and corners there, as judge() sees to.
+class SolidReference {
+ public:
+  SolidReference(const MeshFile& reference, RunContext& context);
+  ~SolidReference();
+  SolidReference(const SolidReference&) = delete;
+  SolidReference& operator=(const SolidReference&) = delete;
+
+  SolidComparison compare(const MeshFile& mesh, const SolidOptions& options, RunContext& context) const;
+
+ private:
+  struct Parts;
+  class Comparison;
+  std::unique_ptr<const Parts> parts_;  ///< none if no polygon has an area
+};
+
+/// The same for one mesh.
 SolidComparison compare_solids(const MeshFile& mesh, const MeshFile& reference, const SolidOptions& options,
                                RunContext& context);
 

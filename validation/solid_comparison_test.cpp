@@ -52,8 +52,66 @@ MeshFile globe(double r, const Vector3d& centre, int n) {
   return mesh;
 }
 
+/// Unit cubes of an integer lattice, and their union's boundary as unit squares, each cut into n × n.
+struct Bricks {
+  MeshFile soup, boundary;
+};
+
+Bricks random_bricks(std::mt19937& random, int n) {
+  constexpr int kSize = 8;
+  std::vector<std::uint8_t> full(kSize * kSize * kSize, 0);
+  const auto inside = [&](const Eigen::Vector3i& p) {
+    return p.minCoeff() >= 0 && p.maxCoeff() < kSize &&
+           full[std::size_t((p.x() * kSize + p.y()) * kSize + p.z())];
+  };
+  Bricks bricks;
+  const int boxes = 1 + int(random() % 5);
+  for (int i = 0; i < boxes; ++i) {
+    Eigen::Vector3i lower, upper;
+    for (int axis = 0; axis < 3; ++axis) {
+      lower[axis] = int(random() % (kSize - 2));
+      upper[axis] = lower[axis] + 1 + int(random() % std::uint32_t(kSize - lower[axis]));
+      upper[axis] = std::min(upper[axis], kSize);
+    }
+    bricks.soup = together(bricks.soup, box(lower.cast<double>(), upper.cast<double>()));
+    for (int x = lower.x(); x < upper.x(); ++x)
+      for (int y = lower.y(); y < upper.y(); ++y)
+        for (int z = lower.z(); z < upper.z(); ++z) full[std::size_t((x * kSize + y) * kSize + z)] = 1;
+  }
+  for (int x = 0; x < kSize; ++x)
+    for (int y = 0; y < kSize; ++y)
+      for (int z = 0; z < kSize; ++z)
+        for (int axis = 0; axis < 3; ++axis)
+          for (int side : {0, 1}) {
+            const Eigen::Vector3i at(x, y, z);
+            Eigen::Vector3i beyond = at;
+            beyond[axis] += side ? 1 : -1;
+            if (!inside(at) || inside(beyond)) continue;
+            for (int i = 0; i < n; ++i)
+              for (int j = 0; j < n; ++j) {
+                const std::uint32_t first = std::uint32_t(bricks.boundary.points.size());
+                for (const auto& [u, v] :
+                     {std::pair<int, int>{i, j}, {i + 1, j}, {i + 1, j + 1}, {i, j + 1}}) {
+                  Vector3d p = at.cast<double>();
+                  p[axis] += side;
+                  p[(axis + 1) % 3] += double(u) / n;
+                  p[(axis + 2) % 3] += double(v) / n;
+                  bricks.boundary.points.push_back(p);
+                }
+                bricks.boundary.quads.push_back(side ? Quad{first, first + 1, first + 2, first + 3}
+                                                     : Quad{first, first + 3, first + 2, first + 1});
+              }
+          }
+  bricks.boundary = welded(bricks.boundary);
+  return bricks;
+}
+
+void turn_about(MeshFile& mesh, const Eigen::Matrix3d& by) {
+  for (Vector3d& p : mesh.points) p = by * p;
+}
+
 SolidComparison compared(const MeshFile& mesh, const MeshFile& reference, double voxel_size = 0.0,
-                         std::int64_t samples = 40'000) {
+                         std::int64_t samples = 10'000) {
   RunContext context;
   return compare_solids(mesh, reference, {samples, voxel_size}, context);
 }
@@ -127,6 +185,7 @@ TEST(OuterBoundary, OfSoupsThatHideWalls) {
   };
   expect(overlapping_boxes(), 2600, 1);
   expect(together(box({0, 0, 0}, {10, 10, 20}), box({0, 0, 20}, {10, 10, 60})), 2600, 1);  // stacked
+  expect(together(box({0, 0, 0}, {10, 10, 20}), box({2, 2, 20}, {5, 5, 30})), 1000 + 4 * 30, 1);
   expect(together(box({0, 0, 0}, {10, 10, 20}), box({0, 0, 30}, {10, 10, 60})), 1000 + 1400, 2);
   expect(together(box({0, 0, 0}, {10, 10, 10}), box({2, 2, 2}, {5, 5, 5})), 600, 1);     // buried
   expect(together(box({0, 0, 0}, {10, 10, 10}), box({0, 0, 0}, {10, 10, 10})), 600, 1);  // twice
@@ -142,6 +201,22 @@ TEST(OuterBoundary, OfSoupsThatHideWalls) {
   expect(turned_wall_in_two_halves(), 1000, 1);
 }
 
+TEST(OuterBoundary, OfBricksIsTheirUnionsHoweverTheyAreTurned) {
+  // Turned, faces that lie upon one another do so but for rounding.
+  for (int seed = 0; seed < 16; ++seed) {
+    std::mt19937 random{std::uint32_t(seed)};
+    Bricks bricks = random_bricks(random, 1);
+    const double exact = double(bricks.boundary.quads.size());
+    if (seed % 2) {
+      const Vector3d axis = Vector3d(1.0, 0.3 * seed, 2.0).normalized();
+      turn_about(bricks.soup, Eigen::AngleAxisd(0.7 * seed, axis).toRotationMatrix());
+    }
+    const OuterBoundary b = boundary_of(bricks.soup);
+    EXPECT_LE(b.area, exact * 1.004) << seed;
+    EXPECT_GE(b.area + b.possible_area, exact * 0.996) << seed;
+  }
+}
+
 TEST(OuterBoundary, AVoidsWallIsPossible) {
   const OuterBoundary b =
       boundary_of(together(box({0, 0, 0}, {10, 10, 10}), turned_over(box({2, 2, 2}, {5, 5, 5}))));
@@ -153,7 +228,7 @@ TEST(SolidComparison, AVoidMayBeKeptOrFilled) {
   const MeshFile soup = together(box({0, 0, 0}, {10, 10, 10}), turned_over(box({2, 2, 2}, {8, 8, 8})));
   EXPECT_NE(compared(soup, soup).verdict, Verdict::differs);
   EXPECT_NE(compared(box({0, 0, 0}, {10, 10, 10}), soup).verdict, Verdict::differs);
-  EXPECT_NEAR(compared(soup, soup).unknown_volume.value, 216, 10);
+  EXPECT_NEAR(compared(soup, soup).unknown_volume.value, 216, 15);
   EXPECT_EQ(compared(box({0, 0, 0}, {10, 10, 5}), soup, 0.1).verdict, Verdict::differs);
 }
 
@@ -163,10 +238,11 @@ TEST(SolidComparison, SymmetricDifferenceOfAnalyticPairs) {
   // The facets of a globe of 48 rings leave out 3e-3 of the ball.
   const MeshFile sphere = globe(1.0, o, 48), half = globe(0.5, o, 48), cube = box({0, 0, 0}, {1, 1, 1});
   const auto expect = [](const MeshFile& a, const MeshFile& b, double exact, double facets = 0.0) {
-    for (const SolidComparison& c : {compared(a, b, 0.0, 20'000), compared(b, a, 0.0, 20'000)}) {
+    for (const SolidComparison& c : {compared(a, b), compared(b, a)}) {
       EXPECT_LE(c.difference.lower, exact + facets);
       EXPECT_GE(c.difference.upper, exact - facets);
-      EXPECT_LE(c.difference.upper - c.difference.lower, 0.1 + 0.1 * exact);  // some six standard deviations of 20,000 samples
+      // Some six standard deviations of 10,000 samples.
+      EXPECT_LE(c.difference.upper - c.difference.lower, 0.15 + 0.15 * exact);
       EXPECT_EQ(c.unknown_volume.value, 0.0);
     }
   };
@@ -216,8 +292,8 @@ TEST(SolidComparison, NeverAFalseVerdictOnOpenOrUnorientedReferences) {
   both.quads.pop_back();
   std::swap(both.quads[2][1], both.quads[2][3]);
   for (const MeshFile& reference : {open, flipped, both, turned_over(cube), turned_over(open)}) {
-    EXPECT_NE(compared(cube, reference).verdict, Verdict::differs);
-    EXPECT_NE(compared(cube, soup_of_triangles(reference)).verdict, Verdict::differs);
+    EXPECT_NE(compared(cube, reference, 0.0, 4'000).verdict, Verdict::differs);
+    EXPECT_NE(compared(cube, soup_of_triangles(reference), 0.0, 4'000).verdict, Verdict::differs);
   }
   // Closed, so that parity tells all of it.
   EXPECT_EQ(compared(cube, flipped).verdict, Verdict::same);
@@ -242,8 +318,49 @@ TEST(SolidComparison, AVoidBetweenPartsMayBeFilled) {
     boards = together(boards, box(lower, upper));
   const MeshFile filled = box({0, 0, 0}, {10, 10, 10});
   const MeshFile room = together(filled, turned_over(box({1, 1, 1}, {9, 9, 9})));
-  EXPECT_NE(compared(filled, boards).verdict, Verdict::differs);
-  EXPECT_NE(compared(room, boards).verdict, Verdict::differs);
+  EXPECT_NE(compared(filled, boards, 0.0, 4'000).verdict, Verdict::differs);
+  EXPECT_NE(compared(room, boards, 0.0, 4'000).verdict, Verdict::differs);
+}
+
+TEST(FreeCells, TheFloodComesAroundAndNotInside) {
+  const MeshFile mesh = together(box({0, 0, 0}, {10, 10, 10}), box({2, 2, 10}, {5, 5, 30}));
+  const MeshFile welded = welded_triangles(mesh);
+  const TriangleSoup soup(welded);
+  const FreeCells cells{TriangleTree(soup)};
+  for (const Vector3d& p : {Vector3d(-1, 5, 5), {5, 5, 31}, {8, 8, 20}, {6, 3, 29}, {1, 1, 12}}) {
+    EXPECT_TRUE(cells.free(p)) << p.transpose();
+    EXPECT_FALSE(cells.enclosed(p)) << p.transpose();
+  }
+  for (const Vector3d& p : {Vector3d(5, 5, 5), {3, 3, 20}, {1, 9, 1}}) {
+    EXPECT_FALSE(cells.free(p)) << p.transpose();
+    EXPECT_TRUE(cells.enclosed(p)) << p.transpose();
+  }
+  for (const Vector3d& p : {Vector3d(0, 5, 5), {5, 5, 10}, {2, 3, 29.9}}) {
+    EXPECT_FALSE(cells.free(p)) << p.transpose();
+    EXPECT_FALSE(cells.enclosed(p)) << p.transpose();
+  }
+}
+
+TEST(SolidComparison, PiecesAreComparedWithoutTheirSeams) {
+  // Two halves that share a seam, each point of it twice.
+  const MeshFile halves = together(box({0, 0, 0}, {10, 10, 10}), box({0, 0, 10}, {10, 10, 20}));
+  const MeshFile whole = box({0, 0, 0}, {10, 10, 20});
+  RunContext context;
+  const SolidOptions heap = {.samples = 10'000, .voxel_size = 0.5, .pieces = true};
+  const SolidComparison c = compare_solids(halves, whole, heap, context);
+  EXPECT_EQ(c.verdict, Verdict::same);
+  EXPECT_NEAR(c.mesh_area, 1000, 2);
+  EXPECT_EQ(c.difference.value, 0.0);
+  EXPECT_EQ(compare_solids(box({0, 0, 0}, {10, 10, 10}), whole, heap, context).verdict, Verdict::differs);
+}
+
+TEST(SolidComparison, OfAThinPlateNoMoreSamplesAreTakenThanAskedFor) {
+  const MeshFile plate = box({0, 0, 0}, {10, 10, 1e-3}), half = box({0, 0, 0}, {5, 10, 1e-3});
+  const SolidComparison c = compared(half, plate);
+  EXPECT_LE(c.difference.lower, 0.05);
+  EXPECT_GE(c.difference.upper, 0.05);
+  EXPECT_LE(c.difference.upper - c.difference.lower, 0.01);
+  EXPECT_EQ(c.verdict, Verdict::differs);
 }
 
 TEST(SolidComparison, IsDeterministic) {
@@ -252,64 +369,6 @@ TEST(SolidComparison, IsDeterministic) {
   EXPECT_EQ(c.difference.value, d.difference.value);
   EXPECT_EQ(c.false_area.value, d.false_area.value);
   EXPECT_EQ(*c.unexplained_place, *d.unexplained_place);
-}
-
-/// Unit cubes of an integer lattice, and their union's boundary as unit squares, each cut into n × n.
-struct Bricks {
-  MeshFile soup, boundary;
-};
-
-Bricks random_bricks(std::mt19937& random, int n) {
-  constexpr int kSize = 8;
-  std::vector<std::uint8_t> full(kSize * kSize * kSize, 0);
-  const auto inside = [&](const Eigen::Vector3i& p) {
-    return p.minCoeff() >= 0 && p.maxCoeff() < kSize &&
-           full[std::size_t((p.x() * kSize + p.y()) * kSize + p.z())];
-  };
-  Bricks bricks;
-  const int boxes = 1 + int(random() % 5);
-  for (int i = 0; i < boxes; ++i) {
-    Eigen::Vector3i lower, upper;
-    for (int axis = 0; axis < 3; ++axis) {
-      lower[axis] = int(random() % (kSize - 2));
-      upper[axis] = lower[axis] + 1 + int(random() % std::uint32_t(kSize - lower[axis]));
-      upper[axis] = std::min(upper[axis], kSize);
-    }
-    bricks.soup = together(bricks.soup, box(lower.cast<double>(), upper.cast<double>()));
-    for (int x = lower.x(); x < upper.x(); ++x)
-      for (int y = lower.y(); y < upper.y(); ++y)
-        for (int z = lower.z(); z < upper.z(); ++z) full[std::size_t((x * kSize + y) * kSize + z)] = 1;
-  }
-  for (int x = 0; x < kSize; ++x)
-    for (int y = 0; y < kSize; ++y)
-      for (int z = 0; z < kSize; ++z)
-        for (int axis = 0; axis < 3; ++axis)
-          for (int side : {0, 1}) {
-            const Eigen::Vector3i at(x, y, z);
-            Eigen::Vector3i beyond = at;
-            beyond[axis] += side ? 1 : -1;
-            if (!inside(at) || inside(beyond)) continue;
-            for (int i = 0; i < n; ++i)
-              for (int j = 0; j < n; ++j) {
-                const std::uint32_t first = std::uint32_t(bricks.boundary.points.size());
-                for (const auto& [u, v] :
-                     {std::pair<int, int>{i, j}, {i + 1, j}, {i + 1, j + 1}, {i, j + 1}}) {
-                  Vector3d p = at.cast<double>();
-                  p[axis] += side;
-                  p[(axis + 1) % 3] += double(u) / n;
-                  p[(axis + 2) % 3] += double(v) / n;
-                  bricks.boundary.points.push_back(p);
-                }
-                bricks.boundary.quads.push_back(side ? Quad{first, first + 1, first + 2, first + 3}
-                                                     : Quad{first, first + 3, first + 2, first + 1});
-              }
-          }
-  bricks.boundary = welded(bricks.boundary);
-  return bricks;
-}
-
-void turn_about(MeshFile& mesh, const Eigen::Matrix3d& by) {
-  for (Vector3d& p : mesh.points) p = by * p;
 }
 
 /// A mesh that is as good as any: finer than the reference or coarser, with points off by a little, of a soup
@@ -346,23 +405,21 @@ std::pair<MeshFile, MeshFile> good_pair(int number) {
 void expect_no_alarm(int first, int last) {
   for (int number = first; number < last; ++number) {
     const auto [mesh, reference] = good_pair(number);
-    EXPECT_EQ(compared(mesh, reference, 0.0, 20'000).verdict, Verdict::same) << number;
+    EXPECT_EQ(compared(mesh, reference).verdict, Verdict::same) << number;
   }
 }
 
-TEST(SolidComparison, NoAlarmOnGoodMeshes) { expect_no_alarm(0, 12); }
+TEST(SolidComparison, NoAlarmOnGoodMeshes) { expect_no_alarm(0, 8); }
 
 }  // namespace
 
 TEST(Slow, NoFalseAlarmInFiveHundredGoodMeshes) {
-  int alarms = 0;
+  std::vector<int> alarms;
   for (int number = 0; number < 500; ++number) {
     const auto [mesh, reference] = good_pair(number);
-    const bool alarm = compared(mesh, reference, 0.0, 20'000).verdict != Verdict::same;
-    if (alarm) RecordProperty("alarm", number);
-    alarms += alarm;
+    if (compared(mesh, reference).verdict != Verdict::same) alarms.push_back(number);
   }
-  EXPECT_LE(alarms, 1);
+  EXPECT_LE(alarms.size(), 1u) << testing::PrintToString(alarms);
 }
 
 }  // namespace hermesh::validation
