@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
+#include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/piece_attributes.h"
 #include "algorithms/fracture/thesis_fracture.h"
 #include "reference/openvdb_fracture.h"
@@ -157,6 +159,13 @@ void check_method(const FractureMethod& method) {
     throw Error("the tolerance must be a number of at least 0");
   if (method.name == "openvdb" && method.tolerance > 1)
     throw Error("the tolerance of openvdb is its adaptivity, from 0 to 1");
+}
+
+double uncut_volume(const FractureObject& object, RunContext& context) {
+  if (object.hermite.leaves.empty()) return 0.0;
+  const PolygonMesh uncut = manifold_dual_contouring(view_of(object.hermite, context),
+                                                     {.tolerance = 0.0, .uniform = {}}, nullptr, context);
+  return mass_properties(uncut).volume;
 }
 
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,

@@ -19,6 +19,9 @@ struct FractureObject {
   const PolygonMesh* source = nullptr;  ///< whose attributes the pieces take over; null: none
 };
 
+/// Of its mesh before it is broken, at tolerance 0 (world units); 0 if no sample is inside. @throws Cancelled.
+double uncut_volume(const FractureObject& object, RunContext& context);
+
 struct FractureMethod {
   std::string name = "labelled";  ///< or thesis, openvdb
   /// labelled: two-sided distance to the finest mesh, in voxels; thesis: the root of adaptive_dual_contouring's

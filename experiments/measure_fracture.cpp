@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "algorithms/core/mesh_file.h"
-#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
 #include "algorithms/fracture/scatter.h"
 #include "experiments/cell.h"
 #include "experiments/fracture_folder.h"
@@ -73,9 +72,7 @@ class FractureBooks {
     SampledSubject made = sample_subject(mesh, longest, input_);
     conversion_ = made.hermite_seconds;
     FractureObject object = std::move(made.object);
-    const PolygonMesh uncut = manifold_dual_contouring(view_of(object.hermite, child),
-                                                       {.tolerance = 0.0, .uniform = {}}, nullptr, child);
-    uncut_volume_ = mass_properties(uncut).volume;
+    uncut_volume_ = uncut_volume(object, child);
     return object;
   }
 

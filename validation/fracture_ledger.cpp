@@ -57,8 +57,8 @@ class Ledger {
     judge_pieces();
     weld();
     find_seams();
-    judge_tags();
     judge_rest();
+    judge_tags();
     compare_volumes();
     {
       const Stage stage(context_, "intersections of all pieces");
@@ -184,7 +184,12 @@ class Ledger {
         std::none_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface < 0; });
     const bool some_cut =
         std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface > 0; });
-    ledger_.gaps_can_be_judged = (all_tagged && some_cut) || are_far_apart();
+    ledger_.gaps_can_be_judged = (all_tagged && some_cut) || (all_tagged && is_complete()) || are_far_apart();
+  }
+
+  /// A gap is missing in the sum of the volumes.
+  bool is_complete() const {
+    return expected_.whole && std::abs(ledger_.pieces_volume - *expected_.whole) <= 1e-9 * std::abs(*expected_.whole);
   }
 
   /// A gap that a fracture leaves is narrower than the cells along it, and their edges are as long as they

@@ -21,7 +21,8 @@ struct ExpectedVolumes {
 struct FractureLedger {
   std::int64_t pieces = 0, triangles = 0;
   /// Of several pieces, that the tags tell what was cut, or that there is no need to know: each triangle is
-  /// matched, or the pieces are so far apart that no two of them were one.
+  /// matched, or the pieces are so far apart that no two of them were one, or nothing was cut and nothing of
+  /// the whole is missing.
   bool gaps_can_be_judged = true;
 
   // Triangles with the same three points, compared exactly, in any order.
@@ -48,12 +49,14 @@ struct FractureLedger {
 
   double volume_difference() const;  ///< between the two volumes, relative to the greater one's size
   bool lost_a_piece() const;         ///< too much of the expected volume is missing, or there is too much
-  bool balances() const {
+  /// Of the pieces by themselves: what thin parts lose beside cuts is no fault of their surfaces.
+  bool is_consistent() const {
     return pieces > 0 && gaps_can_be_judged && unmatched_cut == 0 && matched_original == 0 &&
            repeated_triangles == 0 && rest_open_edges == 0 && intersecting_pairs == 0 &&
-           nested_components == 0 && broken_pieces == 0 && volume_difference() <= 1e-9 && !lost_a_piece() &&
+           nested_components == 0 && broken_pieces == 0 && volume_difference() <= 1e-9 &&
            wrong_records == 0;
   }
+  bool balances() const { return is_consistent() && !lost_a_piece(); }
   std::vector<std::string> sentences() const;  ///< what does not balance, or that all of it does
 };
 

@@ -87,13 +87,23 @@ void note_idle_cutters(const FractureSummary& summary, Session& session) {
   for (const std::string& name : summary.empty) session.context.note(name + ": nothing");
 }
 
-bool report_ledger(const validation::FractureLedger& ledger) {
+/// Whether the pieces are right by themselves; a loss of volume is said in a note, as it is of surfaces.
+bool report_ledger(const validation::FractureLedger& ledger, RunContext& context) {
   for (const std::string& sentence : ledger.sentences()) std::cout << sentence << '\n';
   for (const std::string& place : ledger.places) std::cout << "  " << place << '\n';
   std::cout << "original surface: " << ledger.rest_triangles << " triangles, volume "
             << text(ledger.rest_volume) << "; the pieces' volumes differ from it by "
-            << text(ledger.volume_difference()) << " of it\n";
-  return ledger.balances();
+            << text(ledger.volume_difference()) << " of it";
+  if (ledger.expected_difference)
+    std::cout << ", and from the uncut mesh's by " << text(*ledger.expected_difference) << " of that";
+  std::cout << '\n';
+  if (ledger.lost_a_piece()) {
+    const double difference = 100.0 * *ledger.expected_difference;
+    context.note("the pieces hold " + text(std::abs(difference)) + " % " + (difference < 0 ? "less" : "more") +
+                 " than the uncut mesh: parts thinner than two voxels end in a sharp edge at cuts; "
+                 "smaller voxels keep them");
+  }
+  return ledger.is_consistent();
 }
 
 int run_fracture_command(const Arguments& given, Session& session) {
@@ -122,7 +132,9 @@ int run_fracture_command(const Arguments& given, Session& session) {
   if (summary.pieces == 0) throw Error("no piece has a surface, nothing was written");
   summarise(summary, session);
   note_idle_cutters(summary, session);
-  const bool balances = !arguments.judge || report_ledger(folder.judge(session.context));
+  const bool balances =
+      !arguments.judge ||
+      report_ledger(folder.judge(session.context, uncut_volume(object, session.context)), session.context);
   folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
   work_is_finished();
   return balances ? kDone : kNotMet;
