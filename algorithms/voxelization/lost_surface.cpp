@@ -1,5 +1,6 @@
 #include "algorithms/voxelization/lost_surface.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -24,8 +25,7 @@ constexpr std::size_t kChunk = 4096;         ///< triangles to a task
 constexpr double kReach = 2.0;               ///< voxels: how far an opposite wall is looked for
 constexpr double kOff = 1e-4;                ///< voxels: where the way to it begins
 constexpr double kSameDistance =
-    1e-3;  ///< voxels: up to here a sample's distance is that to the place's polygon
-
+    1e-3;                           ///< voxels: up to here a sample's distance is that to the place's polygon
 constexpr double kTouching = 1e-3;  ///< voxels: what is thinner is no wall to be kept
 
 struct LostPlace {
@@ -46,8 +46,13 @@ class Search {
         triangles_(triangulated(mesh)),
         grid_(*level_set.grid().grid),
         voxel_size_(level_set.voxel_size()),
+        scale_(1.0 / voxel_size_),
         boundary_distances_(boundary_distances),
-        context_(context) {}
+        context_(context) {
+    const openvdb::Vec3d origin =
+        grid_.transform().worldToIndex(openvdb::Vec3d(mesh.origin.x(), mesh.origin.y(), mesh.origin.z()));
+    origin_ = {origin.x(), origin.y(), origin.z()};
+  }
 
   LostSurface run() {
     const double share = std::max(1.0, total_area() / kMostPlaces);
@@ -74,9 +79,7 @@ class Search {
 
   /// In voxels of the grid, whose placement need not be the mesh's own.
   Vector3d corner(std::size_t triangle, std::size_t i) const {
-    const Vector3d world = mesh_.points[triangles_[triangle][i]].cast<double>() + mesh_.origin;
-    const openvdb::Vec3d at = grid_.transform().worldToIndex(openvdb::Vec3d(world.x(), world.y(), world.z()));
-    return {at.x(), at.y(), at.z()};
+    return origin_ + scale_ * mesh_.points[triangles_[triangle][i]].cast<double>();
   }
 
   double total_area() const {
@@ -103,10 +106,12 @@ class Search {
     const auto count = static_cast<std::uint64_t>(std::ceil(area / share));
     const double weight = area / double(count);
     for (std::uint64_t i = 0; i < count; ++i) {
-      double u = std::fmod(0.5 + double(i) * 0.7548776662466927, 1.0),
-             v = std::fmod(0.5 + double(i) * 0.5698402909980532, 1.0);
-      if (count == 1) u = v = 1.0 / 3.0;
-      if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+      double u = 1.0 / 3.0, v = 1.0 / 3.0;
+      if (count > 1) {
+        u = std::fmod(0.5 + double(i) * 0.7548776662466927, 1.0);
+        v = std::fmod(0.5 + double(i) * 0.5698402909980532, 1.0);
+        if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+      }
       const Vector3d at =
           facet.corner[0] + u * (facet.corner[1] - facet.corner[0]) + v * (facet.corner[2] - facet.corner[0]);
       const Verdict verdict = look_around(at, samples);
@@ -120,8 +125,20 @@ class Search {
 
   enum class Verdict { kept, lost, inner };
 
+  /// Whether the leaf that holds a cell's first corner holds all of them.
+  static bool is_in_one_leaf(const openvdb::Coord& cell) {
+    return (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
+  }
+
   Verdict look_around(const Vector3d& at, Samples& samples) const {
     const openvdb::Coord cell(int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z())));
+    // All but a third of the cells have their corners in one leaf.
+    if (const auto* leaf = samples.probeConstLeaf(cell); leaf && is_in_one_leaf(cell)) {
+      const float* values = leaf->buffer().data() + leaf->coordToOffset(cell);
+      const bool inside = values[0] < 0.0f;
+      for (const int next : {1, 8, 9, 64, 65, 72, 73})
+        if ((values[next] < 0.0f) != inside) return Verdict::kept;
+    }
     const bool inside = samples.getValue(cell) < 0.0f;
     const auto differs = [&](int low, int high) {
       for (int x = low; x <= high; ++x)
@@ -142,28 +159,53 @@ class Search {
   }
 
   void find_thinnest(const std::vector<LostPlace>& places, LostSurface& result) const {
-    const TriangleTree tree(mesh_.points, triangles_, 1.0 / voxel_size_);
     const std::size_t step = (places.size() + kMostProbes - 1) / kMostProbes;
-    std::vector<double> thickness((places.size() + step - 1) / step, kReach);
-    tbb::parallel_for(std::size_t(0), thickness.size(), [&](std::size_t i) {
+    std::vector<LostPlace> probes;
+    for (std::size_t i = 0; i < places.size(); i += step) probes.push_back(places[i]);
+    const std::vector<Triangle> about = triangles_about(probes);
+    const TriangleTree tree(mesh_.points, about, 1.0 / voxel_size_);
+    std::vector<double> thickness(probes.size(), kReach);
+    tbb::parallel_for(std::size_t(0), probes.size(), [&](std::size_t i) {
       context_.check();
-      const LostPlace& place = places[i * step];
-      const Vector3d at = in_tree(place.at);
       for (const double side : {-1.0, 1.0})
-        thickness[i] = std::min(thickness[i], gap(tree, at, side * place.normal));
+        thickness[i] = std::min(thickness[i], gap(tree, probes[i].at - origin_, side * probes[i].normal));
     });
     const auto least = std::min_element(thickness.begin(), thickness.end());
     if (*least >= kReach) return;
-    const Vector3d& at = places[std::size_t(least - thickness.begin()) * step].at;
+    const Vector3d& at = probes[std::size_t(least - thickness.begin())].at;
     const openvdb::Vec3d world = grid_.transform().indexToWorld(openvdb::Vec3d(at.x(), at.y(), at.z()));
     result.thinnest_at = {world.x(), world.y(), world.z()};
     result.thickness = *least * voxel_size_;
   }
 
-  /// From voxels of the grid to those that the tree counts from the mesh's origin.
-  Vector3d in_tree(const Vector3d& at) const {
-    const openvdb::Vec3d world = grid_.transform().indexToWorld(openvdb::Vec3d(at.x(), at.y(), at.z()));
-    return (Vector3d(world.x(), world.y(), world.z()) - mesh_.origin) / voxel_size_;
+  /// Those that may be within reach of one of the places: a tree of all of them would take longer than the
+  /// search where little is lost.
+  std::vector<Triangle> triangles_about(const std::vector<LostPlace>& places) const {
+    // Cells as long as the reach: what is within reach of a place and no longer than it has all of its
+    // corners within two cells of the place's.
+    const auto cell_of = [](const Vector3d& at) {
+      return openvdb::Coord(int(std::floor(at.x() / kReach)), int(std::floor(at.y() / kReach)),
+                            int(std::floor(at.z() / kReach)));
+    };
+    openvdb::MaskTree cells;
+    for (const LostPlace& place : places) {
+      const openvdb::Coord cell = cell_of(place.at);
+      cells.fill(openvdb::CoordBBox(cell.offsetBy(-2), cell.offsetBy(2)), true);
+    }
+    std::vector<std::uint8_t> near(mesh_.points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), kChunk), [&](const auto& range) {
+      const openvdb::tree::ValueAccessor<const openvdb::MaskTree> marked(cells);
+      for (std::size_t i = range.begin(); i < range.end(); ++i)
+        near[i] = marked.isValueOn(cell_of(origin_ + scale_ * mesh_.points[i].cast<double>()));
+    });
+    std::vector<Triangle> result;
+    const auto longest = static_cast<float>(kReach * voxel_size_);
+    for (const Triangle& t : triangles_) {
+      const Eigen::Vector3f &a = mesh_.points[t[0]], &b = mesh_.points[t[1]], &c = mesh_.points[t[2]];
+      const bool is_long = (a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c)).maxCoeff() > longest;
+      if (near[t[0]] | near[t[1]] | near[t[2]] | is_long) result.push_back(t);
+    }
+    return result;
   }
 
   /// How far it is from the place along a unit vector to the next triangle, in voxels, at most kReach.
@@ -201,7 +243,8 @@ class Search {
   const PolygonMesh& mesh_;
   const std::vector<Triangle> triangles_;
   const openvdb::FloatGrid& grid_;
-  double voxel_size_;
+  double voxel_size_, scale_;
+  Vector3d origin_;  ///< of the mesh, in voxels of the grid
   bool boundary_distances_;
   const RunContext& context_;
 };
