@@ -358,7 +358,8 @@ std::vector<std::string> FractureLedger::sentences() const {
   if (pieces == 0) result.push_back("There are no pieces.");
   if (!gaps_can_be_judged)
     result.push_back(
-        "The pieces are not tagged: gaps cannot be judged (no attribute `surface` says what is cut).");
+        "Pieces lie side by side, and cuts are not tagged: gaps cannot be judged (no triangle's attribute "
+        "`surface` is 1).");
   say(broken_pieces, "pieces are not closed, manifold, oriented and free of self-intersections");
   say(unmatched_cut, "cut triangles have no other side");
   say(matched_original, "triangles are tagged original but lie between two pieces");

@@ -163,6 +163,11 @@ TEST_F(FractureTest, BadInputIsOneSentenceAndLeavesNothing) {
       {{"--cutters", "voronoi:3", "--tolerance", "-1"}, 2, "at least 0"},
       {{"--cutters", "voronoi:3", "--method", "openvdb", "--tolerance", "2"}, 2, "adaptivity"},
       {{}, 2, "--cutters"},
+      {{"--cutters", "voronoi:3", "--roughness", "0.1"}, 2, "--roughness has no effect"},
+      {{"--cutters", "planes:0,0,1,0", "--seed", "1"}, 2, "--seed has no effect"},
+      {{"--cutters", "voronoi:3", "--mesh-scale", "2"}, 2, "--mesh-scale has no effect"},
+      {{"--cutters", "voronoi:3", "--impact-radius", "2"}, 2, "--impact-radius has no effect"},
+      {{"--cutters", "voronoi:3", "--method", "thesis", "--no-split"}, 2, "--no-split has no effect"},
   };
   for (const auto& c : cases) {
     const Outcome outcome = fracture(c.words);

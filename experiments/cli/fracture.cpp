@@ -1,5 +1,6 @@
 // hermesh fracture: a solid into pieces, one file each, with a ledger.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
@@ -106,10 +107,31 @@ bool report_ledger(const validation::FractureLedger& ledger, RunContext& context
   return ledger.is_consistent();
 }
 
-int run_fracture_command(const Arguments& given, Session& session) {
+/// What was asked for and nothing would look at.
+void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, const CLI::App& command) {
+  using Kind = CutterSpec::Kind;
+  if (is_volume(arguments.paths.in))
+    refuse_idle(command, {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band"},
+                "'" + arguments.paths.in + "' has voxels already");
+  if (arguments.method.name != "labelled")
+    refuse_idle(command, {"--min-volume", "--no-split"}, "only --method labelled looks at it");
+  if (spec.kind != Kind::chunks) refuse_idle(command, {"--roughness"}, "only the walls of chunks are rough");
+  const bool copies =
+      std::ranges::any_of(spec.files, [](const CutterSpec::File& file) { return file.copies > 0; });
+  if (!copies) refuse_idle(command, {"--mesh-scale"}, "no meshes are scattered (mesh:FILE*N)");
+  if (spec.count == 0 && !copies)
+    refuse_idle(command, {"--seed", "--impact", "--impact-radius", "--density"},
+                "these cutters are in place, nothing is scattered");
+  if (!arguments.density.empty())
+    refuse_idle(command, {"--impact", "--impact-radius"}, "--density says where places are scattered");
+  if (arguments.impact.empty()) refuse_idle(command, {"--impact-radius"}, "there is no --impact");
+}
+
+int run_fracture_command(const Arguments& given, const CLI::App& command, Session& session) {
   Arguments arguments = given;
   const CutterSpec spec = as_usage([&] { return parse_cutters(arguments.cutters); });
   as_usage([&] { check_method(arguments.method); });
+  refuse_idle_options(arguments, spec, command);
   if (!arguments.impact.empty())
     arguments.choices.impact = Eigen::Vector3d(arguments.impact[0], arguments.impact[1], arguments.impact[2]);
   arguments.method.options.split = !arguments.no_split;
@@ -197,8 +219,10 @@ void add_fracture(CLI::App& app, Session& session) {
       ->add_option("--hermite", arguments->hermite,
                    "Data of the object: auto, exact from polygons, or level-set")
       ->check(CLI::IsMember({"auto", "exact", "level-set"}));
-  command->callback([arguments, &session] {
-    session.command = [arguments, &session] { return run_fracture_command(*arguments, session); };
+  command->callback([arguments, command, &session] {
+    session.command = [arguments, command, &session] {
+      return run_fracture_command(*arguments, *command, session);
+    };
   });
 }
 

@@ -133,6 +133,11 @@ CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, 
   return command;
 }
 
+void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
+  for (const char* option : options)
+    if (command.count(option) > 0) throw UsageError(std::string(option) + " has no effect: " + why);
+}
+
 void add_json_option(CLI::App& command, Session& session) {
   command.add_flag("--json", session.json, "Print what was done as JSON: notes, figures, times of stages");
 }

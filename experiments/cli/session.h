@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <optional>
 #include <string>
 
@@ -54,6 +55,9 @@ void add_experiments(CLI::App& app, Session& session);  ///< run, report
 
 /// Lets a command that makes volumes or surfaces print what it did as JSON: its notes, figures and times of stages.
 void add_json_option(CLI::App& command, Session& session);
+
+/// Refuses the options that were given though nothing would look at them. @throws UsageError that ends with `why`.
+void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 /// A subcommand with the options that all of them take.
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary);

@@ -69,7 +69,7 @@ std::optional<MeshFile> read_if_named(const std::string& file, RunContext& conte
   return read_mesh_file(file, context);
 }
 
-int run_validate(const Arguments& arguments, Session& session) {
+int run_validate(const Arguments& arguments, const CLI::App& command, Session& session) {
   const std::vector<Requirement> requirements = parse_requirements(arguments.require);
   if (arguments.certify && arguments.reference.empty())
     throw UsageError("--certify bounds the distance to a reference: name it with --reference");
@@ -78,6 +78,9 @@ int run_validate(const Arguments& arguments, Session& session) {
     throw UsageError("--require solid compares the mesh with a reference: name it with --reference");
   if (arguments.voxel_size > 0.0 && arguments.reference.empty())
     throw UsageError("--voxel-size says what explains a distance to a reference: name it with --reference");
+  if (arguments.reference.empty() && arguments.features.empty())
+    refuse_idle(command, {"--samples"}, "distances need a --reference");
+  if (arguments.features.empty()) refuse_idle(command, {"--dihedral"}, "sharp edges are those of --features");
 
   const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
   const auto reference = read_if_named(arguments.reference, session.context);
@@ -134,8 +137,8 @@ void add_validate(CLI::App& app, Session& session) {
                    "(default: three times the distance from the mesh to the reference)")
       ->check(CLI::PositiveNumber);
   command->add_flag("--json", arguments->json, "Print JSON");
-  command->callback([arguments, &session] {
-    session.command = [arguments, &session] { return run_validate(*arguments, session); };
+  command->callback([arguments, command, &session] {
+    session.command = [arguments, command, &session] { return run_validate(*arguments, *command, session); };
   });
 }
 
