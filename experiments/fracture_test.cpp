@@ -310,6 +310,10 @@ void expect_balance(std::uint64_t first, std::uint64_t count) {
   }
 }
 
+TEST(FractureOfPolygons, BalancesWherePiecesWouldMeetAcrossFacesOnly) {
+  for (const std::uint64_t number : {63, 1023, 1131}) expect_balance(number, 1);
+}
+
 TEST(FractureOfPolygons, BalancesOnRandomSolids) { expect_balance(0, 16); }
 
 TEST(Slow, FracturesOfRandomSolidsBalance) { expect_balance(1000, 200); }

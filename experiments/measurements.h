@@ -104,5 +104,6 @@ Measurement guarantee_measurement();
 Measurement fracture_measurement();
 Measurement fracture_speed_measurement();
 Measurement fracture_guarantee_measurement();
+Measurement digests_measurement();
 
 }  // namespace hermesh

@@ -117,8 +117,10 @@ int run_program(int argc, char** argv) {
     return fail(kUsage, option + " was given an empty value; see hermesh --help");
   if (!session.command) return fail(kUsage, "say what to do: a command is missing; see hermesh --help");
 
-  const int threads = session.threads.value_or(std::max(1u, std::thread::hardware_concurrency()));
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  // Where nobody says how many, TBB takes as many as the machine has, and an experiment may ask for more.
+  std::optional<tbb::global_control> limit;
+  if (session.threads)
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(*session.threads));
   const int exit_code = run_to_exit_code(session);
   work_is_finished();
   print_notes(session);
