@@ -1,14 +1,13 @@
 #include "experiments/run_cells.h"
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "algorithms/core/mesh_file.h"
 #include "algorithms/voxelization/lost_surface.h"
 #include "experiments/cell.h"
+#include "experiments/digest.h"
 #include "experiments/provenance.h"
 #include "validation/distance.h"
 #include "validation/report_json.h"
@@ -16,31 +15,12 @@
 namespace hermesh {
 namespace {
 
-/// FNV-1a over the arrays, to see whether a repetition gave the same mesh without keeping both.
-std::uint64_t fingerprint(const PolygonMesh& mesh) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto add = [&](const void* data, std::size_t bytes) {
-    const unsigned char* at = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i + 4 <= bytes; i += 4) {
-      std::uint32_t word;
-      std::memcpy(&word, at + i, 4);
-      hash = (hash ^ word) * 0x100000001b3u;
-    }
-  };
-  add(mesh.origin.data(), sizeof(double) * 3);
-  add(mesh.points.data(), mesh.points.size() * sizeof(Eigen::Vector3f));
-  add(mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle));
-  add(mesh.quads.data(), mesh.quads.size() * sizeof(Quad));
-  return hash;
-}
-
 struct Cell {
   const Extractor* extractor = nullptr;
   Options options;
   Json row;
   std::string uniform;              ///< as in VariantEntry
   std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
-  std::uint64_t mesh_fingerprint = 0;
   std::optional<Timing> timing;  ///< absent when the variant failed
 };
 
@@ -122,6 +102,7 @@ class Group {
     race(std::span(&timing.contender, 1));
     voxelization_["seconds"] = seconds_json(timing.contender.seconds, timing.warm);
     voxelization_["stage_seconds"] = stages_json(timing.stages);
+    voxelization_["digest"] = digest(level_set_);
     voxelization_["active_voxels"] = level_set_.active_voxels();
     voxelization_["memory_bytes"] = level_set_.memory_bytes();
     const LostSurface lost =
@@ -147,7 +128,7 @@ class Group {
       cell.timing.emplace(in_.tier, seconds, child.stage_seconds);
     }
     cell.row["triangle_count"] = mesh.triangle_count();
-    cell.mesh_fingerprint = fingerprint(mesh);
+    cell.row["digest"] = digest(mesh);
     if (mesh.empty()) throw Error("the mesh is empty");
     const std::filesystem::path folder = in_.out / "meshes" / (in_.experiment.name + "-" + name_);
     std::filesystem::create_directories(folder);
@@ -215,7 +196,7 @@ class Group {
     std::optional<PolygonMesh> mesh;
     const double seconds = timed([&] { mesh.emplace(extract(cell, child)); });
     cell.timing->stages.push_back(child.stage_seconds);
-    if (fingerprint(*mesh) != cell.mesh_fingerprint) cell.row["repetitions_differ"] = true;
+    if (digest(*mesh) != cell.row["digest"]) cell.row["repetitions_differ"] = true;
     return seconds;
   }
 

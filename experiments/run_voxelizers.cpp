@@ -7,6 +7,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "experiments/cell.h"
+#include "experiments/digest.h"
 #include "experiments/level_set_facts.h"
 #include "experiments/provenance.h"
 #include "reference/level_set_judge.h"
@@ -204,6 +205,7 @@ class Group {
     cell.fingerprint = fingerprint(level_set);
     char text[20];
     std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(cell.fingerprint));
+    cell.row["digest"] = digest(level_set);
     const std::size_t grid_bytes = level_set.memory_bytes();
     cell.row["voxelization"] = {
         {"active_voxels", level_set.active_voxels()},

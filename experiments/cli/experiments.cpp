@@ -1,12 +1,15 @@
-// hermesh run, hermesh report: experiments and the tables made of them.
+// hermesh run, report and compare: experiments, the tables made of them, and two runs beside each other.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
+#include "experiments/compare.h"
 #include "experiments/harness.h"
+#include "experiments/rows.h"
 
 namespace hermesh::cli {
 namespace {
@@ -58,11 +61,30 @@ void add_report(CLI::App& app, Session& session) {
   });
 }
 
+void add_compare(CLI::App& app, Session& session) {
+  struct Arguments {
+    std::filesystem::path before, after;
+  };
+  CLI::App* command = add_command(
+      app, session, "compare", "Whether the cells of two runs made the same, by their digests; if not, exit code 3");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("BEFORE", arguments->before, "Folder with rows.jsonl")->required();
+  command->add_option("AFTER", arguments->after, "Folder with rows.jsonl")->required();
+  command->callback([arguments, &session] {
+    session.command = [arguments] {
+      const RunComparison comparison = compare_runs(read_rows(arguments->before), read_rows(arguments->after));
+      std::cout << text(comparison);
+      return comparison.same() ? kDone : kNotMet;
+    };
+  });
+}
+
 }  // namespace
 
 void add_experiments(CLI::App& app, Session& session) {
   add_run(app, session);
   add_report(app, session);
+  add_compare(app, session);
 }
 
 }  // namespace hermesh::cli
