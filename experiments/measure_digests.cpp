@@ -45,14 +45,25 @@ class ChosenLevel {
   std::optional<std::string> before_;
 };
 
+/// Numbers of threads and levels of vector code change together, which tells as surely that all of them give
+/// the same in fewer runs.
 std::vector<Way> ways(const Options& parameters) {
-  std::vector<Way> result = {{"2 threads"}};
-  if (parameters.is("threads", "1 2 7"))
-    result.push_back({"1 thread", 1}), result.push_back({"7 threads", 7});
-  if (!parameters.is("simd", "all")) return result;
-  const SimdLevel chosen = chosen_simd_level();
-  for (const SimdLevel level : available_simd_levels())
-    if (level < chosen) result.push_back({std::string(name(level)), 2, level});
+  std::vector<std::optional<SimdLevel>> levels = {{}};
+  if (parameters.is("simd", "all")) {
+    const std::vector<SimdLevel> available = available_simd_levels();
+    const SimdLevel chosen = chosen_simd_level();
+    for (auto level = available.rbegin(); level != available.rend(); ++level)
+      if (*level < chosen) levels.push_back(*level);
+  }
+  std::vector<int> threads = {2};
+  if (parameters.is("threads", "1 2 7")) threads = {2, 1, 7};
+  std::vector<Way> result;
+  for (std::size_t i = 0; i < std::max(levels.size(), threads.size()); ++i) {
+    const int count = threads[std::min(i, threads.size() - 1)];
+    const std::optional<SimdLevel> level = levels[std::min(i, levels.size() - 1)];
+    result.push_back({std::to_string(count) + " threads" + (level ? " and " + std::string(name(*level)) : ""),
+                      count, level});
+  }
   return result;
 }
 
