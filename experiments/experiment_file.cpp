@@ -56,14 +56,20 @@ VariantEntry read_variant(const Section& file, const toml::node& node, const std
   entry.uniform = section.text_or("uniform", "");
   const toml::table* options = section.optional_table("options");
   if (!options) return entry;
-  for (const auto& [key, value] : *options) {
-    const std::string name(key.str());
-    entry.options[name] = option_text(section, name, value);
-    try {
-      Options(entry.name, known->options, {{name, entry.options[name]}});
-    } catch (const Error& error) {
-      section.fail(key.source().begin.line, shown(error.what(), 200));
-    }
+  for (const auto& [key, value] : *options)
+    entry.options[std::string(key.str())] = option_text(section, std::string(key.str()), value);
+  try {
+    Options(entry.name, known->options, entry.options);
+  } catch (const Error& error) {
+    // All of them together, for one may need another; the sentence names the one that is wrong.
+    const std::string sentence = error.what();
+    auto line = options->begin()->first.source().begin.line;
+    for (const auto& [key, value] : *options)
+      if (sentence.find("'" + std::string(key.str()) + "'") != std::string::npos) {
+        line = key.source().begin.line;
+        break;
+      }
+    section.fail(line, shown(sentence, 200));
   }
   return entry;
 }

@@ -104,7 +104,7 @@ validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces, std::o
   std::vector<MeshFile> files;
   for (const PolygonMesh& piece : pieces) files.push_back(to_mesh_file(piece));
   for (std::size_t i = 0; i < pieces.size(); ++i) files[i].attributes = pieces[i].attributes;
-  return validation::judge_fracture(files, context, {whole, {}});
+  return validation::judge_fracture(files, context, {whole, 0.0, {}});
 }
 
 std::string text(const validation::FractureLedger& ledger) {

@@ -259,12 +259,16 @@ int run_experiment(const RunSettings& settings, const Tables& tables, RunContext
   return Run(settings, tables, context, table).run();
 }
 
-int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
+Tables all_tables() {
   Tables tables{all_extractors(), all_voxelizers(), {}, load_case, load_changed_case};
   for (const CaseInfo& info : list_cases())
     if (info.kind != "volume") tables.cases.push_back(info.name);
   tables.measurements = {all_measurements().begin(), all_measurements().end()};
-  return run_experiment(settings, tables, context, table);
+  return tables;
+}
+
+int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
+  return run_experiment(settings, all_tables(), context, table);
 }
 
 }  // namespace hermesh

@@ -238,6 +238,15 @@ TEST_F(Harness, ATierThatIsNotThereIsAnError) {
                Error);
 }
 
+/// What comes with the project names variants, options, cases and columns that there are.
+TEST(ListExperiments, AllCanBeRead) {
+  const Tables tables = all_tables();
+  for (const ExperimentInfo& info : list_experiments())
+    EXPECT_NO_THROW(read_experiment(
+        info.file, {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements}))
+        << info.name;
+}
+
 TEST(ListExperiments, KnowsTheHeadlineAndItsQuestion) {
   bool found = false;
   for (const ExperimentInfo& info : list_experiments()) {

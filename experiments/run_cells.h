@@ -28,6 +28,9 @@ struct Tables {
   std::vector<Measurement> measurements = {};
 };
 
+/// Those of the program.
+Tables all_tables();
+
 /// run_experiment() of harness.h with the names to choose from given.
 int run_experiment(const RunSettings& settings, const Tables& tables, RunContext& context,
                    std::ostream& table);

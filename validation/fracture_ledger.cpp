@@ -189,7 +189,12 @@ class Ledger {
 
   /// A gap is missing in the sum of the volumes.
   bool is_complete() const {
-    return expected_.whole && std::abs(ledger_.pieces_volume - *expected_.whole) <= 1e-9 * std::abs(*expected_.whole);
+    if (!expected_.whole) return false;
+    double area = 0.0;
+    for (const Triangle& t : rest_)
+      area += 0.5 * (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]).norm();
+    return std::abs(ledger_.pieces_volume - *expected_.whole) <=
+           1e-9 * std::abs(*expected_.whole) + expected_.moved * area;
   }
 
   /// A gap that a fracture leaves is narrower than the cells along it, and their edges are as long as they
@@ -375,8 +380,8 @@ std::vector<std::string> FractureLedger::sentences() const {
                      ", which is not the uncut object's: they differ by " +
                      std::to_string(100.0 * *expected_difference) + " %.");
   say(wrong_records, "pieces do not hold the volume that was recorded of them");
-  if (result.empty())
-    result.push_back("The books balance: " + std::to_string(pieces) + " pieces, " +
+  if (is_consistent())
+    result.push_back((result.empty() ? "The books balance: " : "But for that the books balance: ") + std::to_string(pieces) + " pieces, " +
                      std::to_string(seam_triangles) + " seam triangles, each reversed in one other piece.");
   return result;
 }

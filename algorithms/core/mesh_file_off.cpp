@@ -16,7 +16,7 @@ class OffReader {
 
   void read() {
     const auto points = count(), polygons = count();
-    cursor_.rest_of_line();  // the number of edges, which nobody fills in
+    read_edge_count();
     // Before anything is allocated: a point takes three digits and three spaces, a polygon one of each; the
     // last space may be missing.
     const std::uint64_t space = cursor_.remaining() + 1;
@@ -38,6 +38,17 @@ class OffReader {
   std::uint64_t count() {
     skip_space();
     return cursor_.number<std::uint64_t>("a count");
+  }
+
+  /// Nobody fills it in, and some leave it out; where each count has a line of its own, so has this one.
+  void read_edge_count() {
+    if (cursor_.rest_of_line().find_first_not_of(" \t\r,") != std::string_view::npos) return;
+    TextCursor ahead = cursor_;
+    ahead.skip_to_word([](std::string_view) {});
+    std::string_view line = ahead.rest_of_line();
+    while (!line.empty() && (line.back() == ' ' || line.back() == '\t' || line.back() == '\r')) line.remove_suffix(1);
+    const bool is_count = !line.empty() && line.find_first_not_of("0123456789") == std::string_view::npos;
+    if (is_count) cursor_ = ahead;
   }
 
   void skip_space() {

@@ -137,6 +137,14 @@ TEST_F(MeshFileTest, ReadsOff) {
                           "3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n"));
 }
 
+TEST_F(MeshFileTest, CountsOfOffMayHaveLinesOfTheirOwn) {
+  const std::string rest = "0 0 0\n1 0 0\n0 1.5 0\n0 0 -2.25\n3 0 1 2\n3 0 2 3\n3 0 3 1\n3 1 3 2\n";
+  expect_tetrahedron(read("a.off", "OFF\n4\n4\n0\n" + rest));
+  expect_tetrahedron(read("b.off", "OFF\n4 4\n6\n" + rest));
+  expect_tetrahedron(read("c.off", "OFF\n4\n4\n" + rest));
+  expect_tetrahedron(read("d.off", "OFF\r\n4 \r\n4 \r\n# edges\r\n6 \r\n" + rest));
+}
+
 TEST_F(MeshFileTest, ReadsStlAndSharesEqualPoints) {
   expect_tetrahedron(read("a.stl", text_stl()));
   expect_tetrahedron(read("b.stl", binary_stl("made by hand")));

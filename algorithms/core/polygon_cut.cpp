@@ -281,12 +281,12 @@ class Ring {
 
 bool is_fan(std::span<const Vector3d> corners) {
   const Vector3d normal = newell(corners);
-  // Of a corner that is meant to be in line with its neighbours: a sliver that faces the wrong way does no
-  // harm.
-  constexpr double kRounding = 1e-6;
-  const double least = -kRounding * normal.squaredNorm();
+  // A triangle without an area, at a corner in line with its neighbours, would leave that corner on the side of another
+  // one, and a sliver that faces the wrong way would lie upon it.
+  constexpr double kRounding = 1e-12;
+  const double least = kRounding * normal.squaredNorm();
   for (std::size_t i = 2; i < corners.size(); ++i)
-    if ((corners[i - 1] - corners[0]).cross(corners[i] - corners[0]).dot(normal) < least) return false;
+    if ((corners[i - 1] - corners[0]).cross(corners[i] - corners[0]).dot(normal) <= least) return false;
   return true;
 }
 

@@ -59,12 +59,22 @@ void expect_cover(const Polygon& polygon, const Vector3d& whole) {
 TEST(IsFan, ConvexPolygonsAndThoseSeenWholeFromTheirFirstCorner) {
   EXPECT_TRUE(is_fan(flat({{0, 0}, {2, 0}, {3, 1}, {2, 2}, {0, 2}})));
   EXPECT_TRUE(is_fan(flat({{0, 0}, {0, 2}, {2, 2}, {3, 1}, {2, 0}})));  // clockwise
-  EXPECT_TRUE(is_fan(flat({{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}})));  // straight at a corner
+  // A fan would leave a corner that is straight on the side of a triangle, unless it begins there.
+  EXPECT_FALSE(is_fan(flat({{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}})));
+  EXPECT_TRUE(is_fan(flat({{1, 0}, {2, 0}, {2, 2}, {0, 2}, {0, 0}})));
   const Polygon corner = flat({{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}});
   EXPECT_TRUE(is_fan(corner));
   Polygon turned = corner;
   std::rotate(turned.begin(), turned.begin() + 1, turned.end());
   EXPECT_FALSE(is_fan(turned));
+}
+
+TEST(ClipEars, NoTriangleIsFlatAtAStraightCorner) {
+  Polygon square = flat({{0, 0}, {1, 0}, {2, 0}, {2, 2}, {0, 2}});
+  for (std::size_t start = 0; start < square.size(); ++start) {
+    for (const Triangle& t : clip_ears(square, RunContext())) EXPECT_GE(area(square, t).norm(), 0.9) << start;
+    std::rotate(square.begin(), square.begin() + 1, square.end());
+  }
 }
 
 TEST(ClipEars, Letters) {

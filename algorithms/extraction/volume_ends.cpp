@@ -186,7 +186,8 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   };
   const std::vector<EndEdge> edges = edges_of(level_set);
   if (edges.empty()) return {level_set, {}};
-  if (rule.level_set && grid.background() > 0.0f) {
+  // Without a sample in a leaf there is no band to flood from: OpenVDB would take the sign of a node's first tile for all.
+  if (rule.level_set && grid.background() > 0.0f && grid.tree().leafCount() > 0) {
     const LevelSet flooded = with_flooded_signs(grid);
     if (edges_of(flooded).empty()) {
       context.note("the level set's inactive samples had no signs (its inside was not flooded): they got those of the band");
