@@ -37,24 +37,31 @@ class DamageTest : public ProgramTest {
     const std::size_t line = outcome.err.rfind("hermesh: ");
     ASSERT_NE(line, std::string::npos) << outcome.err;
     EXPECT_TRUE(line == 0 || outcome.err[line - 1] == '\n');
-    EXPECT_EQ(std::count(outcome.err.begin() + std::ptrdiff_t(line), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin() + std::ptrdiff_t(line), outcome.err.end(), '\n'), 1)
+        << outcome.err;
     EXPECT_LE(outcome.err.size() - line, 300u) << outcome.err;
-    EXPECT_TRUE(std::ranges::none_of(outcome.err, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; }));
+    EXPECT_TRUE(std::ranges::none_of(outcome.err,
+                                     [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; }));
     for (const std::string& word : words) EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
     EXPECT_EQ(files(), before);
   }
-  nlohmann::json judged(const std::string& mesh) { return nlohmann::json::parse(run({"validate", mesh, "--json"}).out); }
+  nlohmann::json judged(const std::string& mesh) {
+    return nlohmann::json::parse(run({"validate", mesh, "--json"}).out);
+  }
 };
 
 TEST_F(DamageTest, ABlockOfValuesThatIsLongerThanItsPlace) {
   const std::string file = input("damaged-chunk.vdb");
-  for (const Arguments& arguments : {Arguments{"info", file}, {"extract", file, "out.ply"}, {"fracture", file, "out", "--cutters", "planes:1"}})
+  for (const Arguments& arguments : {Arguments{"info", file},
+                                     {"extract", file, "out.ply"},
+                                     {"fracture", file, "out", "--cutters", "planes:1"}})
     expect_refusal(1, arguments, {file, "damaged"});
 }
 
 TEST_F(DamageTest, ATileOf4096CubedIsWeighedBeforeItIsMade) {
   const std::string file = input("one-tile-4096.vdb");
-  EXPECT_NE(run({"info", file}).out.find(std::to_string(4096LL * 4096 * 4096) + " voxels"), std::string::npos);
+  EXPECT_NE(run({"info", file}).out.find(std::to_string(4096LL * 4096 * 4096) + " voxels"),
+            std::string::npos);
   // With less memory than its surface of 100 million cells takes, on any machine.
   limit(RLIMIT_AS, rlim_t{3} << 30);
   for (const char* extractor : {"dual-contouring", "marching-cubes", "manifold-dual-contouring"})
@@ -62,7 +69,8 @@ TEST_F(DamageTest, ATileOf4096CubedIsWeighedBeforeItIsMade) {
 }
 
 TEST_F(DamageTest, NiftiThatOthersRead) {
-  for (const auto& [file, values] : {std::pair("nan-slope.nii.gz", "values 76.6"), {"bitpix.nii.gz", "values 76.6"}}) {
+  for (const auto& [file, values] :
+       {std::pair("nan-slope.nii.gz", "values 76.6"), {"bitpix.nii.gz", "values 76.6"}}) {
     const Outcome outcome = run({"import", input(file), "out.vdb"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_NE(outcome.out.find(values), std::string::npos) << outcome.out;
@@ -79,11 +87,23 @@ TEST_F(DamageTest, SingleBytesHaveNoOrder) {
 }
 
 TEST_F(DamageTest, DamagedExperimentsLeaveNoFolder) {
-  for (int i = 1; i <= 4; ++i)
-    expect_refusal(1, {"run", input("damaged-experiment-" + std::to_string(i) + ".toml"), "--out", "a/b/rows"}, {"damaged-experiment"});
-  write("good.toml",
-        "question = \"Q?\"\nvoxelizers = [\"hermesh\"]\ncolumns = [\"triangles\"]\n[[variants]]\nname = \"marching-cubes\"\n"
-        "[quick]\ncases = [{ name = \"uv-sphere\", resolutions = [8] }]\n");
+  const std::string good =
+      "question = \"Q?\"\nvoxelizers = [\"hermesh\"]\ncolumns = [\"triangles\"]\n[[variants]]\nname = "
+      "\"marching-cubes\"\n"
+      "[quick]\ncases = [{ name = \"uv-sphere\", resolutions = [8] }]\n";
+  const std::pair<const char*, const char*> damages[] = {{"marching-cubes", "marching-cuves"},
+                                                         {"[quick]", "[quick"},
+                                                         {"\"triangles\"", "\"triangles"},
+                                                         {"question", "quextion"},
+                                                         {"uv-sphere", "\x1b[2J"},
+                                                         {"resolutions", "resolutionsresolutions"}};
+  for (const auto& [from, to] : damages) {
+    std::string damaged = good;
+    damaged.replace(damaged.find(from), std::strlen(from), to);
+    write("damaged.toml", damaged);
+    expect_refusal(1, {"run", "damaged.toml", "--out", "a/b/rows"}, {"damaged.toml"});
+  }
+  write("good.toml", good);
   expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--filter", "no such cell"}, {"no cell"});
   expect_refusal(1, {"run", "good.toml", "--out", "a/b/rows", "--tier", "full"}, {"full"});
 }
@@ -94,12 +114,15 @@ TEST_F(DamageTest, AMaskIsInsideWhereItIsActive) {
   mask->fill(openvdb::CoordBBox(openvdb::Coord(1), openvdb::Coord(10, 20, 30)), true);
   mask->setName("mask");
   openvdb::io::File(path("mask.vdb")).write({mask});
-  ASSERT_EQ(run({"extract", "mask.vdb", "a.obj", "--isovalue", "0.5", "--extractor", "marching-cubes"}).exit_code, 0);
+  ASSERT_EQ(
+      run({"extract", "mask.vdb", "a.obj", "--isovalue", "0.5", "--extractor", "marching-cubes"}).exit_code,
+      0);
   const nlohmann::json report = judged("a.obj");
   EXPECT_EQ(report.at("components"), 1);
   EXPECT_EQ(report.at("euler_characteristic"), 2);
-  // A box of 10 x 20 x 30 voxels whose edges and corners marching cubes cuts: off an edge a prism of 1/8 voxel a voxel of
-  // its length, off a corner a pyramid of 1/48, where the prisms of three edges would meet in 3 · 1/16 of a voxel.
+  // A box of 10 x 20 x 30 voxels whose edges and corners marching cubes cuts: off an edge a prism of 1/8
+  // voxel a voxel of its length, off a corner a pyramid of 1/48, where the prisms of three edges would meet
+  // in 3 · 1/16 of a voxel.
   EXPECT_LT(report.at("volume").get<double>(), 6000.0);
   EXPECT_GT(report.at("volume").get<double>(), 6000.0 - 4 * 60 / 8.0 - 1e-3);
 }
@@ -107,7 +130,8 @@ TEST_F(DamageTest, AMaskIsInsideWhereItIsActive) {
 /// The inside of a level set with the background of outside, as programs leave it that do not flood it.
 TEST_F(DamageTest, AnUnfloodedLevelSetIsFlooded) {
   initialize_openvdb();
-  const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(10.0f, openvdb::Vec3f(0.3f), 0.5f);
+  const auto grid =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(10.0f, openvdb::Vec3f(0.3f), 0.5f);
   grid->setName("sdf");
   openvdb::io::File(path("flooded.vdb")).write({grid});
   const auto unflooded = openvdb::FloatGrid::create(grid->background());
@@ -161,7 +185,8 @@ TEST_F(DamageTest, NotesAreThereBeforeAnError) {
 TEST_F(DamageTest, AHangUpLeavesNothingHalfWritten) {
   write_sphere();
   for (const int signal : {SIGHUP, SIGXCPU, SIGPIPE}) {
-    const Outcome outcome = run({"remesh", "sphere.off", "out.ply", "--resolution", "1500"}, Interruption{signal, {}});
+    const Outcome outcome =
+        run({"remesh", "sphere.off", "out.ply", "--resolution", "1500"}, Interruption{signal, {}});
     EXPECT_EQ(outcome.exit_code, 128 + signal) << outcome.err;
     EXPECT_EQ(files(), std::set<std::string>{"sphere.off"});
   }
