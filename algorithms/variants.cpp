@@ -1,11 +1,11 @@
 #include "algorithms/variants.h"
 
-#include "algorithms/extraction/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
-#include "algorithms/extraction/manifold_dual_contouring/manifold_dual_contouring.h"
+#include "algorithms/extraction/manifold_dual_contouring.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/voxelization/thesis_voxelizer.h"
+#include "algorithms/thesis/thesis_voxelizer.h"
 
 namespace hermesh {
 

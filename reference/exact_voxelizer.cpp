@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/memory_estimate.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "reference/distance_oracle.h"
 #include "reference/winding_oracle.h"
 

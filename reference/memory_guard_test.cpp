@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "algorithms/core/memory_estimate.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "reference/test_meshes.h"
 #include "reference/variants.h"
 

@@ -3,7 +3,7 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/memory_estimate.h"
+#include "algorithms/lattice/memory_estimate.h"
 
 namespace hermesh {
 namespace {

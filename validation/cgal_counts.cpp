@@ -8,7 +8,7 @@
 #include <boost/container/small_vector.hpp>
 
 #include "validation/library_counts.h"
-#include "validation/triangle_soup.h"
+#include "validation/geometry/triangle_soup.h"
 
 namespace hermesh::validation {
 namespace {

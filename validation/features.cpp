@@ -9,8 +9,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "validation/distance.h"
-#include "validation/welded_surface.h"
+#include "validation/geometry/distance.h"
+#include "validation/geometry/welded_surface.h"
 
 namespace hermesh::validation {
 namespace {

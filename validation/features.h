@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "validation/mesh_report.h"
-#include "validation/triangle_soup.h"
-#include "validation/triangle_tree.h"
+#include "validation/geometry/triangle_soup.h"
+#include "validation/geometry/triangle_tree.h"
 
 namespace hermesh::validation {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "validation/test_meshes.h"
+#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

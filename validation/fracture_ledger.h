@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/run_context.h"
 #include "validation/mesh_report.h"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "validation/triangle_tree.h"
+#include "validation/geometry/triangle_tree.h"
 
 namespace hermesh::validation {
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "validation/triangle_cover.h"
+#include "validation/geometry/triangle_cover.h"
 
 namespace hermesh::validation {
 namespace {

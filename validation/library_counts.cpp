@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "validation/topology.h"
-#include "validation/triangle_soup.h"
+#include "validation/geometry/triangle_soup.h"
 
 namespace hermesh::validation {
 namespace {

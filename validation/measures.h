@@ -2,7 +2,7 @@
 #pragma once
 
 #include "validation/mesh_report.h"
-#include "validation/triangle_soup.h"
+#include "validation/geometry/triangle_soup.h"
 
 namespace hermesh::validation {
 

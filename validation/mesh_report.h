@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/core/mesh_file.h"
-#include "validation/quad_cut.h"
+#include "algorithms/io/mesh_file.h"
+#include "validation/geometry/quad_cut.h"
 
 namespace hermesh::validation {
 

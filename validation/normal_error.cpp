@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "validation/surface_samples.h"
+#include "validation/geometry/surface_samples.h"
 
 namespace hermesh::validation {
 namespace {

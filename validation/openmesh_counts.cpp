@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "validation/library_counts.h"
-#include "validation/triangle_soup.h"
+#include "validation/geometry/triangle_soup.h"
 
 namespace hermesh::validation {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "algorithms/core/disjoint_sets.h"
-#include "validation/near_pairs.h"
+#include "validation/geometry/near_pairs.h"
 
 namespace hermesh::validation {
 namespace {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "validation/distance.h"
+#include "validation/geometry/distance.h"
 #include "validation/features.h"
 #include "validation/hausdorff.h"
 #include "validation/library_counts.h"

@@ -5,7 +5,7 @@
 
 #include "validation/mesh_report.h"
 #include "validation/report_json.h"
-#include "validation/test_meshes.h"
+#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "validation/exact_predicates.h"
-#include "validation/places.h"
+#include "validation/geometry/exact_predicates.h"
+#include "validation/geometry/places.h"
 
 namespace hermesh::validation {
 namespace {

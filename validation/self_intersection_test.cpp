@@ -7,8 +7,8 @@
 
 #include <random>
 
-#include "validation/exact_predicates.h"
-#include "validation/test_meshes.h"
+#include "validation/geometry/exact_predicates.h"
+#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "validation/exact_predicates.h"
+#include "validation/geometry/exact_predicates.h"
 
 namespace hermesh::validation {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "algorithms/core/run_context.h"
 #include "validation/free_cells.h"
-#include "validation/triangle_soup.h"
-#include "validation/triangle_tree.h"
+#include "validation/geometry/triangle_soup.h"
+#include "validation/geometry/triangle_tree.h"
 
 namespace hermesh::validation {
 

@@ -13,7 +13,7 @@
 #include "algorithms/core/disjoint_sets.h"
 #include "validation/outer_boundary.h"
 #include "validation/solid.h"
-#include "validation/surface_samples.h"
+#include "validation/geometry/surface_samples.h"
 
 namespace hermesh::validation {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/run_context.h"
 #include "validation/mesh_report.h"
 

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "validation/outer_boundary.h"
-#include "validation/test_meshes.h"
+#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "validation/places.h"
+#include "validation/geometry/places.h"
 
 namespace hermesh::validation {
 namespace {

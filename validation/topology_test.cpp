@@ -10,7 +10,7 @@
 
 #include "validation/library_counts.h"
 #include "validation/measures.h"
-#include "validation/test_meshes.h"
+#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/core/blocks.h"
+#include "algorithms/lattice/blocks.h"
 #include "algorithms/core/level_set.h"
 #include "algorithms/core/polygon_mesh.h"
 

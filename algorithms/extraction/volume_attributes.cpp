@@ -6,7 +6,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/vdb_archive.h"
+#include "algorithms/io/vdb_archive.h"
 
 namespace hermesh {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 
 namespace hermesh {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 

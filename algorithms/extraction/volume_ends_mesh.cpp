@@ -3,7 +3,7 @@
 #include <limits>
 #include <unordered_map>
 
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/volume_ends.h"
 

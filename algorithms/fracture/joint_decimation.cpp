@@ -1,6 +1,6 @@
 #include "algorithms/fracture/joint_decimation.h"
 
-#include "algorithms/extraction/manifold_dual_contouring/certified_decimation.h"
+#include "algorithms/extraction/certified_collapse/certified_decimation.h"
 
 namespace hermesh {
 namespace {

@@ -1,11 +1,11 @@
 // How the surfaces between pieces, and that of the whole, pass through one cell, by the labels of its
-// corners: the generalisation of extraction/manifold_dual_contouring/cell_sheets.h to more than two sides.
+// corners: the generalisation of extraction/embedded_mesh/cell_sheets.h to more than two sides.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "algorithms/extraction/manifold_dual_contouring/cell_sheets.h"
+#include "algorithms/extraction/embedded_mesh/cell_sheets.h"
 
 namespace hermesh {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "algorithms/core/large_array.h"
-#include "algorithms/extraction/manifold_dual_contouring/cell_blocks.h"
+#include "algorithms/extraction/embedded_mesh/cell_blocks.h"
 #include "algorithms/fracture/labelled_solid.h"
 
 namespace hermesh {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
-#include "algorithms/extraction/manifold_dual_contouring/uniform_mesh.h"
+#include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 #include "algorithms/fracture/labelled_grid.h"
 
 namespace hermesh {

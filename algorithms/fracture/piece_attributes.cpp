@@ -6,8 +6,8 @@
 #include <map>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/voxelization/surface_transfer.h"
-#include "algorithms/voxelization/triangle_tree.h"
+#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
 namespace {

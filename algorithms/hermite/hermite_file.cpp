@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/vdb_archive.h"
+#include "algorithms/io/vdb_archive.h"
 #include "algorithms/hermite/dense_tree.h"
 #include "algorithms/hermite/sign_tree.h"
 

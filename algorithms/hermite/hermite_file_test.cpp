@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/dense_tree.h"
 #include "algorithms/hermite/test_lattice.h"
 

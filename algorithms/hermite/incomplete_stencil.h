@@ -10,7 +10,7 @@
 #include <limits>
 #include <optional>
 
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/crossing.h"
 

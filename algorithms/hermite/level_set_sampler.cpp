@@ -9,7 +9,7 @@
 #include <new>
 #include <optional>
 
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"

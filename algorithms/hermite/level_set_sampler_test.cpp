@@ -13,7 +13,7 @@
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/simd_level.h"
+#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/hermite/test_normals.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/sample_side.h"
+#include "algorithms/lattice/sample_side.h"
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {

@@ -5,10 +5,10 @@
 #include <limits>
 
 #include "algorithms/core/error.h"
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/voxelization/grid_frame.h"
+#include "algorithms/io/grid_frame.h"
 
 namespace hermesh {
 namespace {

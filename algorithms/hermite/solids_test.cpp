@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "algorithms/core/error.h"
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/variants.h"
 

@@ -3,13 +3,13 @@
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/memory_estimate.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/sample_side.h"
-#include "algorithms/voxelization/band.h"
-#include "algorithms/voxelization/inner_sheets.h"
-#include "algorithms/voxelization/signs.h"
-#include "algorithms/voxelization/wide_band.h"
+#include "algorithms/lattice/sample_side.h"
+#include "algorithms/voxelization/distance/band.h"
+#include "algorithms/voxelization/inside/inner_sheets.h"
+#include "algorithms/voxelization/inside/signs.h"
+#include "algorithms/voxelization/distance/wide_band.h"
 
 namespace hermesh {
 namespace {

@@ -12,9 +12,9 @@
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/voxelization/kernels/kernels.h"
-#include "algorithms/voxelization/triangle_tree.h"
-#include "algorithms/voxelization/winding_number.h"
+#include "algorithms/voxelization/distance/kernels/kernels.h"
+#include "algorithms/search/triangle_tree.h"
+#include "algorithms/voxelization/inside/winding_number.h"
 
 namespace hermesh {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/variants.h"
 #include "experiments/bench/failures.h"
 #include "experiments/bench/sphere_level_set.h"

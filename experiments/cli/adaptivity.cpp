@@ -4,7 +4,7 @@
 #include <sstream>
 #include <vector>
 
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "algorithms/extraction/frustum.h"
 
 namespace hermesh::cli {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {

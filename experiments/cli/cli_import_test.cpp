@@ -4,8 +4,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/core/mesh_file.h"
-#include "algorithms/import/files_for_tests.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/import/files_for_tests.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {

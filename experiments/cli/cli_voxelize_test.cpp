@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {

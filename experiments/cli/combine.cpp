@@ -4,8 +4,8 @@
 #include <iostream>
 #include <memory>
 
-#include "algorithms/core/mesh_file.h"
-#include "algorithms/core/written_precision.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/written_precision.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "experiments/cli/extracting.h"
@@ -14,7 +14,7 @@
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/rows.h"
+#include "experiments/harness/rows.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh::cli {

@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "algorithms/core/value_range.h"
-#include "algorithms/core/vdb_file.h"
-#include "algorithms/core/written_precision.h"
+#include "algorithms/io/vdb_file.h"
+#include "algorithms/io/written_precision.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/extraction/volume_ends.h"
 #include "experiments/cli/adaptivity.h"

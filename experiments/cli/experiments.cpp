@@ -7,9 +7,9 @@
 
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
-#include "experiments/compare.h"
-#include "experiments/harness.h"
-#include "experiments/rows.h"
+#include "experiments/harness/compare.h"
+#include "experiments/harness/harness.h"
+#include "experiments/harness/rows.h"
 
 namespace hermesh::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/harness.h"
+#include "experiments/harness/harness.h"
 
 namespace hermesh::cli {
 

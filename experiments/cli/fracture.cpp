@@ -4,16 +4,16 @@
 #include <iostream>
 #include <memory>
 
-#include "algorithms/core/mesh_file.h"
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/fracture_folder.h"
-#include "experiments/fracture_run.h"
+#include "experiments/fracture/fracture_folder.h"
+#include "experiments/fracture/fracture_run.h"
 
 namespace hermesh::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "algorithms/core/value_range.h"
-#include "algorithms/import/import_volume.h"
+#include "algorithms/io/import/import_volume.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"

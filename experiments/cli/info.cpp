@@ -4,9 +4,9 @@
 #include <iostream>
 #include <memory>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/shown.h"
-#include "algorithms/core/vdb_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "algorithms/variants.h"
-#include "experiments/cases.h"
+#include "experiments/cases/cases.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
-#include "experiments/harness.h"
+#include "experiments/harness/harness.h"
 
 namespace hermesh::cli {
 namespace {

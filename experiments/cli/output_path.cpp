@@ -4,9 +4,9 @@
 #include <cctype>
 #include <string>
 
-#include "algorithms/core/atomic_file.h"
+#include "algorithms/io/atomic_file.h"
 #include "algorithms/core/error.h"
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cli/session.h"
 
 namespace hermesh::cli {

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <thread>
 
-#include "algorithms/core/atomic_file.h"
+#include "algorithms/io/atomic_file.h"
 #include "experiments/cli/terminal_progress.h"
 
 namespace hermesh::cli {

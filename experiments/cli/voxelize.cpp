@@ -3,12 +3,12 @@
 #include <memory>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/mesh_file.h"
-#include "algorithms/core/vdb_file.h"
-#include "algorithms/voxelization/grid_frame.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/vdb_file.h"
+#include "algorithms/io/grid_frame.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/voxelization/quad_diagonals.h"
-#include "algorithms/voxelization/volume_outputs.h"
+#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/voxelization/outputs/volume_outputs.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"

@@ -6,11 +6,11 @@
 #include <limits>
 #include <map>
 
-#include "algorithms/core/memory_estimate.h"
-#include "algorithms/voxelization/lost_surface.h"
-#include "algorithms/voxelization/quad_diagonals.h"
+#include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/voxelization/outputs/lost_surface.h"
+#include "algorithms/voxelization/distance/quad_diagonals.h"
 #include "experiments/cli/format.h"
-#include "experiments/harness.h"
+#include "experiments/harness/harness.h"
 
 namespace hermesh::cli {
 namespace {

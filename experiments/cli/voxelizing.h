@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/core/mesh_file.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/variant.h"
 #include "experiments/cli/session.h"
 

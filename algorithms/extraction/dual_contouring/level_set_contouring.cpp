@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "algorithms/core/large_array.h"
-#include "algorithms/core/leaf_table.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"

@@ -16,7 +16,7 @@
 #include <tuple>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/simd_level.h"
+#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/hermite/samplers.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "algorithms/core/blocks.h"
+#include "algorithms/lattice/blocks.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"

@@ -1,6 +1,6 @@
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
-#include "algorithms/core/simd_level.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh::edge_kernels {
 

@@ -1,6 +1,6 @@
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 
-#include "algorithms/core/simd_level.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh::leaf_kernels {
 

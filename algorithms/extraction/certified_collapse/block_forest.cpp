@@ -1,0 +1,213 @@
+#include "algorithms/extraction/certified_collapse/block_forest.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kLevels = 4;  ///< blocks of 2^kLevels voxels are the largest
+/// A node's point may be farther from the planes that it stands for than this share of the tolerance, root mean square.
+constexpr double kShare = 0.45;
+
+/// Trees of one block of the largest kind after another.
+class BlockTrees {
+ public:
+  BlockTrees(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
+             const FilePoints& file)
+      : fine_(fine), tolerance_(tolerance), pinned_(pinned), file_(file) {}
+
+  /// `position` by point: in which place of `order`; the block's points are in `order` from `begin` to `end`. Writes their
+  /// node_of, counted from 0.
+  void run(std::span<const std::uint32_t> order, std::span<const std::uint32_t> position, std::uint32_t begin,
+           std::uint32_t end, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
+    points_ = order.subspan(begin, end - begin);
+    sums_.assign(points_.size(), Sum());
+    parent_.resize(points_.size());
+    std::iota(parent_.begin(), parent_.end(), 0u);
+    node_at_.assign(points_.size(), MergeForest::kNone);
+    cells_.resize(points_.size());
+    anchor_ = fine_.points()[points_[0]];
+    for (std::uint32_t i = 0; i < points_.size(); ++i) start(i);
+    gather(position, begin, end);
+    for (int level = 1; level <= kLevels; ++level) merge(level, node_of, nodes);
+  }
+
+ private:
+  struct Sum {
+    std::uint32_t points = 1, first = 0;
+    std::int32_t euler = 1;  ///< points - edges + triangles
+    float tolerance = 0;
+    Vector3d places = Vector3d::Zero();
+    WideQuadric quadric;
+    void add(const Sum& other) {
+      points += other.points;
+      first = std::min(first, other.first);
+      euler += other.euler;
+      tolerance = std::min(tolerance, other.tolerance);
+      places += other.places;
+      quadric.a += other.quadric.a;
+      quadric.b += other.quadric.b;
+      quadric.c += other.quadric.c;
+    }
+  };
+
+  void start(std::uint32_t i) {
+    const std::uint32_t p = points_[i];
+    Sum& sum = sums_[i];
+    sum.first = p;
+    sum.tolerance = tolerance_[p];
+    sum.places = fine_.points()[p];
+    sum.quadric.add(quadric_at(fine_, p), sum.places - anchor_);
+    for (int a = 0; a < 3; ++a) cells_[i][a] = static_cast<std::int32_t>(std::floor(sum.places[a]));
+  }
+
+  /// The least block that holds both.
+  int level(std::uint32_t i, std::uint32_t j) const {
+    std::uint32_t differ = 1;
+    for (int a = 0; a < 3; ++a) differ |= static_cast<std::uint32_t>((cells_[i][a] ^ cells_[j][a]));
+    return std::bit_width(differ);
+  }
+
+  /// Edges and triangles within the block, by level.
+  void gather(std::span<const std::uint32_t> position, std::uint32_t begin, std::uint32_t end) {
+    for (auto& edges : edges_) edges.clear();
+    for (auto& triangles : triangles_) triangles.clear();
+    const auto joins = [&](std::uint32_t p) { return position[p] >= begin && position[p] < end && !pinned_[p]; };
+    for (std::uint32_t i = 0; i < points_.size(); ++i) {
+      const std::uint32_t p = points_[i];
+      if (pinned_[p]) continue;
+      for (const std::uint32_t t : fine_.around(p)) {
+        const Triangle& corners = fine_.triangles()[t];
+        const std::uint32_t q = fine_.next(t, p);
+        if (!joins(q)) continue;
+        const std::uint32_t j = position[q] - begin;
+        const int of_edge = level(i, j);
+        if (p < q) edges_[of_edge - 1].push_back({i, j});
+        if (corners[0] != p || !joins(corners[2])) continue;
+        triangles_[std::max(of_edge, level(i, position[corners[2]] - begin)) - 1].push_back(i);
+      }
+    }
+  }
+
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+
+  void merge(int level, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
+    merged_.clear();
+    const auto first_new = static_cast<std::uint32_t>(nodes.size());
+    for (const auto& [i, j] : edges_[level - 1]) {
+      const std::uint32_t a = find(i), b = find(j);
+      if (a == b) continue;
+      for (const std::uint32_t root : {a, b})
+        if (node_at_[root] == MergeForest::kNone || node_at_[root] < first_new) merged_.push_back({root, node_at_[root]});
+      parent_[b] = a;
+      sums_[a].add(sums_[b]);
+      node_at_[a] = first_new;  // some new node
+    }
+    for (const auto& [i, j] : edges_[level - 1]) --sums_[find(i)].euler;
+    for (const std::uint32_t i : triangles_[level - 1]) ++sums_[find(i)].euler;
+    for (const auto& [root, node] : merged_) node_at_[find(root)] = MergeForest::kNone;
+    for (const auto& [root, node] : merged_) {
+      std::uint32_t& at = node_at_[find(root)];
+      if (at == MergeForest::kNone) {
+        at = static_cast<std::uint32_t>(nodes.size());
+        nodes.push_back(node_of_sum(sums_[find(root)], level));
+      }
+      if (node == MergeForest::kNone) node_of[points_[root]] = at;
+      else nodes[node].parent = at;
+    }
+  }
+
+  MergeForest::Node node_of_sum(const Sum& sum, int level) const {
+    MergeForest::Node node;
+    node.first = sum.first;
+    if (sum.euler != 1) return node;
+    const Vector3d middle = sum.places / double(sum.points);
+    WideQuadric q = sum.quadric;  // about the middle
+    const Vector3d shift = middle - anchor_;
+    q.c = q(shift);
+    q.b += q.a * shift;
+    Vector3d x = q.minimiser();
+    const double reach = double(1 << level);
+    if (x.squaredNorm() > reach * reach) x *= reach / x.norm();
+    node.merges = q(x) <= kShare * kShare * double(sum.tolerance) * double(sum.tolerance) * q.a.trace();
+    node.error = static_cast<float>(q(x) / (double(sum.tolerance) * double(sum.tolerance) * q.a.trace() + 1e-30));
+    if (!node.merges) return node;
+    node.place = file_.rounded(middle + x);
+    node.quadric = q.about(node.place - middle);
+    return node;
+  }
+
+  const FineMesh& fine_;
+  const std::span<const float> tolerance_;
+  const std::span<const std::uint8_t> pinned_;
+  const FilePoints& file_;
+  std::span<const std::uint32_t> points_;
+  Vector3d anchor_;
+  std::vector<std::array<std::int32_t, 3>> cells_;
+  std::vector<Sum> sums_;              ///< by point, of those that have come to it
+  std::vector<std::uint32_t> parent_;  ///< by point, of disjoint sets
+  std::vector<std::uint32_t> node_at_; ///< by root of these
+  std::array<std::vector<std::pair<std::uint32_t, std::uint32_t>>, kLevels> edges_;
+  std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< by a corner
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;
+};
+
+std::uint64_t block_key(const Vector3d& p) {
+  std::uint64_t key = 0;
+  for (int a = 0; a < 3; ++a)
+    key = key << 21 | ((static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[a]))) >> kLevels) & 0x1fffff);
+  return key;
+}
+
+}  // namespace
+
+MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
+                         const FilePoints& file, const RunContext& context) {
+  const std::vector<Vector3d>& points = fine.points();
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
+  parallel_blocks(points.size(), context, [&](std::size_t p) { keys[p] = {block_key(points[p]), static_cast<std::uint32_t>(p)}; });
+  tbb::parallel_sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> order(points.size()), position(points.size()), first;
+  for (std::uint32_t i = 0; i < keys.size(); ++i) {
+    order[i] = keys[i].second;
+    position[order[i]] = i;
+    if (i == 0 || keys[i].first != keys[i - 1].first) first.push_back(i);
+  }
+  first.push_back(static_cast<std::uint32_t>(points.size()));
+
+  std::vector<std::uint32_t> node_of(points.size(), MergeForest::kNone);
+  const std::size_t n = first.size() - 1;
+  std::vector<std::vector<MergeForest::Node>> nodes(n);
+  tbb::enumerable_thread_specific<BlockTrees> trees([&] { return BlockTrees(fine, tolerance, pinned, file); });
+  parallel_blocks(n, context, [&](std::size_t b) {
+    trees.local().run(order, position, first[b], first[b + 1], node_of, nodes[b]);
+  });
+  std::vector<std::uint64_t> start(n);
+  for (std::size_t b = 0; b < n; ++b) start[b] = nodes[b].size();
+  std::vector<MergeForest::Node> all(exclusive_scan(start, "blocks"));
+  parallel_blocks(n, context, [&](std::size_t b) {
+    const auto shift = static_cast<std::uint32_t>(start[b]);
+    const auto moved = [&](std::uint32_t node) { return node == MergeForest::kNone ? node : node + shift; };
+    for (std::size_t i = 0; i < nodes[b].size(); ++i) {
+      nodes[b][i].parent = moved(nodes[b][i].parent);
+      all[shift + i] = nodes[b][i];
+    }
+    for (std::uint32_t i = first[b]; i < first[b + 1]; ++i) node_of[order[i]] = moved(node_of[order[i]]);
+  });
+  return MergeForest(std::move(all), std::move(node_of));
+}
+
+}  // namespace hermesh

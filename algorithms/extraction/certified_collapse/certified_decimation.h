@@ -1,0 +1,37 @@
+// A coarse mesh whose distance from a fine one is proved.
+//
+// *Propose*: sets of points become one, the minimiser of the squared distances to the planes of all triangles that they stand
+// for (quadrics, Garland & Heckbert 1997): first those of blocks of up to 16 voxels (block_forest.h), then the ends of edges,
+// cheapest first (decimation.h).
+// *Prove*: the mesh that results (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that
+// it was made of, at last into single points; so this ends, at worst with the fine mesh.
+// Once boldly, by the quadrics alone, which does most of the work in a small part of the time; then with care, once or more.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/certified_collapse/fine_mesh.h"
+
+namespace hermesh {
+
+struct CertifiedMesh {
+  std::vector<Eigen::Vector3d> points;       ///< FilePoints::rounded()
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> fine_triangle;  ///< by triangle: one of the fine mesh, all of whose corners went into its corners
+};
+
+/// A triangle's tolerance is the least of its corners. Each place of the fine mesh is then within its
+/// triangle's tolerance of the coarse one, and for each place of the coarse one there is a fine triangle
+/// within its own tolerance, which where tolerances differ need not be the nearest.
+/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into
+///   another; others may go into them.
+/// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge
+///   its ends must be such; so a complex of patches keeps their rims.
+CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
+                                 std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);
+
+}  // namespace hermesh

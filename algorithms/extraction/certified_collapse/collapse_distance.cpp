@@ -1,0 +1,152 @@
+#include "algorithms/extraction/certified_collapse/collapse_distance.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Steps along a new edge get no shorter than this, in voxels.
+constexpr double kShortestStep = 0.03;
+
+}  // namespace
+
+bool CollapseDistance::passes() { return attach_samples() && point_is_near() && new_edges_are_near(); }
+
+bool CollapseDistance::attach_samples() {
+  reach_.clear();
+  for (const Collapse::NewFace& made : collapse_.made) reach_.emplace_back(made.at);
+  const auto attach_own = [&](std::uint32_t vertex) {
+    const std::uint32_t sample = cube_.vertices[vertex].global;
+    return !mesh_.unmoved[sample] || attach(sample);
+  };
+  if (collapse_.v_moves && !attach_own(collapse_.v)) return false;
+  if (!attach_own(collapse_.going)) return false;
+  for (const std::uint32_t f : collapse_.old)
+    for (std::uint32_t s = mesh_.first_sample[cube_.faces[f].global]; s != kNoSample; s = mesh_.next_sample[s])
+      if (!attach(s)) return false;
+  return true;
+}
+
+/// To the triangle below or above the sample, or else to any that is near.
+bool CollapseDistance::attach(std::uint32_t sample) {
+  const Vector3d& p = mesh_.fine->points()[sample];
+  const double within = mesh_.tolerance[sample];
+  std::uint32_t found = CubeMesh::kNone;
+  for (std::uint32_t n = 0; n < collapse_.made.size(); ++n) {
+    if (!reach_[n].near(p, within)) continue;
+    found = n;
+    if (reach_[n].beyond(p).maxCoeff() <= 0) break;
+  }
+  if (found != CubeMesh::kNone) collapse_.attached.push_back({sample, found});
+  return found != CubeMesh::kNone;
+}
+
+/// The new point, by the triangles around the sample next to it.
+bool CollapseDistance::point_is_near() {
+  if (collapse_.attached.empty()) return false;  // no place to start from; rare, for ends that move leave samples behind
+  const FineMesh& fine = *mesh_.fine;
+  below_ = fine.walk(fine.around(collapse_.attached.front().sample).front(), collapse_.x);
+  return near_fine_around(collapse_.x, 0.0);
+}
+
+/// Whether p, or a ball about it, is near the fine triangle `below_` or one that touches it.
+bool CollapseDistance::near_fine_around(const Vector3d& p, double radius) {
+  if (near_fine(below_, p, radius)) return true;
+  const FineMesh& fine = *mesh_.fine;
+  for (const std::uint32_t corner : fine.triangles()[below_])
+    for (const std::uint32_t t : fine.around(corner))
+      if (t != below_ && near_fine(t, p, radius)) {
+        below_ = t;
+        return true;
+      }
+  return false;
+}
+
+bool CollapseDistance::near_fine(std::uint32_t t, const Vector3d& p, double radius) const {
+  const FineMesh& fine = *mesh_.fine;
+  const Triangle& c = fine.triangles()[t];
+  const double within = std::min({mesh_.tolerance[c[0]], mesh_.tolerance[c[1]], mesh_.tolerance[c[2]]}) - radius;
+  const Vector3d& corner = fine.points()[c[0]];
+  constexpr double kRounding = 1e-4;  // of the normals' single precision, over a triangle's size
+  if (within < 0 || std::abs(fine.normal(t).cast<double>().dot(p - corner)) > within + kRounding) return false;
+  return squared_distance(p, corner, fine.points()[c[1]], fine.points()[c[2]]) <= within * within;
+}
+
+/// The new edges. A narrow ridge could rise above the fine mesh and yet have its flanks near every edge of that.
+bool CollapseDistance::new_edges_are_near() {
+  const std::uint32_t below_x = below_;
+  for (const Collapse::NewFace& made : collapse_.made) {
+    below_ = below_x;
+    const Vector3d& to = cube_.vertices[made.others[0]].point;
+    if (!is_near_below(to, made.normal) && !segment_is_near(collapse_.x, to)) return false;
+  }
+  return true;
+}
+
+/// A quick answer for the edge from the new point, which may be no where a longer look says yes: the fine edges right below
+/// or above it, one after another, seen along a new triangle's normal.
+bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal) const {
+  constexpr int kMostSteps = 256;
+  const FineMesh& fine = *mesh_.fine;
+  const Vector3d along = to - collapse_.x, across = normal.cross(along);
+  const double squared = along.squaredNorm(), height = 1.0 / normal.norm();
+  std::uint32_t t = below_;
+  int entry = -1;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Triangle& c = fine.triangles()[t];
+    std::array<Vector3d, 3> at;
+    std::array<double, 3> side;
+    for (int i = 0; i < 3; ++i) {
+      at[i] = fine.points()[c[i]] - collapse_.x;
+      side[i] = across.dot(at[i]);
+    }
+    // Counter-clockwise seen from outside, so the way leaves by the side that leads from its right to its left.
+    int exit = -1;
+    for (int i = 0; i < 3; ++i)
+      if (i != entry && side[i] < 0 && side[(i + 1) % 3] >= 0) exit = i;
+    if (exit < 0) return false;
+    const int j = (exit + 1) % 3;
+    const double share = side[exit] / (side[exit] - side[j]);
+    const Vector3d q = at[exit] + share * (at[j] - at[exit]);
+    const double way = q.dot(along) / squared;
+    if (way >= 1.0) return true;
+    const double within = std::min(mesh_.tolerance[c[exit]], mesh_.tolerance[c[j]]);
+    if (std::abs(normal.dot(q - way * along)) * height > within) return false;
+    const std::uint32_t next = fine.across(t, exit), corner = c[j];
+    if (next == FineMesh::kNone) return false;
+    const Triangle& n = fine.triangles()[next];
+    entry = n[0] == corner ? 0 : n[1] == corner ? 1 : 2;
+    t = next;
+  }
+  return false;
+}
+
+/// In steps, each near one fine triangle as a whole, that are found by a walk over the fine mesh beside the segment.
+bool CollapseDistance::segment_is_near(const Vector3d& from, const Vector3d& to) {
+  const double length = (to - from).norm();
+  double done = 0, step = 1.0;
+  while (done < length) {
+    step = std::min(step, length - done);
+    const Vector3d begin = from + (done / length) * (to - from), end = from + ((done + step) / length) * (to - from);
+    if (near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) {
+      done += step;
+      step *= 2;
+      continue;
+    }
+    const Vector3d middle = 0.5 * (begin + end);
+    below_ = mesh_.fine->walk(below_, middle);
+    if ((near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) || near_fine_around(middle, 0.5 * step)) {
+      done += step;
+      step *= 2;
+    } else if ((step *= 0.5) < kShortestStep) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,36 @@
+// The part of a collapse's tests that keeps it within the tolerance of the fine mesh (decimation.h).
+#pragma once
+
+#include "algorithms/extraction/certified_collapse/cube_mesh.h"
+#include "algorithms/extraction/contact/triangle_reach.h"
+
+namespace hermesh {
+
+/// For one collapse after another, whose data it reads and, as for Collapse::attached, writes.
+class CollapseDistance {
+ public:
+  CollapseDistance(DecimatedMesh& mesh, CubeMesh& cube, Collapse& collapse)
+      : mesh_(mesh), cube_(cube), collapse_(collapse) {}
+
+  /// Finds a new triangle within the tolerance for every sample of the old ones and for the ends that move; and whether the
+  /// new point and the new edges are within the tolerance of the fine mesh.
+  bool passes();
+
+ private:
+  bool attach_samples();
+  bool attach(std::uint32_t sample);
+  bool point_is_near();
+  bool near_fine_around(const Eigen::Vector3d& p, double radius);
+  bool near_fine(std::uint32_t t, const Eigen::Vector3d& p, double radius) const;
+  bool new_edges_are_near();
+  bool is_near_below(const Eigen::Vector3d& to, const Eigen::Vector3d& normal) const;
+  bool segment_is_near(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
+  DecimatedMesh& mesh_;
+  CubeMesh& cube_;
+  Collapse& collapse_;
+  std::vector<TriangleReach> reach_;  ///< of the new triangles
+  std::uint32_t below_ = 0;           ///< a fine triangle near the place looked at
+};
+
+}  // namespace hermesh

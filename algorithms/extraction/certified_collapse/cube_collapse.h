@@ -1,0 +1,52 @@
+// Collapses within one cube of a round: proposed, tested, done (decimation.h).
+#pragma once
+
+#include "algorithms/extraction/certified_collapse/collapse_distance.h"
+#include "algorithms/extraction/certified_collapse/cube_mesh.h"
+
+namespace hermesh {
+
+/// Of one cube. First gather(), then passes(), then apply(); each only after the one before said yes.
+class CubeCollapse {
+ public:
+  CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
+               std::span<const std::uint32_t> triangles, CubeNumbers& numbers);
+
+  CubeMesh& mesh() { return local_; }
+  const Collapse& collapse() const { return collapse_; }
+
+  /// Makes the faces as they will be when two ends of an edge have become the point at x; v keeps its number, and moves only
+  /// if x is not where it is, and must be free then, as the one that goes must be. False if x lies outside of the cube, or
+  /// if a face turns over, degenerates or gets too long.
+  bool gather(std::uint32_t going, std::uint32_t v, const Eigen::Vector3d& x);
+  /// Whether it keeps near enough (decimation.h); the topology is the caller's.
+  bool passes();
+  void apply();
+  std::vector<Join>& joins() { return joins_; }
+
+  /// Sum of their quadrics.
+  WideQuadric quadric_about(std::uint32_t u, std::uint32_t v, const Eigen::Vector3d& anchor) const;
+
+  float tolerance_at(std::uint32_t v) const { return mesh_.least_tolerance[local_.vertices[v].global]; }
+  bool is_stirred(std::uint32_t v) const { return mesh_.stirred[local_.vertices[v].global] != 0; }
+  /// What failed at this point may succeed in the next round.
+  void stir(std::uint32_t v) { mesh_.stirred_next[local_.vertices[v].global] = 1; }
+  Eigen::Vector3d rounded(const Eigen::Vector3d& p) const { return file_.rounded(p); }
+
+ private:
+  bool make_faces(std::uint32_t moved);
+  bool is_short(const Corners& at, std::uint32_t moved);
+  bool is_well_shaped(const Collapse::NewFace& made, const Corners& before) const;
+  void merge_vertices();
+
+  DecimatedMesh& mesh_;
+  const Collapses kind_;
+  const FilePoints& file_;
+  const DecimationCube& cube_;
+  CubeMesh local_;
+  Collapse collapse_;  ///< the one under way
+  CollapseDistance distance_;
+  std::vector<Join> joins_;
+};
+
+}  // namespace hermesh

@@ -1,0 +1,194 @@
+#include "algorithms/extraction/certified_collapse/decimation.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_sort.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/certified_collapse/cube_decimation.h"
+#include "algorithms/extraction/certified_collapse/cube_mesh.h"
+#include "algorithms/extraction/contact/triangle_grid.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kFirstSide = 32.0;  ///< voxels: some thousand triangles, which fit a core's cache
+/// Share of a cube's side by which the cubes of a round are displaced, so that no two rounds have borders in common.
+constexpr double kDisplacement = 0.382;
+/// Longest edge that a round makes, as a share of the side: what lies at a border must not fall far behind the rest.
+constexpr double kLongestEdge = 0.25;
+
+struct Entry {
+  std::uint64_t cube;  ///< 21 bits an axis
+  std::uint32_t triangle;
+  bool operator<(const Entry& other) const {
+    return cube != other.cube ? cube < other.cube : triangle < other.triangle;
+  }
+};
+
+class Round {
+ public:
+  Round(DecimatedMesh& mesh, const Box3& box, double side, RunContext& context)
+      : mesh_(mesh), side_(side), start_(box.lower - Vector3d::Constant(kDisplacement * side)) {
+    file_triangles(context);
+    triangles_.resize(entries_.size());
+    for (std::size_t i = 0; i < entries_.size(); ++i) {
+      triangles_[i] = entries_[i].triangle;
+      if (i == 0 || entries_[i].cube != entries_[i - 1].cube) first_.push_back(i);
+    }
+    first_.push_back(entries_.size());
+  }
+
+  std::size_t cube_count() const { return first_.size() - 1; }
+
+  /// The joins of all cubes, in their order.
+  std::vector<std::vector<Join>> run(Collapses kind, const FilePoints& file, const RunContext& context) {
+    std::vector<std::vector<Join>> joins(cube_count());
+    tbb::parallel_for(std::size_t{0}, cube_count(), [&](std::size_t c) {
+      context.check();
+      const auto cube = static_cast<std::uint32_t>(c);
+      joins[c] = decimate_cube(mesh_, kind, file, cube_of(cube), triangles_of(cube), numbers_.local(), context);
+    });
+    return joins;
+  }
+
+ private:
+  std::span<const std::uint32_t> triangles_of(std::uint32_t cube) const {
+    return std::span(triangles_).subspan(first_[cube], first_[cube + 1] - first_[cube]);
+  }
+  DecimationCube cube_of(std::uint32_t cube) const {
+    constexpr std::uint64_t kMask = (1u << 21) - 1;
+    const std::uint64_t key = entries_[first_[cube]].cube;
+    return {start_, side_, {key >> 42, (key >> 21) & kMask, key & kMask}, kLongestEdge * side_};
+  }
+  void file_triangles(RunContext& context) {
+    const std::size_t n = mesh_.triangles.size();
+    std::vector<std::uint64_t> counts(n);
+    parallel_blocks(n, context, [&](std::size_t t) {
+      for_each_cube(t, [&](std::uint64_t) { ++counts[t]; });
+    });
+    entries_.resize(exclusive_scan(counts, "triangles"));
+    parallel_blocks(n, context, [&](std::size_t t) {
+      std::size_t at = counts[t];
+      for_each_cube(t, [&](std::uint64_t cube) { entries_[at++] = {cube, static_cast<std::uint32_t>(t)}; });
+    });
+    tbb::parallel_sort(entries_.begin(), entries_.end());
+  }
+  template <class F>
+  void for_each_cube(std::size_t t, F&& f) const {
+    if (!mesh_.alive(t)) return;
+    Box3 box;
+    for (const std::uint32_t p : mesh_.triangles[t]) box.add(mesh_.points[p]);
+    const DecimationCube::Index low = DecimationCube::index_of(box.lower, start_, side_),
+                                high = DecimationCube::index_of(box.upper, start_, side_);
+    for (std::uint64_t x = low[0]; x <= high[0]; ++x)
+      for (std::uint64_t y = low[1]; y <= high[1]; ++y)
+        for (std::uint64_t z = low[2]; z <= high[2]; ++z) f(x << 42 | y << 21 | z);
+  }
+  DecimatedMesh& mesh_;
+  const double side_;
+  const Vector3d start_;
+  std::vector<Entry> entries_;             ///< by cube
+  std::vector<std::uint32_t> triangles_;   ///< of the entries
+  std::vector<std::size_t> first_;         ///< by cube: its first entry, and the end
+  tbb::enumerable_thread_specific<CubeNumbers> numbers_;
+};
+
+void forget_the_dead(DecimatedMesh& mesh) {
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (!mesh.alive(t)) continue;
+    mesh.triangles[kept] = mesh.triangles[t];
+    mesh.first_sample[kept] = mesh.first_sample[t];
+    mesh.fine_triangle[kept] = mesh.fine_triangle[t];
+    ++kept;
+  }
+  mesh.triangles.resize(kept);
+  mesh.first_sample.resize(kept);
+  mesh.fine_triangle.resize(kept);
+}
+
+/// Every sample to a triangle near it, but for those that are points where they were.
+void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged, const RunContext& context) {
+  std::vector<std::uint32_t> nearest(mesh.unmoved.size(), kNoTriangle);
+  parallel_blocks(nearest.size(), context, [&](std::size_t i) {
+    const auto sample = static_cast<std::uint32_t>(i);
+    if (mesh.unmoved[sample]) return;
+    const Vector3d& p = mesh.fine->points()[sample];
+    double squared;
+    const std::uint32_t start = merged.mesh->around(merged.number[forest.leader(sample)]).front();
+    nearest[i] = merged.mesh->nearest_around(merged.mesh->walk(start, p), p, squared);
+  });
+  for (std::uint32_t sample = 0; sample < nearest.size(); ++sample) {
+    if (nearest[sample] == kNoTriangle) continue;
+    mesh.next_sample[sample] = mesh.first_sample[nearest[sample]];
+    mesh.first_sample[nearest[sample]] = sample;
+  }
+}
+
+DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
+                    std::span<const float> tolerance, const RunContext& context) {
+  const std::size_t n = fine.points().size();
+  DecimatedMesh mesh;
+  mesh.fine = &fine;
+  mesh.tolerance = tolerance;
+  mesh.points.resize(n);
+  mesh.quadrics.resize(n);
+  mesh.least_tolerance.resize(n);
+  mesh.unmoved.resize(n);
+  mesh.stirred.resize(n);
+  mesh.stirred_next.resize(n);
+  mesh.fine_triangle = merged.origin;
+  mesh.first_sample.assign(merged.origin.size(), kNoSample);
+  mesh.next_sample.assign(n, kNoSample);
+  parallel_blocks(n, context, [&](std::size_t i) {
+    mesh.unmoved[i] = forest.set_of(static_cast<std::uint32_t>(i)) == MergeForest::kNone;
+  });
+  parallel_blocks(merged.leaders.size(), context, [&](std::size_t i) {
+    const std::uint32_t p = merged.leaders[i], set = forest.set_of(p);
+    mesh.stirred[p] = 1;
+    mesh.points[p] = merged.mesh->points()[i];
+    mesh.least_tolerance[p] = tolerance[p];
+    if (set == MergeForest::kNone) {
+      mesh.quadrics[p] = quadric_at(fine, p);
+      return;
+    }
+    mesh.quadrics[p] = forest.node(set).quadric;
+    for (const std::uint32_t sample : forest.members(set))
+      mesh.least_tolerance[p] = std::min(mesh.least_tolerance[p], tolerance[sample]);
+  });
+  mesh.triangles = merged.mesh->triangles();
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& p : t) p = merged.leaders[p];
+  return mesh;
+}
+
+}  // namespace
+
+void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
+                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file, RunContext& context) {
+  DecimatedMesh mesh = begin(forest, merged, fine, tolerance, context);
+  mesh.pinned = pinned;
+  if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
+  Box3 box;
+  for (const Vector3d& p : merged.mesh->points()) box.add(p);
+  const double largest = (box.upper - box.lower).norm();
+  for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
+    Round round(mesh, box, side, context);
+    for (const auto& joins : round.run(kind, file, context))
+      for (const Join& join : joins) forest.join(join.going, join.node);
+    forget_the_dead(mesh);
+    mesh.stirred.swap(mesh.stirred_next);
+    std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);
+    if (kLongestEdge * side > largest) break;
+  }
+  forest.settle();
+}
+
+}  // namespace hermesh

@@ -1,0 +1,82 @@
+// Proof that a triangle is nowhere farther from a mesh than a bound.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "algorithms/extraction/certified_collapse/fine_mesh.h"
+#include "algorithms/extraction/contact/triangle_overlay.h"
+#include "algorithms/extraction/contact/triangle_reach.h"
+#include "algorithms/search/triangle_tree.h"
+
+namespace hermesh {
+
+/// What a bound may be exceeded by, voxels: so that pieces need not get smaller than this.
+inline constexpr double kDistanceSlack = 0.005;
+
+/// **What it proves.** Most triangles are covered by the mesh right above or below, no farther away than the bound
+/// (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so, or until its corners
+/// are within the bound of one triangle of the mesh (the distance to a convex set is convex), or until it is so small that
+/// its middle's distance and its radius add up to no more than the bound and kDistanceSlack. It may fail to prove what is
+/// true: the mesh is searched for the nearest triangle only nearby, and there is an end to the pieces.
+class DistanceCertificate {
+ public:
+  DistanceCertificate(const FineMesh& mesh, TriangleOverlay& overlay) : mesh_(mesh), overlay_(overlay) {}
+
+  /// @param start a triangle of the mesh near the one that is asked about
+  /// @param bound bound(face): how near the triangle has to be to that of the mesh; it hears of every face that the proof
+  ///   rests on
+  /// @param covered told of triangles of the mesh that lie over this one as a whole, within their bounds
+  template <class Bound, class Covered>
+  bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, const Covered& covered) {
+    const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+    start = mesh_.walk(start, middle);
+    if (overlay_.is_near(triangle, mesh_, start, bound, covered)) return true;
+    pieces_left_ = kMostPieces;
+    return holds_in_pieces(triangle, start, bound, nullptr);
+  }
+
+ private:
+  /// A triangle of the mesh, and how near to it one has to be.
+  struct Face {
+    TriangleReach reach;
+    double within;
+    bool is_near(const Corners& piece) const {
+      return reach.near(piece[0], within) && reach.near(piece[1], within) && reach.near(piece[2], within);
+    }
+  };
+
+  /// @param last the one that was nearest to what the piece is cut from
+  template <class Bound>
+  bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound, const Face* last) {
+    if (last && last->is_near(piece)) return true;
+    if (--pieces_left_ < 0) return false;
+    const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0;
+    double squared;
+    const std::uint32_t found = mesh_.nearest_around(start, middle, squared);
+    const double distance = std::sqrt(squared), within = bound(found);
+    if (distance > within) return false;
+    double radius = 0;
+    for (const Eigen::Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
+    if (distance + radius <= within + kDistanceSlack) return true;
+    const Face face{TriangleReach(mesh_.corners(found)), within};
+    if (face.is_near(piece) || overlay_.is_near(piece, mesh_, found, bound)) return true;
+
+    int i = 0;
+    for (int side = 1; side < 3; ++side)
+      if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm()) i = side;
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const Eigen::Vector3d half = 0.5 * (piece[i] + piece[j]);
+    return holds_in_pieces({piece[i], half, piece[k]}, found, bound, &face) &&
+           holds_in_pieces({half, piece[j], piece[k]}, found, bound, &face);
+  }
+
+  static constexpr int kMostPieces = 512;
+
+  const FineMesh& mesh_;
+  TriangleOverlay& overlay_;
+  int pieces_left_ = 0;
+};
+
+}  // namespace hermesh

@@ -1,0 +1,115 @@
+#include "algorithms/extraction/certified_collapse/fine_mesh.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "algorithms/core/error.h"
+#include "algorithms/search/triangle_tree.h"
+
+namespace hermesh {
+
+namespace {
+
+/// Calls f(first, end) for ranges of the points, side by side. Each is to read all triangles for the sake of its own points:
+/// that is cheap, for they are read in order, and what is done about a point is done in the same order by any number of threads.
+template <class F>
+void for_each_range(std::size_t points, F&& f) {
+  constexpr std::size_t kLeast = 1 << 13;
+  const std::size_t threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t ranges = std::clamp<std::size_t>(points / kLeast, 1, threads);
+  tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t i) {
+    f(static_cast<std::uint32_t>(points * i / ranges), static_cast<std::uint32_t>(points * (i + 1) / ranges));
+  });
+}
+
+}  // namespace
+
+FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
+    : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
+  if (triangles_.size() > kNone / 3)
+    throw Error("the surface has " + std::to_string(triangles_.size()) +
+                " triangles, more than can be merged; use larger voxels or tolerance 0");
+  normals_.resize(triangles_.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles_.size(), 1024), [&](const auto& range) {
+    for (std::size_t t = range.begin(); t < range.end(); ++t) {
+      if (triangles_[t][0] == kNone) continue;
+      const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
+      normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
+    }
+  });
+  const auto for_each_corner = [&](std::uint32_t first, std::uint32_t end, auto&& f) {
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+      if (triangles_[t][0] != kNone)
+        for (const std::uint32_t p : triangles_[t])
+          if (p >= first && p < end) f(p, t);
+  };
+  for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
+    for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t) { ++first_[p + 1]; });
+  });
+  for (std::size_t p = 0; p < points_.size(); ++p) first_[p + 1] += first_[p];
+  around_.resize(first_.back());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
+    for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t t) { around_[next[p]++] = t; });
+  });
+}
+
+std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
+  constexpr int kMostSteps = 1000;
+  std::uint32_t before = triangle;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Corners c = corners(triangle);
+    const Eigen::Vector3d n = normals_[triangle].cast<double>();
+    int side = -1;
+    double farthest = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d edge = c[(i + 1) % 3] - c[i];
+      const double beyond = edge.cross(n).dot(p - c[i]), squared = edge.squaredNorm();
+      if (beyond > 0 && beyond * beyond > farthest * squared) {
+        farthest = beyond * beyond / squared;
+        side = i;
+      }
+    }
+    if (side < 0) return triangle;
+    const std::uint32_t next = across(triangle, side);
+    if (next == before || next == kNone) return triangle;
+    before = triangle;
+    triangle = next;
+  }
+  return triangle;
+}
+
+std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const {
+  constexpr int kMostSteps = 16;
+  constexpr double kNormalRounding = 1e-4;  // over the few voxels that p is away
+  squared = std::numeric_limits<double>::infinity();
+  const auto ask = [&](std::uint32_t t) {
+    const Corners c = corners(t);
+    // Most are ruled out by their boxes.
+    const Eigen::Vector3d below = c[0].cwiseMin(c[1]).cwiseMin(c[2]) - p, above = p - c[0].cwiseMax(c[1]).cwiseMax(c[2]);
+    if (below.cwiseMax(above).cwiseMax(0.0).squaredNorm() >= squared) return;
+    // Then by their planes; the normals are of single precision.
+    const double height = std::abs(normals_[t].cast<double>().dot(p - c[0])) - kNormalRounding;
+    if (height > 0 && height * height >= squared) return;
+    const double there = squared_distance(p, c[0], c[1], c[2]);
+    if (there < squared) squared = there, triangle = t;
+  };
+  ask(triangle);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const std::uint32_t from = triangle;
+    for (const std::uint32_t corner : triangles_[from])
+      for (const std::uint32_t t : around(corner))
+        if (t != from) ask(t);
+    if (triangle == from) break;
+  }
+  return triangle;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,166 @@
+#include "algorithms/extraction/certified_collapse/merge_proof.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "algorithms/extraction/certified_collapse/distance_certificate.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A torus of n x n quads, each cut in two; points by number i * n + j. Its tube is `tube` thick.
+FineMesh torus(int n, double ring = 20.0, double tube = 8.0) {
+  std::vector<Vector3d> points;
+  std::vector<Triangle> triangles;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double a = 2 * M_PI * i / n, b = 2 * M_PI * j / n, r = ring + tube * std::cos(b);
+      points.emplace_back(r * std::cos(a), r * std::sin(a), tube * std::sin(b));
+    }
+  const auto at = [n](int i, int j) { return static_cast<std::uint32_t>((i % n) * n + j % n); };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  return FineMesh(std::move(points), std::move(triangles));
+}
+
+MergeForest::Node set(std::uint32_t first, const Vector3d& place = Vector3d::Zero()) {
+  MergeForest::Node node;
+  node.first = first;
+  node.merges = true;
+  node.place = place;
+  return node;
+}
+
+/// A forest of pairs of points, each merged in its middle, moved outwards by `off`.
+MergeForest pairs(const FineMesh& fine, const std::vector<std::array<std::uint32_t, 2>>& of, double off = 0) {
+  std::vector<std::uint32_t> node_of(fine.points().size(), MergeForest::kNone);
+  std::vector<MergeForest::Node> nodes;
+  for (const auto& [p, q] : of) {
+    node_of[p] = node_of[q] = static_cast<std::uint32_t>(nodes.size());
+    const Vector3d outwards = fine.normal(fine.around(p).front()).cast<double>();
+    nodes.push_back(set(p, 0.5 * (fine.points()[p] + fine.points()[q]) + off * outwards));
+  }
+  return MergeForest(std::move(nodes), std::move(node_of));
+}
+
+TEST(MergeForest, SplitsIntoWhatWasJoined) {
+  // Points 0 to 5; {0, 1} and {2, 3}, then {0, 1} with {2, 3}, then that with 4.
+  constexpr std::uint32_t kNone = MergeForest::kNone;
+  MergeForest forest({set(0), set(2)}, {0, 0, 1, 1, kNone, kNone});
+  forest.join(2, set(0));
+  forest.join(4, set(0));
+  forest.settle();
+  for (std::uint32_t p = 0; p < 5; ++p) EXPECT_EQ(forest.set_of(p), 3u);
+  EXPECT_EQ(forest.set_of(5), kNone);
+  EXPECT_EQ(forest.members(3).size(), 5u);
+  EXPECT_EQ(forest.members(2).size(), 4u);
+  forest.split(3);
+  EXPECT_EQ(forest.set_of(3), 2u);
+  EXPECT_EQ(forest.set_of(4), kNone);
+  forest.split(2);
+  EXPECT_EQ(forest.leader(1), 0u);
+  EXPECT_EQ(forest.leader(3), 2u);
+  EXPECT_EQ(forest.set_of(1), 0u);
+}
+
+TEST(MergeProof, KeepsWhatIsNearAndTakesBackWhatIsNot) {
+  const FineMesh fine = torus(60);
+  RunContext context;
+  const std::vector<float> tolerance(fine.points().size(), 0.2f);
+  for (const double off : {0.0, 0.15, 0.3}) {
+    MergeForest forest = pairs(fine, {{0, 60}, {600, 601}}, off);
+    const MergedMesh merged = prove_merges(forest, fine, tolerance, context);
+    EXPECT_EQ(merged.mesh->points().size(), fine.points().size() - (off < 0.2 ? 2 : 0)) << off;
+  }
+}
+
+TEST(MergeProof, TakesBackWhatFailsWhateverErrorItClaims) {
+  const FineMesh fine = torus(60);
+  RunContext context;
+  const std::vector<float> tolerance(fine.points().size(), 0.2f);
+  for (const float error : {0.0f, -1.0f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    std::vector<std::uint32_t> node_of(fine.points().size(), MergeForest::kNone);
+    node_of[0] = node_of[60] = 0;
+    MergeForest::Node far = set(0, fine.points()[0] * 1.1);
+    far.error = error;
+    MergeForest forest({far}, std::move(node_of));
+    EXPECT_EQ(prove_merges(forest, fine, tolerance, context).mesh->points().size(), fine.points().size()) << error;
+  }
+}
+
+/// Six rings of six points about the tube: halves that become one make rings of two points, whose edges occur twice.
+TEST(MergeProof, TakesBackWhatChangesTheTopology) {
+  const FineMesh fine = torus(6);
+  RunContext context;
+  std::vector<MergeForest::Node> nodes;
+  std::vector<std::uint32_t> node_of(36, MergeForest::kNone);
+  for (std::uint32_t i = 0; i < 6; ++i)
+    for (const std::uint32_t half : {0u, 3u}) {
+      const auto n = static_cast<std::uint32_t>(nodes.size());
+      nodes.push_back(set(6 * i + half, fine.points()[6 * i + half]));
+      for (std::uint32_t j = 0; j < 3; ++j) node_of[6 * i + half + j] = n;
+    }
+  MergeForest forest(nodes, node_of);
+  const MergedMesh merged = sort_out_merges(forest, fine, context);
+  const FineMesh& mesh = *merged.mesh;
+  EXPECT_EQ(std::ssize(mesh.triangles()), 2 * std::ssize(mesh.points()));  // Euler characteristic 0
+  for (std::uint32_t p = 0; p < mesh.points().size(); ++p) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t t : mesh.around(p)) next.push_back(mesh.next(t, p));
+    std::sort(next.begin(), next.end());
+    EXPECT_EQ(std::adjacent_find(next.begin(), next.end()), next.end());
+  }
+}
+
+/// All of a closed surface in sets none of whose triangles has three: nothing would be left of it.
+TEST(MergeProof, BringsBackWhatHasVanished) {
+  const std::vector<Vector3d> points = {{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  const FineMesh fine(points, {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}});
+  RunContext context;
+  MergeForest forest({set(0, Vector3d(0.5, 0.5, 0.5)), set(2, Vector3d(-0.5, -0.5, -0.5))}, {0, 0, 1, 1, 0, 1});
+  const MergedMesh merged = prove_merges(forest, fine, std::vector<float>(6, 10.0f), context);
+  EXPECT_GE(merged.mesh->points().size(), 4u);
+  EXPECT_EQ(merged.mesh->triangles().size() + 4, 2 * merged.mesh->points().size());
+}
+
+/// A thin ring; a set at its outer rim that would go into its hole, through the other side.
+TEST(MergeProof, TakesBackWhatMeetsAnotherSheet) {
+  const FineMesh fine = torus(40, 20.0, 1.5);
+  RunContext context;
+  const std::vector<float> tolerance(fine.points().size(), 100.0f);
+  std::vector<std::uint32_t> node_of(fine.points().size(), MergeForest::kNone);
+  node_of[0] = node_of[40] = 0;  // at the outer rim, to within the hole
+  MergeForest forest({set(0, Vector3d(10, 0, 0))}, node_of);
+  EXPECT_EQ(prove_merges(forest, fine, tolerance, context).mesh->points().size(), fine.points().size());
+}
+
+/// The certificate has to fail before it is trusted.
+TEST(DistanceCertificate, SeesAPointThatIsTooFarAway) {
+  const FineMesh fine = torus(60);
+  for (const double off : {0.0, 0.19, 0.21}) {
+    std::vector<Vector3d> points = fine.points();
+    points[100] += off * fine.normal(fine.around(100).front()).cast<double>();
+    const FineMesh moved(points, fine.triangles());
+    TriangleOverlay over_moved(fine.triangles().size()), over_fine(fine.triangles().size());
+    int far = 0;
+    for (std::uint32_t t = 0; t < fine.triangles().size(); ++t) {
+      const auto bound = [](std::uint32_t) { return 0.2; };
+      const auto nothing = [](std::uint32_t) {};
+      far += !DistanceCertificate(moved, over_moved).holds(fine.corners(t), t, bound, nothing);
+      far += !DistanceCertificate(fine, over_fine).holds(moved.corners(t), t, bound, nothing);
+    }
+    EXPECT_EQ(far > 0, off > 0.205) << off;
+  }
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,71 @@
+// Sum of squared distances to planes, weighted by area (Garland & Heckbert 1997).
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "algorithms/extraction/certified_collapse/fine_mesh.h"
+
+namespace hermesh {
+
+/// Relative to an anchor that its owner keeps, so that single precision does.
+struct PlaneQuadric {
+  Eigen::Matrix<float, 6, 1> a = Eigen::Matrix<float, 6, 1>::Zero();  ///< xx xy xz yy yz zz
+  Eigen::Vector3f b = Eigen::Vector3f::Zero();
+  float c = 0;
+
+  /// A plane through the anchor.
+  void add_plane(const Eigen::Vector3d& unit_normal, double weight) {
+    const Eigen::Vector3f n = unit_normal.cast<float>();
+    const float w = static_cast<float>(weight);
+    a += w * Eigen::Matrix<float, 6, 1>(n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2], n[2] * n[2]);
+  }
+};
+
+/// Of the triangles around a point of a fine mesh, about that; each gives a third of its area to each of its corners.
+inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
+  PlaneQuadric quadric;
+  for (const std::uint32_t t : fine.around(point)) {
+    const Corners at = fine.corners(t);
+    const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
+    const double size = normal.norm();
+    if (size > 0) quadric.add_plane(normal / size, size / 6.0);
+  }
+  return quadric;
+}
+
+/// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to decide on a plane.
+inline constexpr double kPull = 1e-6;
+
+/// The same in double precision about any anchor, for one decision.
+struct WideQuadric {
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double c = 0;
+
+  /// Adds q, which is about an anchor that lies `shift` from this one's.
+  void add(const PlaneQuadric& q, const Eigen::Vector3d& shift) {
+    Eigen::Matrix3d m;
+    m << q.a[0], q.a[1], q.a[2], q.a[1], q.a[3], q.a[4], q.a[2], q.a[4], q.a[5];
+    const Eigen::Vector3d moved = m * shift, v = q.b.cast<double>();
+    a += m;
+    b += v - moved;
+    c += q.c - 2 * v.dot(shift) + shift.dot(moved);
+  }
+  double operator()(const Eigen::Vector3d& x) const { return std::max(0.0, x.dot(a * x) + 2 * b.dot(x) + c); }
+  PlaneQuadric about(const Eigen::Vector3d& x) const {
+    PlaneQuadric q;
+    q.a << float(a(0, 0)), float(a(0, 1)), float(a(0, 2)), float(a(1, 1)), float(a(1, 2)), float(a(2, 2));
+    q.b = (b + a * x).cast<float>();
+    q.c = static_cast<float>((*this)(x));
+    return q;
+  }
+  /// Minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which decides where planes do not.
+  Eigen::Vector3d minimiser() const {
+    const double weight = kPull * a.trace() + 1e-12;
+    return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b);
+  }
+};
+
+}  // namespace hermesh

@@ -1,0 +1,9 @@
+#include <immintrin.h>
+
+#include "algorithms/extraction/certified_octree/kernels/shell_kernels.h"
+
+namespace hermesh::shell_kernels::avx512 {
+
+#include "algorithms/extraction/certified_octree/kernels/shell_kernels.inc"
+
+}  // namespace hermesh::shell_kernels::avx512

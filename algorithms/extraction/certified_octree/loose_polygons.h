@@ -1,0 +1,75 @@
+// Polygons of a mesh that nothing but a test keeps from meeting others.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/contact/triangle_contact.h"
+#include "algorithms/extraction/contact/triangle_grid.h"
+
+namespace hermesh {
+
+/// A triangle, or a quad that is cut from its first corner to its third. (Without initialisers, so that many can be made
+/// without writing them twice.)
+struct NamedPolygon {
+  std::uint64_t name;  ///< no other polygon's
+  int corners;
+  std::array<std::uint32_t, 4> names;  ///< of the corners: those of the same name are the same point
+  std::array<Eigen::Vector3d, 4> points;
+  /// Corners around which triangles are known not to meet (polygon_stars.h), a bit each.
+  unsigned settled;
+};
+
+/// Which polygons meet another one in more than the corners and the edge that they share, or may do so, or
+/// themselves where they are quads.
+class LoosePolygons {
+ public:
+  /// @throws Cancelled
+  LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& context);
+
+  /// Of the polygons around, some that are near one another: with those that are tested among them, or
+  /// without. Safe to call for several lots at once.
+  void test_against(std::span<const NamedPolygon> polygons);
+  /// The places, in the list given, of those that meet what they were tested against; ascending.
+  std::vector<std::size_t> that_meet() const;
+
+ private:
+  /// Polygons by the cubes of a lattice that their boxes touch.
+  class ByPlace {
+   public:
+    ByPlace(std::span<const Box3> boxes, const RunContext& context);
+    /// Calls f(polygon, the cube) for those that share a cube with the box.
+    template <class F>
+    void for_each_near(const Box3& box, F&& f) const;
+
+   private:
+    struct Entry {
+      std::uint64_t place;
+      std::uint32_t polygon;
+      auto operator<=>(const Entry&) const = default;
+    };
+    LargeArray<Entry> entries_;  ///< ascending
+    struct Range {
+      std::uint64_t place;
+      std::uint32_t first, end;  ///< none if they are equal
+    };
+    std::size_t slot_of(std::uint64_t place) const;
+    std::vector<Range> ranges_;  ///< of each place's entries, found by hashing
+  };
+
+  struct Near;
+  void find_near(const Box3& box, Near& near) const;
+
+  LargeArray<NamedPolygon> polygons_;
+  std::vector<Box3> boxes_;  ///< theirs
+  ByPlace by_place_;
+  std::vector<std::uint8_t> meets_;  ///< by polygon
+};
+
+}  // namespace hermesh

@@ -1,0 +1,228 @@
+#include "algorithms/extraction/certified_octree/region_proof.h"
+
+#include <algorithm>
+#include <atomic>
+#include <numeric>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/certified_octree/region_cubes.h"
+#include "algorithms/extraction/certified_octree/widened_mask.h"
+
+namespace hermesh {
+namespace {
+
+constexpr BlockMask kAll = [] {
+  BlockMask mask;
+  mask.fill(~std::uint64_t{0});
+  return mask;
+}();
+
+void add(BlockMask& mask, const Region& region) {
+  for (int x = 0; x < region.side(); ++x)
+    mask[static_cast<std::size_t>((region.cell >> 6) + x)] |= rows_of(region.cell, region.side(), 0, 0);
+}
+
+bool overlap(const BlockMask& mask, const Region& region) {
+  for (int x = 0; x < region.side(); ++x)
+    if (mask[static_cast<std::size_t>((region.cell >> 6) + x)] & rows_of(region.cell, region.side(), 0, 0))
+      return true;
+  return false;
+}
+
+}  // namespace
+
+RegionProof::RegionProof(CellRegions& regions, UniformCells& uniform, RunContext& context)
+    : RegionProof(regions, nullptr, nullptr, &uniform, context) {}
+
+RegionProof::RegionProof(CellRegions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context)
+    : RegionProof(regions, &slabs, nullptr, &uniform, context) {}
+
+RegionProof::RegionProof(CellRegions& regions, const RegionShell& shell, RunContext& context)
+    : RegionProof(regions, nullptr, &shell, nullptr, context) {}
+
+RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionShell* shell,
+                         UniformCells* uniform, RunContext& context)
+    : regions_(regions),
+      cells_(regions.cells()),
+      slabs_(slabs),
+      shell_(shell),
+      uniform_(uniform),
+      context_(context),
+      bold_(cells_.size()),
+      any_bold_(cells_.size()),
+      changed_(filled(cells_.size(), kAll, context)),
+      fresh_(filled(cells_.size(), kAll, context)),
+      stirred_(filled(cells_.size(), kAll, context)),
+      open_(shell ? cells_.size() : 0),
+      loose_(slabs ? cells_.size() : 0) {
+  if (!slabs && !shell) return;
+  for (std::size_t b = 0; b < cells_.size(); ++b) {
+    const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
+    turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 |
+                                    ((lower[2] >> 3) & 1))]
+        .push_back(static_cast<std::uint32_t>(b));
+  }
+}
+
+std::size_t RegionProof::run() {
+  Stage stage(context_, "prove regions");
+  std::size_t splits = std::exchange(is_fresh_, false) ? 0 : split();  // what was called bold meanwhile
+  for (;;) {
+    if (uniform_) place_lone_points();
+    if (!slabs_ && !shell_) return splits;
+    if (slabs_) begin_slabs();
+    look_at_polygons();
+    if (slabs_) look_at_slabs();
+    const std::size_t now = split();
+    if (now == 0) return splits;
+    splits += now;
+  }
+}
+
+LargeArray<BlockMask> RegionProof::take_changed() {
+  return std::exchange(changed_, filled(cells_.size(), BlockMask{}, context_));
+}
+
+void RegionProof::place_lone_points() {
+  LargeArray<BlockMask> alone(cells_.size());
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    alone[b] = any(fresh_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
+  });
+  uniform_->place(alone, context_);
+}
+
+/// Calls f(cube) for those of a block that may have new polygons.
+template <class F>
+void RegionProof::for_each_touched(std::size_t b, F&& f) const {
+  if (!any(stirred_[b])) return;
+  regions_.for_each_cube(static_cast<std::int32_t>(b), [&](const Region& cube) {
+    if (overlap(stirred_[b], cube)) f(cube);
+  });
+}
+
+/// Of new cubes. Those beside them keep theirs, which still tell of polygons that are gone: so less is done
+/// anew.
+void RegionProof::begin_slabs() {
+  slabs_->make_room();
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    for_each_touched(b, [&](const Region& cube) {
+      if (overlap(fresh_[b], cube)) slabs_->begin(cube);
+    });
+  });
+}
+
+void RegionProof::look_at_polygons() {
+  // A cube has polygons in its own block and those next to it, and of these no two in one turn: what is
+  // split does not depend on threads.
+  for (const std::vector<std::uint32_t>& turn : turns_)
+    parallel_blocks(turn.size(), context_, [&](std::size_t i) { look_at_polygons(turn[i]); });
+}
+
+/// New ones, those not shown before, and loose ones that may touch new cubes.
+void RegionProof::look_at_polygons(std::size_t b) {
+  const auto block = static_cast<std::int32_t>(b);
+  const bool is_stirred = any(stirred_[b]);
+  const bool may_touch = slabs_ && (any(loose_[b][0]) || any(loose_[b][1]) || any(loose_[b][2])) &&
+                         std::ranges::any_of(cells_.source(block).neighbours, [&](std::int32_t there) {
+                           return there >= 0 && any(fresh_[static_cast<std::size_t>(there)]);
+                         });
+  const bool is_open = shell_ && (any(open_[b][0]) || any(open_[b][1]) || any(open_[b][2]));
+  if (!is_stirred && !may_touch && !is_open) return;
+  const std::array<BlockMask, 3> edges = regions_.merged_edges(block);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    BlockMask looked_at;
+    for (std::size_t word = 0; word < 8; ++word) {
+      looked_at[word] = edges[a][word] & (stirred_[b][word] | (shell_ ? open_[b][a][word] : 0));
+      if (slabs_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
+    }
+    if (slabs_)
+      for_each_bit(loose_[b][a], [&](int sample) {
+        const CellBlocks::Edge edge{block, sample, axis};
+        slabs_->add(polygon_of(regions_, edge, ring_of(regions_, edge)));
+      });
+    if (shell_) open_[b][a] = {};
+    for_each_bit(looked_at, [&](int sample) {
+      const CellBlocks::Edge edge{block, sample, axis};
+      const auto set = [&](BlockMask& mask) {
+        mask[static_cast<std::size_t>(sample >> 6)] |= std::uint64_t{1} << (sample & 63);
+      };
+      const RegionRing ring = ring_of(regions_, edge);
+      // Of a cube that is split anyway. Slabs want all polygons, and in any order.
+      if (shell_ && std::any_of(ring.regions.begin(), ring.regions.begin() + ring.corners,
+                                [&](const Region& region) { return region.merged() && is_bold(region); }))
+        return set(open_[b][a]);
+      const RegionPolygon polygon = polygon_of(regions_, edge, ring);
+      if (slabs_) {
+        slabs_->add(polygon);
+        if (polygon.loose) set(loose_[b][a]);
+      }
+      if (shell_ ? shell_->holds(polygon) : !polygon.loose || slabs_->holds(polygon)) return;
+      call_bold(ring.largest());
+      if (shell_) set(open_[b][a]);
+    });
+  }
+}
+
+void RegionProof::look_at_slabs() {
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    for_each_touched(b, [&](const Region& cube) {
+      if (!slabs_->holds(cube)) call_bold(cube);
+    });
+  });
+}
+
+void RegionProof::call_bold(const CellBlocks::Edge& edge) { call_bold(ring_of(regions_, edge).largest()); }
+
+void RegionProof::call_bold(const Region& cube) {
+  std::atomic_ref(any_bold_[static_cast<std::size_t>(cube.block)]).store(1, std::memory_order_relaxed);
+  std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
+      .fetch_or(std::uint64_t{1} << cube_of(cube.cell, cube.level), std::memory_order_relaxed);
+}
+
+bool RegionProof::is_bold(const Region& cube) {
+  const auto bits = std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
+                        .load(std::memory_order_relaxed);
+  return (bits >> cube_of(cube.cell, cube.level)) & 1;
+}
+
+/// How many cubes were split.
+std::size_t RegionProof::split() {
+  std::vector<std::uint32_t> splits(cells_.size());
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    fresh_[b] = {};
+    if (!std::exchange(any_bold_[b], 0)) return;
+    const auto block = static_cast<std::int32_t>(b);
+    std::vector<Region>& here = split_.local();
+    here.clear();
+    regions_.for_each_cube(block, [&](const Region& cube) {
+      if (is_bold(cube)) here.push_back(cube);
+    });
+    bold_[b] = {};
+    for (const Region& cube : here) {
+      regions_.split(cube);
+      add(fresh_[b], cube);
+    }
+    splits[b] = static_cast<std::uint32_t>(here.size());
+  });
+  const std::size_t all = std::reduce(splits.begin(), splits.end(), std::size_t{0});
+  if (all == 0) return 0;
+  regions_.propose_parts(context_);
+  parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    const auto& neighbours = cells_.source(static_cast<std::int32_t>(b)).neighbours;
+    stirred_[b] = {};
+    if (std::ranges::none_of(neighbours, [&](std::int32_t there) {
+          return there >= 0 && splits[static_cast<std::size_t>(there)] > 0;
+        }))
+      return;
+    stirred_[b] = widened<1>([&](int x, int y, int z) -> const BlockMask* {
+      const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(x, y, z))];
+      return there < 0 ? nullptr : &fresh_[static_cast<std::size_t>(there)];
+    });
+    for (std::size_t word = 0; word < 8; ++word) changed_[b][word] |= stirred_[b][word];
+  });
+  return all;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,152 @@
+#include "algorithms/extraction/certified_octree/shell_prism.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Of the angle between a pillar and the normal of a triangle at its foot.
+constexpr double kLeastCosine = 0.3;
+
+constexpr double kRounding = ShellPrism::kRounding;
+using Places = std::array<OverTriangle::Place, 3>;
+
+enum class Walls { outer, inner };
+
+/// Between which heights a triangle lies in a prism; nowhere if the first is the greater one.
+struct Extent {
+  double lowest = 1, highest = -1;
+  bool empty() const { return lowest > highest; }
+};
+
+/// Of the prism that is as wide, or as narrow, as the leans of a side's two pillars allow at each height:
+/// above the triangle's plane that is one plane, below it another. What reaches less than kRounding into it
+/// is not there.
+Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
+  Extent extent;
+  for (const double up : {1.0, -1.0}) {
+    Places places = triangle;
+    for (std::size_t side = 0; side < 3; ++side) {
+      const auto [least, most] = std::minmax(prism.leans()[side][0], prism.leans()[side][1]);
+      const double lean = (walls == Walls::outer) == (up > 0) ? most : least;
+      for (auto& place : places) place[static_cast<int>(side)] += kRounding - lean * place[3];
+    }
+    const ClippedTriangle part(places);
+    double nearest = prism.height(), farthest = -1;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(part.size); ++i) {
+      nearest = std::min(nearest, std::max(0.0, up * part.corners[i][3]));
+      farthest = std::max(farthest, up * part.corners[i][3]);
+    }
+    if (farthest < 0 || nearest >= prism.height()) continue;
+    const Extent there = up > 0 ? Extent{nearest, farthest} : Extent{-farthest, -nearest};
+    extent = extent.empty()
+                 ? there
+                 : Extent{std::min(extent.lowest, there.lowest), std::max(extent.highest, there.highest)};
+  }
+  return extent;
+}
+
+Places places_of(const ShellPrism& prism, const Corners& triangle) {
+  return {prism.over()(triangle[0]), prism.over()(triangle[1]), prism.over()(triangle[2])};
+}
+
+}  // namespace
+
+ShellPrism::ShellPrism(const Corners& corners, const std::array<Vector3d, 3>& pillars, double height)
+    : over_(corners), pillars_(pillars), height_(height) {
+  if (over_.degenerate()) return;
+  for (const Vector3d& pillar : pillars_)
+    if (!(pillar.dot(over_.normal()) >= kLeastCosine)) return;
+  for (std::size_t side = 0; side < 3; ++side)
+    for (std::size_t end = 0; end < 2; ++end) leans_[side][end] = lean(pillars_[(side + end) % 3], side);
+  lid_ = through(corners, height_);
+  bottom_ = through(corners, -height_);
+  bottom_.coeffs() = -bottom_.coeffs();
+  for (std::size_t i = 0; i < 3; ++i)
+    for (const double up : {height_, -height_}) box_.extend(corners[i] + up * pillars_[i]);
+  for (const Vector3d& pillar : pillars_) least_lid_ = std::min(least_lid_, pillar.dot(over_.normal()));
+  stands_ = is_unfolded(corners) && keeps_its_corners(corners);
+}
+
+double ShellPrism::beyond_wall(const OverTriangle::Place& place, std::size_t side) const {
+  return place[static_cast<int>(side)] - std::max(leans_[side][0] * place[3], leans_[side][1] * place[3]);
+}
+
+double ShellPrism::lean(const Vector3d& pillar, std::size_t side) const {
+  return over_.frame().axes.row(static_cast<int>(side)).dot(pillar) / pillar.dot(over_.normal());
+}
+
+/// The map from a point of the triangle and a height to a place turns nothing over: the triangle that the
+/// pillars make at any height faces up along each of them. A quadratic function of the height, bounded by its
+/// coefficients.
+bool ShellPrism::is_unfolded(const Corners& corners) const {
+  const Vector3d e = corners[1] - corners[0], f = corners[2] - corners[0];
+  const Vector3d de = pillars_[1] - pillars_[0], df = pillars_[2] - pillars_[0];
+  const Vector3d constant = e.cross(f), linear = e.cross(df) + de.cross(f), square = de.cross(df);
+  return std::ranges::all_of(pillars_, [&](const Vector3d& pillar) {
+    return constant.dot(pillar) - height_ * std::abs(linear.dot(pillar)) -
+               height_ * height_ * std::abs(square.dot(pillar)) >
+           kRounding * (e.squaredNorm() + f.squaredNorm());
+  });
+}
+
+/// No pillar leans over the wall opposite.
+bool ShellPrism::keeps_its_corners(const Corners& corners) const {
+  for (std::size_t i = 0; i < 3; ++i)
+    for (const double up : {height_, -height_})
+      if (!(beyond_wall(over_(corners[i] + up * pillars_[i]), (i + 1) % 3) < -kRounding)) return false;
+  return true;
+}
+
+ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
+  // Eigen's planes face those that see the points clockwise.
+  return Plane::Through(corners[0] + up * pillars_[0], corners[2] + up * pillars_[2],
+                        corners[1] + up * pillars_[1]);
+}
+
+Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
+  const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
+  const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
+  if ((lowest.array() > prism.box().max().array() + kRounding).any() ||
+      (highest.array() < prism.box().min().array() - kRounding).any())
+    return Meeting::none;
+  const Places places = places_of(prism, triangle);
+  // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are
+  // their sums: where one is positive at all corners, it is on all of the triangle. Sums tell of what is
+  // beyond an edge of the prism.
+  std::array<std::array<double, 3>, 5> beyond;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    for (std::size_t side = 0; side < 3; ++side)
+      beyond[side][corner] = prism.beyond_wall(places[corner], side);
+    beyond[3][corner] = prism.lid().signedDistance(triangle[corner]);
+    beyond[4][corner] = prism.bottom().signedDistance(triangle[corner]);
+  }
+  for (std::size_t side = 0; side < 3; ++side)
+    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kRounding; })) return Meeting::none;
+  const auto above = std::ranges::minmax(beyond[3]), below = std::ranges::minmax(beyond[4]);
+  if (above.min > kRounding || below.min > kRounding) return Meeting::none;
+  const Vector3d normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+  const bool faces =
+      std::ranges::all_of(prism.pillars(), [&](const Vector3d& pillar) { return normal.dot(pillar) > 0; });
+  if (faces && tolerance >= prism.height() && above.max < -kRounding && below.max < -kRounding)
+    return Meeting::good;
+  for (std::size_t i = 0; i < 5; ++i)
+    for (std::size_t j = i + 1; j < 5; ++j) {
+      const auto by = [&](std::size_t corner) { return beyond[i][corner] + beyond[j][corner]; };
+      if (std::min({by(0), by(1), by(2)}) > kRounding) return Meeting::none;
+    }
+  const Extent extent = extent_in(prism, places, Walls::outer);
+  if (extent.empty()) return Meeting::none;
+  const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kRounding;
+  return faces && extent.lowest >= -most && extent.highest <= most ? Meeting::good : Meeting::bad;
+}
+
+bool reaches_into(const ShellPrism& prism, const Corners& triangle) {
+  return !extent_in(prism, places_of(prism, triangle), Walls::inner).empty();
+}
+
+}  // namespace hermesh

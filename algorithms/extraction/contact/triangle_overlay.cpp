@@ -1,0 +1,72 @@
+#include "algorithms/extraction/contact/triangle_overlay.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+using Place = OverTriangle::Place;
+
+/// A part narrower than this, in voxels, counts as none.
+constexpr double kNarrow = 1e-9;
+/// Least cosine between a triangle and what covers it.
+constexpr double kFacing = 0.05;
+
+}  // namespace
+
+ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
+  std::array<Place, 24> before;
+  std::copy(triangle.begin(), triangle.end(), corners.begin());
+  size = 3;
+  for (int side = 0; side < 3 && size > 0; ++side) {
+    int outside = 0;
+    for (int i = 0; i < size; ++i) outside += corners[i][side] > 0;
+    if (outside == 0) continue;
+    const int n = std::exchange(size, 0);
+    std::copy_n(corners.begin(), n, before.begin());
+    for (int i = 0; i < n; ++i) {
+      const Place &a = before[i], &b = before[(i + 1) % n];
+      if (a[side] <= 0) corners[size++] = a;
+      if ((a[side] <= 0) != (b[side] <= 0)) corners[size++] = a + (a[side] / (a[side] - b[side])) * (b - a);
+    }
+  }
+}
+
+bool passes_over(const Place& from, const Place& to) {
+  double begin = 0, end = 1;
+  for (int i = 0; i < 3; ++i) {
+    if (from[i] >= -kNarrow && to[i] >= -kNarrow) return false;
+    if (from[i] > 0) begin = std::max(begin, from[i] / (from[i] - to[i]));
+    if (to[i] > 0) end = std::min(end, from[i] / (from[i] - to[i]));
+  }
+  return begin < end;
+}
+
+/// Whether the part over the triangle has some area, more than kNarrow from the sides: a part within that
+/// would have no side that passes_over(), and all else would be taken for covered. Seen along the triangle's
+/// normal, two of the distances beyond its sides are coordinates.
+bool TriangleOverlay::overlaps(std::array<Place, 3> places) {
+  for (Place& place : places) place.head<3>().array() += kNarrow;
+  const ClippedTriangle part(places);
+  double twice_area = 0;
+  for (int i = 1; i + 1 < part.size; ++i) {
+    const Place a = part.corners[i] - part.corners[0], b = part.corners[i + 1] - part.corners[0];
+    twice_area += a[0] * b[1] - a[1] * b[0];
+  }
+  constexpr double kNoArea = 1e-9;  // square voxels
+  return std::abs(twice_area) > kNoArea;
+}
+
+bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
+                                              const std::array<Place, 3>& places, double within) {
+  if (!(normal.cast<double>().dot(over.normal()) > kFacing)) return false;
+  const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
+  if (highest <= within) return true;
+  const ClippedTriangle part(places);
+  for (int i = 0; i < part.size; ++i)
+    if (!(std::abs(part.corners[i][3]) <= within)) return false;
+  return true;
+}
+
+}  // namespace hermesh

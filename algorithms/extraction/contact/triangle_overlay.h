@@ -1,0 +1,123 @@
+// Whether a triangle is near another surface as a whole, by laying that over it.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/extraction/contact/triangle_contact.h"
+
+namespace hermesh {
+
+/// Coordinates of places seen from a triangle, all of them affine: how far they lie beyond each of its three sides, along
+/// its plane, and how high above the plane.
+class OverTriangle {
+ public:
+  using Place = Eigen::Vector4d;  ///< beyond sides 0, 1, 2 (positive outside), height
+
+  explicit OverTriangle(const Corners& corners) {
+    const Eigen::Vector3d n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    const double size = n.norm();
+    normal_ = n / size;
+    axes_.row(3) = normal_;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d out = (corners[(i + 1) % 3] - corners[i]).cross(normal_);
+      axes_.row(i) = out / out.norm();
+    }
+    origin_ = corners[0];
+    offsets_.setZero();
+    offsets_[1] = axes_.row(1).dot(corners[1] - origin_);
+    degenerate_ = !axes_.allFinite();
+  }
+  bool degenerate() const { return degenerate_; }
+  const Eigen::Vector3d& normal() const { return normal_; }
+  Place operator()(const Eigen::Vector3d& p) const { return axes_ * (p - origin_) - offsets_; }
+
+  /// What that is computed from.
+  struct Frame {
+    const Eigen::Matrix<double, 4, 3>& axes;
+    const Eigen::Vector3d& origin;
+    const Place& offsets;
+  };
+  Frame frame() const { return {axes_, origin_, offsets_}; }
+
+ private:
+  Eigen::Matrix<double, 4, 3> axes_;
+  Eigen::Vector3d origin_, normal_;
+  Place offsets_;
+  bool degenerate_;
+};
+
+/// Part of a polygon over a triangle, by its corners: six at most, or more where rounding makes it not quite convex.
+struct ClippedTriangle {
+  std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles them
+  int size = 0;
+  explicit ClippedTriangle(const std::array<OverTriangle::Place, 3>& triangle);
+};
+
+/// Whether some of the segment lies above or below the inside of the triangle.
+bool passes_over(const OverTriangle::Place& from, const OverTriangle::Place& to);
+
+/// For one triangle after another that is laid over the same mesh.
+class TriangleOverlay {
+ public:
+  explicit TriangleOverlay(std::size_t faces) : seen_(faces) {}
+
+  /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther away than
+  /// `within(face)`, a double, says of the face that this lies in.
+  ///
+  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected, across every side
+  /// that passes over its inside. All of them face as t does. So the projection of their union onto t's inside is open; it
+  /// is closed, too, for no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are
+  /// largest at the part's corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
+  ///
+  /// `Mesh` has corners(face), normal(face) and across(face, side). `covered(face)` is told of faces that lie over t as a whole, no
+  /// farther away than within(face), whatever the answer is.
+  template <class Mesh, class Within, class Covered>
+  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Covered&& covered) {
+    const OverTriangle over(t);
+    if (over.degenerate()) return false;
+    if (++question_ == 0) std::fill(seen_.begin(), seen_.end(), 0), question_ = 1;
+    faces_.assign(1, start);
+    seen_[start] = question_;
+    while (!faces_.empty()) {
+      const std::uint32_t face = faces_.back();
+      faces_.pop_back();
+      const Corners corners = mesh.corners(face);
+      const std::array<OverTriangle::Place, 3> places = {over(corners[0]), over(corners[1]), over(corners[2])};
+      // All faces but the first were come to over the inside of t.
+      if (face == start && !overlaps(places)) return false;
+      if (!is_near_and_faces_alike(over, mesh.normal(face), places, within(face))) return false;
+      if (places[0].head<3>().maxCoeff() <= 0 && places[1].head<3>().maxCoeff() <= 0 && places[2].head<3>().maxCoeff() <= 0)
+        covered(face);
+      for (int i = 0; i < 3; ++i) {
+        if (!passes_over(places[i], places[(i + 1) % 3])) continue;
+        const std::uint32_t next = mesh.across(face, i);
+        if (next == Mesh::kNone) return false;
+        if (seen_[next] == question_) continue;
+        seen_[next] = question_;
+        faces_.push_back(next);
+      }
+    }
+    return true;
+  }
+
+  template <class Mesh, class Within>
+  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
+    return is_near(t, mesh, start, within, [](std::uint32_t) {});
+  }
+
+ private:
+  static bool overlaps(std::array<OverTriangle::Place, 3> places);
+  static bool is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
+                                      const std::array<OverTriangle::Place, 3>& places, double within);
+
+  std::vector<std::uint32_t> seen_, faces_;
+  std::uint32_t question_ = 0;
+};
+
+}  // namespace hermesh

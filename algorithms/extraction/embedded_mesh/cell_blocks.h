@@ -1,0 +1,254 @@
+// The cells of a lattice by block, with their sheets, points and edges by number.
+//
+// The lattice is that of Hermite data, or one whose inside is divided among several pieces
+// (algorithms/fracture/): then an edge is crossed, too, whose ends are both inside, but in different pieces.
+// Such an edge is a *cut*. A cell without a cut is as in Hermite data: the inside bits of its corners tell its
+// sheets. A cell with a cut is a *joint*. Most have one point, which all their crossing
+// edges share; for the others the lattice tells the sheets. Who makes such a lattice sees to it that the
+// pieces become manifold (fracture/label_repair.h).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/extraction/embedded_mesh/by_block.h"
+#include "algorithms/extraction/embedded_mesh/cell_sheets.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+/// Cells of a block whose sheets are not those of kCellSheets, ascending.
+using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
+
+/// What the cells are made from.
+class CellGrid {
+ public:
+  virtual ~CellGrid() = default;
+  /// Of a block whose `leaf` is −1 the signs are unknown, but one and the same.
+  virtual const HermiteView::Blocks& blocks() const = 0;
+  virtual const IndexToWorld& placement() const = 0;
+  /// Of an edge that is crossed.
+  virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
+  /// Of all of a block, by axis and then by sample. @param out room for as many, 1536 at most
+  virtual void crossings(std::int32_t block, EdgeCrossing* out) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(blocks()[static_cast<std::size_t>(block)].crossing[static_cast<std::size_t>(axis)],
+                   [&](int sample) { *out++ = crossing(block, sample, axis); });
+  }
+  /// By block and axis those crossing edges that are cuts; empty where there are none.
+  virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
+  /// By block the joints that have several sheets or an ambiguous face; empty where there are none.
+  virtual std::span<const SheetsOfBlock> joint_sheets() const { return {}; }
+  /// Whether the two inside corners of an ambiguous face without a cut are of one piece. If not, the face is
+  /// never cut so that they are joined across it.
+  virtual bool is_of_one_piece(std::int32_t /*block*/, int /*cell*/, int /*face*/) const { return true; }
+};
+
+class CellBlocks {
+ public:
+  /// (Without initialisers, so that many can be made without writing them twice.)
+  struct Block {
+    BlockMask inside;
+    BlockMask active;   ///< cells with a crossing edge, by their first corner
+    BlockMask joints;   ///< of these, those with a cut
+    BlockMask special;  ///< of these, joints and those of several sheets or with an ambiguous face
+    BlockMask joined;   ///< of the active ones, those with an ambiguous face whose inside is joined
+    std::uint32_t first_point, first_code;
+    std::array<std::uint32_t, 8> rank;  ///< active cells before each word
+  };
+  struct Edge {
+    std::int32_t block;
+    int sample, axis;
+  };
+  struct Cell {
+    std::int32_t block;
+    int cell;
+  };
+  /// The four cells around an edge, counter-clockwise seen against its axis: a quad's corners.
+  struct Around {
+    std::array<Cell, 4> cells;
+    std::array<std::uint32_t, 4> points;  ///< of the sheet that the edge belongs to
+    std::array<const CellSheets*, 4> sheets;
+    int axis;
+  };
+
+  /// @throws Error if margin() would leave crossings and points no room.
+  CellBlocks(const CellGrid& grid, RunContext& context);
+
+  /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
+  /// rounding to the file's precision moves none across. The mean of a loop's crossings may be as near as a third of it, and
+  /// a crossing is rounded off its edge, too; so it is eight times what rounding may do at the lattice's farthest corner, but
+  /// at least 1/1024, which is that up to 2048 voxels from the base.
+  double margin() const { return margin_; }
+
+  std::size_t size() const { return blocks_.size(); }
+  const Block& operator[](std::int32_t block) const { return blocks_[block]; }
+  const CellGrid& grid() const { return grid_; }
+  const HermiteView::Block& source(std::int32_t block) const { return source_[static_cast<std::size_t>(block)]; }
+  std::size_t point_count() const { return points_; }
+  std::size_t cell_count() const { return codes_.size(); }
+  /// Of an active cell, from 0, ascending by block and cell.
+  std::uint32_t cell_number(std::int32_t block, int cell) const {
+    return static_cast<std::uint32_t>(code_at(block, cell));
+  }
+  /// By corner the inside bits of all cells of a block.
+  std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
+  /// Inside bits of the corners of the cell of that number.
+  int corner_signs(std::uint32_t number) const { return codes_[number]; }
+
+  /// By the inside bits of the corners, but for those joints of which the lattice tells them. Of other joints
+  /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
+  /// it has one sheet (or none, all corners being inside) and no ambiguous face.
+  ///
+  /// On an ambiguous face the corners of one kind are cut off one by one and those of the other kind are joined. Which is
+  /// which the normals of its four crossings tell, so that edges and thin walls of either kind stay whole; without
+  /// normals, at joints, between two pieces and beside cells of which every other corner is inside it is the inside corners
+  /// that are cut off. So each sheet of a cell without a cut bounds one piece.
+  /// A face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons would meet
+  /// in the edge between the two cells' points. It is cut the other way, which parts each of the two sheets into two, and
+  /// closes a tunnel of less than a voxel or opens a wall of less than one.
+  const CellSheets& sheets(std::int32_t block, int cell) const {
+    if (const CellSheets* told = told_sheets(block, cell)) return *told;
+    if (test(blocks_[block].joined, cell)) return find(joined_sheets_[block], cell);
+    return kCellSheets[codes_[code_at(block, cell)]];
+  }
+  bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
+  /// Of an active cell's face. Only faces of joints are.
+  bool is_pinched(std::int32_t block, int cell, int face) const;
+  /// Points of an active cell.
+  int point_count(std::int32_t block, int cell) const {
+    return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
+  }
+  std::uint32_t point(std::int32_t block, int cell, int sheet) const;
+  /// How many active cells a block has.
+  std::uint32_t cells_in(std::int32_t block) const {
+    const auto next = static_cast<std::size_t>(block) + 1;
+    const std::size_t end = next < blocks_.size() ? blocks_[next].first_code : codes_.size();
+    return static_cast<std::uint32_t>(end) - blocks_[block].first_code;
+  }
+  /// How many points a block's cells have: those of its active cells' first sheets, ascending, and then those of all others.
+  std::uint32_t points_in(std::int32_t block) const {
+    const auto next = static_cast<std::size_t>(block) + 1;
+    const std::size_t end = next < blocks_.size() ? blocks_[next].first_point : points_;
+    return static_cast<std::uint32_t>(end) - blocks_[block].first_point;
+  }
+  /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
+  Eigen::Vector3d corner(std::int32_t block, int sample) const;
+  Cell locate(std::int32_t block, int x, int y, int z) const {
+    return {source_[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
+            sample_index(x & 7, y & 7, z & 7)};
+  }
+  /// Calls f(Cell) for the active cells at most so many steps from one along each axis, that one included.
+  template <class F>
+  void for_each_about(const Cell& cell, int steps, F&& f) const {
+    for (int x = -steps; x <= steps; ++x)
+      for (int y = -steps; y <= steps; ++y)
+        for (int z = -steps; z <= steps; ++z) {
+          const Cell at = locate(cell.block, (cell.cell >> 6) + x, ((cell.cell >> 3) & 7) + y, (cell.cell & 7) + z);
+          if (at.block >= 0 && test(blocks_[at.block].active, at.cell)) f(at);
+        }
+  }
+  Edge edge_of_cell(std::int32_t block, int cell, int edge) const;
+  bool is_crossed(const Edge& edge) const {
+    return edge.block >= 0 && test(source_[edge.block].crossing[edge.axis], edge.sample);
+  }
+  /// How many are crossed of so many edges of a block, up to 8, that follow one another in a line.
+  int crossings_on(const Edge& first, int length) const;
+  Eigen::Vector3d crossing_point(const Edge& edge) const {
+    return crossing_point(edge, grid_.crossing(edge.block, edge.sample, edge.axis));
+  }
+  Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
+  Around around(const Edge& edge) const;
+  /// One of the four cells around a crossing edge, in the order of around().
+  Cell cell_around(const Edge& edge, int i) const {
+    int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
+    at[(edge.axis + 1) % 3] += kAround[i][0];
+    at[(edge.axis + 2) % 3] += kAround[i][1];
+    return locate(edge.block, at[0], at[1], at[2]);
+  }
+
+  /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint,
+  /// has several sheets or an ambiguous face.
+  bool plain_points(const Edge& edge, std::array<std::uint32_t, 4>& points) const {
+    for (int i = 0; i < 4; ++i) {
+      const Cell cell = cell_around(edge, i);
+      const Block& block = blocks_[cell.block];
+      const std::size_t number = code_at(cell.block, cell.cell);
+      if (test(block.special, cell.cell)) return false;
+      points[i] = block.first_point + static_cast<std::uint32_t>(number - block.first_code);
+    }
+    return true;
+  }
+  /// Whether an active cell is no joint, has one sheet and no ambiguous face.
+  bool is_plain(std::int32_t block, int cell) const { return !test(blocks_[block].special, cell); }
+
+  /// Whether the surface is held to the segments of the face between cells i and i+1 around an edge.
+  bool is_explicit(const Around& around, int i) const {
+    return around.sheets[i]->sheets > 1 || around.sheets[(i + 1) % 4]->sheets > 1 ||
+           ((around.sheets[i]->ambiguous_faces >> face_after(around.axis, i)) & 1);
+  }
+  /// Of the segment that starts at the edge in that face.
+  Edge other_end(const Around& around, int i) const;
+  /// Whether any of the cell's faces is explicit.
+  bool has_explicit_face(std::int32_t block, int cell) const;
+  /// An order of edges that does not depend on blocks, so that of a segment's two ends one speaks for both.
+  bool comes_first(const Edge& a, const Edge& b) const;
+
+  template <class F>
+  void for_each_crossing_edge(std::int32_t block, F&& f) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(source_[block].crossing[axis], [&](int sample) { f(Edge{block, sample, axis}); });
+  }
+
+ private:
+  /// Cells around an edge, as steps along the two other axes.
+  static constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
+  /// The face of cell i that leads to cell i+1.
+  static constexpr int face_after(int axis, int i) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    return i == 0 ? 2 * u + 1 : i == 1 ? 2 * v + 1 : i == 2 ? 2 * u : 2 * v;
+  }
+  static constexpr int edge_in(int axis, int i) { return 4 * axis - kAround[i][0] - 2 * kAround[i][1]; }
+
+  std::size_t code_at(std::int32_t block, int cell) const {
+    const Block& b = blocks_[block];
+    const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
+    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
+  }
+  const CellSheets* told_sheets(std::int32_t block, int cell) const {
+    return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;
+  }
+  const CellSheets* find_told(std::int32_t block, int cell) const;
+  static const CellSheets& find(const SheetsOfBlock& list, int cell);
+  Cell beside(std::int32_t block, int cell, int face) const;
+  void cut_ambiguous_faces(RunContext& context);
+  bool normals_join(std::int32_t block, int cell, int face) const;
+  int joint_points(std::int32_t block, int cell) const {
+    const CellSheets* told = told_sheets(block, cell);
+    return told ? told->sheets : 1;
+  }
+  bool sign_of_added(const HermiteView::Block& block) const;
+  BlockMask cells_with_cuts(std::int32_t block) const;
+
+  static constexpr double kLargestMargin = 0.25;
+  double margin_for_rounding() const;
+
+  const CellGrid& grid_;
+  const HermiteView::Blocks& source_;  ///< the grid's blocks
+  const double margin_;
+  const std::span<const std::array<BlockMask, 3>> cuts_;
+  const std::span<const SheetsOfBlock> told_;
+  LargeArray<Block> blocks_;
+  ByBlock<SheetsOfBlock> joined_sheets_;  ///< of the cells that are `joined`
+  /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
+  ByBlock<std::vector<std::pair<std::uint16_t, std::uint16_t>>> several_;
+  std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
+  std::size_t points_ = 0;
+};
+
+}  // namespace hermesh

@@ -1,0 +1,30 @@
+// Points of the finest mesh that could not leave their cells by the rule of tetrahedra (uniform_mesh.h), moved one by one
+// where the mesh as it is shows that nothing meets.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/uniform_points.h"
+
+namespace hermesh {
+
+/// Where the point of a cell of one sheet, or of a joint, would rather be; index space relative to the placement's base.
+struct PointWish {
+  int cell;
+  Eigen::Vector3d place;
+  Eigen::Vector3d nearer;  ///< as good, but nearer to where the point is within its cell
+};
+
+/// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but is
+/// not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one another
+/// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already, and
+/// those of crowded cells, are passed over. The same result at any number of threads. @throws Cancelled
+void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
+                 const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
+                 UniformPoints& points, RunContext& context);
+
+}  // namespace hermesh

@@ -1,0 +1,143 @@
+// The triangles of the finest mesh near a place, found through the lattice, and whether two of them meet.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/contact/triangle_contact.h"
+#include "algorithms/extraction/contact/triangle_grid.h"
+#include "algorithms/extraction/embedded_mesh/uniform_points.h"
+
+namespace hermesh {
+
+/// How far any point may be from its cell along an axis, in voxels: so the polygons near a place are known.
+inline constexpr double kFarthestFromCell = 1.0;
+
+/// The triangles of a block are listed when somebody first asks for one of them, from any thread.
+class PolygonNeighbourhood {
+ public:
+  /// @param points by number, those on fanned edges included; they may move
+  /// @param farthest from its cell along an axis that any of them is or may be then
+  PolygonNeighbourhood(const CellBlocks& cells, const EdgePolygons& polygons, const UniformPoints& points,
+                       double farthest)
+      : cells_(cells),
+        polygons_(polygons),
+        points_(points),
+        reach_(1.0 + farthest + kRounding),
+        lists_(cells.size()) {}
+  ~PolygonNeighbourhood() { forget(); }
+  PolygonNeighbourhood(const PolygonNeighbourhood&) = delete;
+  PolygonNeighbourhood& operator=(const PolygonNeighbourhood&) = delete;
+
+  /// The polygons have changed.
+  void forget() {
+    for (auto& list : lists_) delete list.exchange(nullptr, std::memory_order_relaxed);
+  }
+
+  template <class F>
+  void for_each_triangle(const CellBlocks::Edge& edge, F&& f) const {
+    for (const Triangle& t : list_of(edge.block).triangles_of(number_of(edge))) f(t);
+  }
+
+  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than three voxels out
+  /// of the block. The triangles of an edge lie in the box of its four cells and `farthest` around it, so their edges
+  /// begin at most five samples outside the block.
+  template <class F>
+  void for_each_near(std::int32_t block, const Box3& box, F&& f) const {
+    const Eigen::Vector3d origin = cells_.corner(block, 0);
+    int first[3], last[3];
+    for (int a = 0; a < 3; ++a) {
+      first[a] = static_cast<int>(std::ceil(box.lower[a] - origin[a] - reach_));
+      last[a] = static_cast<int>(std::floor(box.upper[a] - origin[a] + reach_));
+    }
+    for (int x = first[0]; x <= last[0]; ++x)
+      for (int y = first[1]; y <= last[1]; ++y)
+        for (int z = first[2]; z <= last[2]; z = (z | 7) + 1)
+          for_each_in_row(block, x, y, z, std::min(last[2], z | 7), box, f);
+  }
+
+  Box3 box_of(const Triangle& t) const {
+    Box3 box;
+    for (const std::uint32_t p : t) box.add(points_[p]);
+    return box;
+  }
+
+  /// Whether it is certain that two triangles meet in nothing but the corners that they share.
+  bool apart(const Triangle& a, const Triangle& b) const { return certainly_apart(a, b, points_); }
+
+ private:
+  static constexpr double kRounding = 1e-3;  // far above that of points to the file's precision
+
+  /// The triangles of a block's crossing edges, by the number of the edge.
+  struct List {
+    std::vector<std::uint32_t> first;
+    std::vector<Triangle> triangles;
+    std::span<const Triangle> triangles_of(std::uint32_t edge) const {
+      return std::span(triangles).subspan(first[edge], first[edge + 1] - first[edge]);
+    }
+  };
+
+  /// Of those of its block, in the order of CellBlocks::for_each_crossing_edge().
+  std::uint32_t number_of(const CellBlocks::Edge& edge) const {
+    const auto& crossing = cells_.grid().blocks()[edge.block].crossing;
+    std::uint32_t before = 0;
+    for (int axis = 0; axis < edge.axis; ++axis) before += static_cast<std::uint32_t>(count(crossing[axis]));
+    return before + rank_in(crossing[edge.axis], edge.sample);
+  }
+
+  const List& list_of(std::int32_t block) const {
+    auto& slot = lists_[static_cast<std::size_t>(block)];
+    if (const List* list = slot.load(std::memory_order_acquire)) return *list;
+    auto made = std::make_unique<List>();
+    cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
+      made->first.push_back(static_cast<std::uint32_t>(made->triangles.size()));
+      if (!test(polygons_.edges(block, edge.axis), edge.sample)) return;
+      const auto add = [&](const Triangle& t) { made->triangles.push_back(t); };
+      polygons_.polygons_of(
+          edge,
+          [&](const Quad& q) {
+            add({q[0], q[1], q[2]});
+            add({q[0], q[2], q[3]});
+          },
+          add);
+    });
+    made->first.push_back(static_cast<std::uint32_t>(made->triangles.size()));
+    const List* before = nullptr;
+    if (slot.compare_exchange_strong(before, made.get(), std::memory_order_acq_rel)) return *made.release();
+    return *before;  // another thread has made the same meanwhile
+  }
+
+  /// Of crossing edges that begin at samples from z to `end` of one row of a block; a mask has eight bits of it.
+  template <class F>
+  void for_each_in_row(std::int32_t block, int x, int y, int z, int end, const Box3& box, F&& f) const {
+    const CellBlocks::Cell row = cells_.locate(block, x, y, z & ~7);
+    if (row.block < 0) return;
+    const unsigned wanted = (2u << (end & 7)) - (1u << (z & 7));
+    for (int axis = 0; axis < 3; ++axis) {
+      const BlockMask& crossing = cells_.grid().blocks()[row.block].crossing[axis];
+      auto bits = static_cast<unsigned>(crossing[row.cell >> 6] >> (row.cell & 63)) & wanted;
+      if (bits == 0) continue;
+      const List& list = list_of(row.block);
+      std::uint32_t number = number_of({row.block, row.cell + std::countr_zero(bits), axis});
+      for (; bits != 0; bits &= bits - 1, ++number)
+        for (const Triangle& t : list.triangles_of(number))
+          if (box.overlaps(box_of(t))) f(CellBlocks::Edge{row.block, row.cell + std::countr_zero(bits), axis}, t);
+    }
+  }
+
+  const CellBlocks& cells_;
+  const EdgePolygons& polygons_;
+  const UniformPoints& points_;
+  const double reach_;  ///< of an edge's triangles along an axis, from its first sample
+  mutable std::vector<std::atomic<const List*>> lists_;  ///< by block
+};
+
+}  // namespace hermesh

@@ -1,0 +1,34 @@
+// Cells of several sheets, and ambiguous faces, tried without the last resort of uniform_mesh.h.
+#pragma once
+
+#include <vector>
+
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/uniform_points.h"
+
+namespace hermesh {
+
+/// Puts the points of fanned edges behind those of the cells.
+void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
+                     UniformPoints& points, RunContext& context);
+
+/// Does that, and holds to their segments those cells of several sheets and
+/// beside ambiguous faces whose polygons, as they would be without, meet others (triangle_contact.h) or leave
+/// an edge with four polygons. Of polygons that meet the cells around their edges are held, and only if there
+/// are none cells farther away: in white noise one cell in a hundred is, where to hold all that lie among
+/// many of their kind took two in five.
+///
+/// Afterwards no two polygons meet: where no cell of an edge is tried, its polygons are those of
+/// uniform_mesh.h and its proof holds of any two; a polygon of another edge has been tested against all
+/// polygons nearby, as they are at the end.
+///
+/// Joints of several sheets are tried, too, but cannot be held. Returns those near polygons that still meet
+/// when nothing is left to be held, each once; nearly always none.
+/// @param farthest from its cell along an axis that any point is, voxels
+/// @throws Cancelled
+std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons,
+                                                   const FilePoints& file, UniformPoints& points,
+                                                   double farthest, RunContext& context);
+
+}  // namespace hermesh

@@ -1,0 +1,117 @@
+// The finest mesh of `manifold-dual-contouring`: closed, oriented, manifold and free of self-intersection, by construction
+// and, where that asks too much, by tests.
+//
+// **Why no two polygons meet** (index space; corners are lattice points). Give every cell a point strictly inside it, and
+// cut space into the tetrahedra of every lattice edge with the points of each two cells that share a face at that edge.
+// These fill space without overlap: a face is cut by the segment between its two cells' points into four triangles, and
+// the point of a cell sees the cell's boundary once. The same holds after points have moved as long as every tetrahedron
+// stays positively oriented (a piecewise linear map that is the identity far away and turns no tetrahedron over is a
+// homeomorphism), so a point may leave its cell for a sharp feature if its 24 tetrahedra allow it. The four tetrahedra of
+// a crossing edge are its *envelope*; two envelopes meet at most in the segments between points and in lattice corners.
+//
+//   plain edge     a quad of the four points; each of its two triangles lies in the envelope, which is checked
+//                  (Ju & Udeshi 2006, envelopes on an octree). One diagonal or the other nearly always does.
+//   fanned edge    else four triangles from the crossing itself, which is a point of the mesh then: each of them lies in
+//                  one tetrahedron.
+//   explicit face  where a cell has several sheets, or a face is ambiguous, the surface can be held to the straight segments
+//                  between the crossings on the faces (cell_sheets.h). Each sheet is a cone over its loop of segments,
+//                  from a point of the hull of the loop's crossings if there are several sheets: hulls of two loops never
+//                  meet, and a cone over a simple loop on a convex cell's boundary, from a point inside, is embedded.
+//                  This is the last resort where polygons of such cells without it meet others (sheet_trials.h), and is counted.
+//                  How an ambiguous face is cut the normals tell (CellBlocks::sheets()).
+//
+// Points that the tetrahedra keep within their cells, and would rather be elsewhere, are moved after that, one by one and
+// only where the mesh as it is then shows that nothing meets (late_moves.h).
+//
+// None of this asks what lies on the two sides of a crossing edge, so it holds, too, for a lattice whose inside
+// is divided among pieces (cell_blocks.h): the polygons of all pieces together, each seam between two pieces
+// once, meet at most in shared edges and points. A joint is never held itself; a face between a joint and a cell
+// that can be is without a cut, and the joint's part of the surface beside a segment on it is the triangle of it
+// and the joint's point, within the joint's tetrahedra at that face if it has one point. The polygons of joints
+// of several sheets are tested, and what meets others even when all else is held is named, so that the lattice
+// can be made anew with one sheet there.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
+#include "algorithms/extraction/embedded_mesh/cell_blocks.h"
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/uniform_points.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+/// What was met on the way to it.
+struct UniformCounts {
+  std::uint64_t cells = 0;           ///< that the surface passes through
+  std::uint64_t joints = 0;          ///< of these: with a cut (cell_blocks.h)
+  std::uint64_t several_sheets = 0;  ///< of these
+  std::uint64_t held = 0;            ///< of all: coned over explicit segments, the last resort
+  std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
+  std::uint64_t escaped = 0;         ///< points outside their cells
+  /// Joints of several sheets, by block and cell, whose polygons may meet others: no promise of the above holds
+  /// unless there are none.
+  std::vector<std::pair<std::int32_t, int>> meeting_joints;
+};
+
+struct UniformMesh {
+  std::vector<Eigen::Vector3d>
+      points;              ///< index space relative to the placement's base; FilePoints::rounded()
+  LargeArray<Quad> quads;  ///< abc and acd, counter-clockwise seen from outside, in index space
+  std::vector<Triangle> triangles;
+  UniformCounts counts;
+};
+
+/// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its
+/// cell: by kFarthestFromCell at most, whatever the options' reach.
+/// @throws Cancelled
+UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+                         RunContext& context);
+
+/// The uniform mesh of points that keep to their cells (`reach` is 0), made only where it is asked for.
+class UniformCells {
+ public:
+  UniformCells(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
+               RunContext& context);
+  ~UniformCells();
+
+  const CellBlocks& cells() const;
+  /// Those that were asked for; references to single ones last until more are.
+  const UniformPoints& points() const;
+  /// Of what was made so far.
+  const UniformCounts& counts() const;
+  /// The points of active cells, by block. @throws Cancelled
+  void place(std::span<const BlockMask> wanted, RunContext& context);
+  /// Those of all cells, which takes less time than if they were asked for one by one. Nothing has been
+  /// placed before. @throws Cancelled
+  void place_all(RunContext& context);
+  /// The polygons of crossing edges all of whose cells have their points, and the points on those that are
+  /// fanned.
+  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must
+  /// be among them, and those within two cells of one: else nothing is promised. They outlive the result.
+  /// @throws Cancelled
+  EdgePolygons connect(const EdgeMasks* edges, RunContext& context);
+
+ private:
+  struct Made;
+  std::unique_ptr<Made> made_;
+};
+
+/// The edge that each polygon belongs to, numbered by block, axis and sample among the crossing edges.
+struct PolygonEdges {
+  std::vector<std::uint32_t> quads, triangles;
+};
+
+/// The same of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the edge's second sample.
+UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
+                         RunContext& context, PolygonEdges* edges = nullptr);
+
+}  // namespace hermesh

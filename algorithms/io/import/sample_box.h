@@ -1,0 +1,28 @@
+// What the importers share: from where samples lie in a file to a grid. Heavy (Eigen): private to algorithms/import.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "algorithms/io/import/byte_source.h"
+#include "algorithms/io/import/import_volume.h"
+
+namespace hermesh {
+
+struct SampleBox {
+  std::string file;  ///< that holds the samples, for sentences
+  std::array<std::int64_t, 3> dims{};
+  SampleFormat format;
+  std::uint64_t offset = 0;  ///< of the first sample in the file
+  double slope = 1.0, intercept = 0.0;
+  Eigen::Matrix4d to_world = Eigen::Matrix4d::Identity();  ///< of columns: index coordinates to millimetres
+};
+
+/// Bytes that the samples take. @throws Error for dimensions below 1 or beyond what a grid's index can be, for more than
+/// `at_most` bytes in all, and for more memory than there is; nothing is allocated.
+std::uint64_t check_box(const SampleBox& box, std::uint64_t at_most);
+
+/// Reads the samples from the source, which stands at or before the first. @throws Error; Cancelled
+LevelSet read_box(ByteSource& source, const SampleBox& box, const ImportOptions& options, RunContext& context);
+
+}  // namespace hermesh

@@ -1,0 +1,349 @@
+#include "algorithms/io/mesh_file.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/core/polygon_cut.h"
+
+namespace hermesh {
+
+namespace mesh_formats {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> extensions = {".ply", ".obj", ".off", ".stl"};
+constexpr std::array<std::string_view, 4> names = {"PLY", "OBJ", "OFF", "STL"};
+
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// To the first word that is not in a comment.
+TextCursor to_first_word(std::string_view bytes) {
+  TextCursor cursor(bytes, "");
+  cursor.skip_to_word([](std::string_view) {});
+  return cursor;
+}
+
+/// The format that the content shows for certain, whatever the file is called.
+std::optional<Format> format_of_content(std::string_view bytes) {
+  if (is_binary_stl(bytes)) return Format::stl;
+  if (begins_like_ply(bytes)) return Format::ply;
+  TextCursor cursor = to_first_word(bytes);
+  const std::string_view word = cursor.word();
+  cursor.skip_blanks();
+  const bool is_off = parse_off_keyword(word).has_value();
+  if (is_off && cursor.word() == "BINARY") return Format::off;
+  // The 80 bytes of text with which a binary STL file begins say what they like.
+  if (without_padding(bytes.substr(0, 1000)).find('\0') != std::string_view::npos) return std::nullopt;
+  if (is_off) return Format::off;
+  if (lower(std::string(word)) == "solid") return Format::stl;
+  for (const char* keyword : {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"})
+    if (word == keyword) return Format::obj;
+  return std::nullopt;
+}
+
+/// As OFF files without their keyword do.
+bool begins_with_digit(std::string_view bytes) {
+  const char first = to_first_word(bytes).peek();
+  return first >= '0' && first <= '9';
+}
+
+bool is_utf16(std::string_view bytes) {
+  return bytes.size() >= 4 && ((bytes.starts_with("\xFF\xFE") && bytes[3] == '\0') ||
+                               (bytes.starts_with("\xFE\xFF") && bytes[2] == '\0'));
+}
+
+/// @throws Error where the content shows that the file is of another format than its name says.
+void check_format(std::string_view bytes, Format named, const std::string& file) {
+  const std::optional<Format> content = format_of_content(bytes);
+  const std::string is_named =
+      in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
+  if (content && *content != named) throw Error(is_named + " but holds " + std::string(name_of(*content)));
+  if (content) return;
+  if (is_utf16(bytes)) throw Error(in_quotes(file) + " is text in UTF-16; save it as UTF-8 or plain ASCII");
+  // An OBJ file may begin with any of dozens of words, a damaged binary STL file with any byte, and OFF files
+  // without their keyword exist.
+  if (named == Format::ply || (named == Format::off && !begins_with_digit(bytes)))
+    throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
+}
+
+}  // namespace
+
+std::string_view name_of(Format format) { return names[static_cast<std::size_t>(format)]; }
+
+std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
+  std::filesystem::path name = path.filename();
+  const bool gzipped = lower(name.extension().string()) == ".gz";
+  if (gzipped) name = name.stem();
+  const auto found = std::ranges::find(extensions, lower(name.extension().string()));
+  if (found == extensions.end()) return std::nullopt;
+  return MeshPath{static_cast<Format>(found - extensions.begin()), gzipped};
+}
+
+void throw_unknown_extension(const std::filesystem::path& path) {
+  throw Error(in_quotes(path.string()) +
+              " is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
+}
+
+namespace {
+
+/// The finaliser of splitmix64 (Steele, Lea & Flood 2014): every bit of a coordinate reaches every bit of the
+/// hash.
+std::uint64_t hash_of(const Eigen::Vector3d& point) {
+  std::uint64_t hash = 0;
+  for (const double x : point) {
+    hash += std::bit_cast<std::uint64_t>(x) + 0x9e3779b97f4a7c15u;
+    hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
+    hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
+    hash ^= hash >> 31;
+  }
+  return hash;
+}
+
+}  // namespace
+
+std::size_t PointMerger::slot_of(const Eigen::Vector3d& point, std::uint64_t hash) const {
+  std::size_t slot = hash & (slots_.size() - 1);
+  while (slots_[slot] != 0 && points_[slots_[slot] - 1] != point) slot = (slot + 1) & (slots_.size() - 1);
+  return slot;
+}
+
+void PointMerger::grow() {
+  slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    slots_[slot_of(points_[i], hash_of(points_[i]))] = static_cast<std::uint32_t>(i + 1);
+}
+
+std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
+  if (2 * points_.size() >= slots_.size()) grow();
+  const Eigen::Vector3d canonical = point.array() + 0.0;  // makes -0 to 0
+  const std::uint64_t hash = hash_of(canonical);
+  std::uint32_t& recent = recent_[hash & (recent_.size() - 1)];
+  if (recent != 0 && points_[recent - 1] == canonical) return recent - 1;
+  const std::size_t slot = slot_of(canonical, hash);
+  if (slots_[slot] == 0) {
+    points_.push_back(canonical);
+    slots_[slot] = static_cast<std::uint32_t>(points_.size());
+  }
+  recent = slots_[slot];
+  return recent - 1;
+}
+
+void MeshBuilder::fail_index(std::size_t polygon, std::int64_t corner) const {
+  fail("polygon " + std::to_string(polygon) + " refers to point " + std::to_string(corner) +
+       ", but there are " + std::to_string(mesh.points.size()) + " points (both count from 0)");
+}
+
+void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
+  const std::size_t polygon = polygons_++;
+  if (attributes_) attributes_->add_polygon(corners.size());
+  for (const std::int64_t corner : corners) {
+    if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
+    if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
+  }
+  const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(corners[i]); };
+  if (corners.size() < 3) {
+    ++dropped_;
+  } else if (corners.size() == 4) {
+    mesh.quads.push_back({at(0), at(1), at(2), at(3)});
+  } else {
+    if (corners.size() > 4) fans_.push_back({polygon, mesh.triangles.size(), corners.size()});
+    for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
+  }
+  if (!numbered_) return;
+  std::vector<std::uint32_t>& numbers = corners.size() == 4 ? numbers_of_quads_ : numbers_of_triangles_;
+  for (std::size_t i = 2; i < corners.size(); ++i) numbers.push_back(next_number_++);
+}
+
+void MeshBuilder::number_triangles() {
+  // Where one kind of polygon comes first, or is all there is, nothing is out of order.
+  if (numbers_of_quads_.empty() || numbers_of_quads_.front() == numbers_of_triangles_.size()) return;
+  mesh.triangle_numbers = std::move(numbers_of_triangles_);
+  mesh.triangle_numbers.insert(mesh.triangle_numbers.end(), numbers_of_quads_.begin(),
+                               numbers_of_quads_.end());
+}
+
+void MeshBuilder::cut_concave_polygons() {
+  std::size_t left = 0;
+  std::vector<std::uint32_t> numbers;
+  std::vector<Eigen::Vector3d> corners;
+  for (const Fan& fan : fans_) {
+    context_.check();
+    const std::span triangles = std::span(mesh.triangles).subspan(fan.first_triangle, fan.corners - 2);
+    numbers = {triangles[0][0], triangles[0][1]};
+    for (const Triangle& triangle : triangles) numbers.push_back(triangle[2]);
+    corners.clear();
+    for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
+    if (is_fan(corners)) continue;
+    std::vector<Triangle> cut = clip_ears(corners, context_);
+    left += cut.empty();
+    for (std::size_t i = 0; i < cut.size(); ++i)
+      triangles[i] = {numbers[cut[i][0]], numbers[cut[i][1]], numbers[cut[i][2]]};
+    if (attributes_ && !cut.empty()) attributes_->cut_polygon(fan.polygon, std::move(cut));
+  }
+  if (left > 0)
+    context_.note(in_quotes(file_) + ": " + std::to_string(left) +
+                  " concave polygons cross themselves; they were cut into fans, which may cover more than they do");
+}
+
+void MeshBuilder::add_comment(std::string_view text) {
+  TextCursor cursor(text, file_);
+  cursor.skip_space();
+  if (cursor.word() != "origin") return;
+  Eigen::Vector3d origin;
+  for (double& x : origin) {
+    cursor.skip_space();
+    // Somebody else's comment may happen to begin with the same word.
+    const std::optional<double> number = cursor.at_end() ? std::nullopt : cursor.number_if_any<double>();
+    if (!number) return;
+    x = *number;
+  }
+  cursor.skip_space();
+  if (cursor.at_end() && origin.allFinite()) mesh.origin = origin;
+}
+
+void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
+  std::vector<std::size_t> kept;
+  std::vector<std::uint32_t> numbers(mesh.points.size());
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    numbers[i] = static_cast<std::uint32_t>(kept.size());
+    if (left_out[i]) continue;
+    mesh.points[kept.size()] = mesh.points[i];
+    kept.push_back(i);
+  }
+  mesh.points.resize(kept.size());
+  const auto renumber = [&](auto& polygons) {
+    for (auto& polygon : polygons)
+      for (std::uint32_t& corner : polygon) corner = numbers[corner];
+  };
+  renumber(mesh.triangles);
+  renumber(mesh.quads);
+  if (attributes_) attributes_->keep_points(std::move(kept));
+}
+
+/// Points that no polygon uses must not stop the work, nor spoil what is computed of all points in single
+/// precision.
+void MeshBuilder::check_points() {
+  const auto fits = [](const Eigen::Vector3d& point) {
+    return (point.array().abs() <= double(std::numeric_limits<float>::max()))
+        .all();  // false for what is no number, too
+  };
+  if (std::ranges::all_of(mesh.points, fits)) return;
+  std::vector<bool> left_out;
+  for (const Eigen::Vector3d& point : mesh.points) left_out.push_back(!fits(point));
+  const auto keep = [&](const auto& polygons) {
+    for (const auto& polygon : polygons)
+      for (const std::uint32_t corner : polygon) left_out[corner] = false;
+  };
+  keep(mesh.triangles);
+  keep(mesh.quads);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    if (!left_out[i] && !mesh.points[i].allFinite())
+      fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
+  const auto count = std::ranges::count(left_out, true);
+  if (count == 0) return;
+  note(std::to_string(count) +
+       " points that no polygon uses were left out, because they have coordinates that are not "
+       "finite numbers in single precision");
+  leave_out_points(left_out);
+}
+
+MeshFile MeshBuilder::finish() {
+  if (mesh.points.size() > 0xffffffff) fail("it has more than 2^32 points");
+  if (largest_ >= static_cast<std::int64_t>(mesh.points.size())) fail_index(polygon_of_largest_, largest_);
+  if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
+  check_points();
+  number_triangles();
+  cut_concave_polygons();
+  if (dropped_ > 0)
+    context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
+                  " polygons with fewer than three corners were dropped");
+  if (attributes_) {
+    mesh.attributes = attributes_->finish(context_);
+    mesh.attributes_left_out = attributes_->has_left_out();
+  }
+  return std::move(mesh);
+}
+
+MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
+                    const ReadOptions& options) {
+  check_format(bytes, named, file);
+  MeshBuilder builder(file, context, options);
+  switch (named) {
+    case Format::ply:
+      read_ply(bytes, builder);
+      break;
+    case Format::obj:
+      read_obj(bytes, builder);
+      break;
+    case Format::off:
+      read_off(bytes, builder);
+      break;
+    case Format::stl:
+      read_stl(bytes, builder);
+      break;
+  }
+  return builder.finish();
+}
+
+}  // namespace mesh_formats
+
+bool is_mesh_path(const std::filesystem::path& path) {
+  return mesh_formats::parse_mesh_path(path).has_value();
+}
+
+MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
+  const Stage stage(context, "read");
+  const std::optional<mesh_formats::MeshPath> named = mesh_formats::parse_mesh_path(path);
+  if (!named && std::filesystem::is_regular_file(path)) mesh_formats::throw_unknown_extension(path);
+  const std::string bytes = mesh_formats::load_bytes(path, context);
+  return mesh_formats::parse_mesh(bytes, named->format, path.string(), context, options);
+}
+
+PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
+  MeshFile file = read_mesh_file(path, context, options);
+  return about_file(path.string(), [&] { return to_polygon_mesh(std::move(file)); });
+}
+
+PolygonMesh to_polygon_mesh(const MeshFile& file) { return to_polygon_mesh(MeshFile(file)); }
+
+PolygonMesh to_polygon_mesh(MeshFile&& file) {
+  Bounds box;
+  for (const Triangle& triangle : file.triangles)
+    for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
+  for (const Quad& quad : file.quads)
+    for (const std::uint32_t corner : quad) box.add(file.points[corner]);
+  PolygonMesh mesh;
+  mesh.origin = file.origin ? *file.origin : choose_origin(box);
+  mesh.triangles = std::move(file.triangles);
+  mesh.quads = std::move(file.quads);
+  mesh.attributes = std::move(file.attributes);
+  mesh.points.reserve(file.points.size());
+  for (const Eigen::Vector3d& point : file.points) {
+    const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();
+    if (!relative.allFinite())
+      throw Error("the mesh has coordinates that are too large for single precision; scale it down");
+    mesh.points.push_back(relative);
+  }
+  return mesh;
+}
+
+MeshFile to_mesh_file(const PolygonMesh& mesh) {
+  MeshFile file;
+  file.points.reserve(mesh.points.size());
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) file.points.push_back(mesh.world(i));
+  file.triangles = mesh.triangles;
+  file.quads = mesh.quads;
+  file.attributes = mesh.attributes;
+  // Left out only where it says nothing: at 0, which a reader would choose by itself.
+  if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
+    file.origin = mesh.origin;
+  return file;
+}
+
+}  // namespace hermesh

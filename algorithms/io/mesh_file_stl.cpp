@@ -1,0 +1,187 @@
+// STL (3D Systems 1988): triangles without shared points, as text or binary.
+#include <bit>
+
+#include "algorithms/io/mesh_file_formats.h"
+
+namespace hermesh::mesh_formats {
+
+namespace {
+
+constexpr std::size_t header_size = 84, triangle_size = 50;
+
+std::uint32_t little_endian_word(const char* at) {
+  std::uint32_t word;
+  std::memcpy(&word, at, sizeof word);
+  return std::endian::native == std::endian::big ? __builtin_bswap32(word) : word;
+}
+
+std::uint64_t declared_triangles(std::string_view bytes) { return little_endian_word(bytes.data() + 80); }
+
+class StlReader {
+ public:
+  StlReader(std::string_view bytes, MeshBuilder& builder)
+      : bytes_(bytes), builder_(builder), merger_(builder.mesh.points) {}
+
+  void read_binary() {
+    const std::uint64_t end = header_size + triangle_size * count_triangles();
+    builder_.mesh.triangles.reserve((end - header_size) / triangle_size);
+    for (std::size_t at = header_size; at < end; at += triangle_size) {
+      builder_.tick(at, bytes_.size());
+      for (std::size_t i = 0; i < 3; ++i) {
+        Eigen::Vector3d point;  // behind the normal, which is not used
+        for (std::size_t k = 0; k < 3; ++k)
+          point[static_cast<int>(k)] =
+              std::bit_cast<float>(little_endian_word(bytes_.data() + at + 12 + 12 * i + 4 * k));
+        add_corner(point);
+      }
+      end_polygon();
+    }
+  }
+
+  void read_text() {
+    TextCursor cursor(bytes_, builder_.file(), 0, '#');
+    const auto skip_space = [&] {
+      cursor.skip_to_word([this](std::string_view comment) { builder_.add_comment(comment); });
+    };
+    for (skip_space(); !cursor.at_end(); skip_space()) {
+      builder_.tick(cursor.offset(), bytes_.size());
+      const std::size_t start = cursor.offset();
+      const Keyword keyword = read_keyword(cursor);
+      if (keyword == Keyword::vertex) {
+        read_vertex(cursor);
+      } else if (keyword == Keyword::end_loop) {
+        end_polygon();
+      } else if (!corners_.empty()) {
+        cursor.fail_at(start, "a facet that does not end in 'endloop'");
+      } else if (keyword == Keyword::none) {
+        // Some programs put colours between the facets. Elsewhere it could be a corner that is lost, or
+        // another file.
+        if (solids_ == 0 || last_ == Keyword::outer || last_ == Keyword::end_solid)
+          cursor.fail_at(start, "a word that is no keyword of an STL file");
+        if (unknown_++ == 0) first_unknown_ = cursor.line_at(start);
+        cursor.rest_of_line();
+      } else if (keyword != Keyword::end_facet) {
+        cursor.rest_of_line();  // a name, or a normal, which is not used
+      }
+      solids_ += keyword == Keyword::solid || keyword == Keyword::facet;
+      last_ = keyword;
+    }
+    check_end();
+    builder_.note_padding(bytes_);
+  }
+
+ private:
+  enum class Keyword { none, solid, facet, outer, vertex, end_loop, end_facet, end_solid };
+
+  /// If the size of the file is that of a whole number of triangles, it decides: programs that write as they
+  /// go leave a count of 0 or −1, and others count wrong.
+  std::uint64_t count_triangles() {
+    if (bytes_.size() < header_size)
+      builder_.fail("the file is truncated: an STL file has at least 84 bytes");
+    const std::uint64_t declared = declared_triangles(bytes_),
+                        whole = (bytes_.size() - header_size) / triangle_size;
+    if (declared == whole && bytes_.size() == header_size + triangle_size * whole) return declared;
+    if (whole > 0 && bytes_.size() == header_size + triangle_size * whole) {
+      builder_.note("it declares " + std::to_string(declared) + " triangles but has the length of " +
+                    std::to_string(whole) + ", which were read; if there were more, it was cut off");
+      return whole;
+    }
+    if (whole < declared)
+      builder_.fail("the file is truncated: it has " + std::to_string(bytes_.size()) +
+                    " bytes, but a binary STL file of its declared number of triangles has " +
+                    std::to_string(header_size + triangle_size * declared));
+    const std::string_view rest = bytes_.substr(header_size + triangle_size * declared);
+    if (!without_padding(rest).empty())
+      builder_.fail("it declares " + std::to_string(declared) + " triangles, but " +
+                    std::to_string(rest.size()) +
+                    " bytes follow, which are not a whole number of triangles; the file is damaged");
+    builder_.note_padding(rest);
+    return declared;
+  }
+
+  void check_end() {
+    if (last_ != Keyword::end_solid && last_ != Keyword::end_facet)
+      builder_.fail("the file is truncated: it does not end in 'endsolid'");
+    if (last_ == Keyword::end_facet)
+      builder_.note("it does not end in 'endsolid'; if there was more than " + std::to_string(polygons_) +
+                    " facets, it was cut off");
+    if (unknown_ > 0)
+      builder_.note(std::to_string(unknown_) +
+                    " lines that do not belong into an STL file were passed over, the first is line " +
+                    std::to_string(first_unknown_));
+  }
+
+  static bool is(std::string_view word, std::string_view keyword) {
+    return std::equal(word.begin(), word.end(), keyword.begin(), keyword.end(),
+                      [](char a, char b) { return a == b || a == b - 'a' + 'A'; });
+  }
+
+  /// "end loop" is written for "endloop", too.
+  static Keyword read_keyword(TextCursor& cursor) {
+    constexpr std::pair<std::string_view, Keyword> keywords[] = {
+        {"vertex", Keyword::vertex},     {"facet", Keyword::facet},        {"outer", Keyword::outer},
+        {"endloop", Keyword::end_loop},  {"endfacet", Keyword::end_facet}, {"solid", Keyword::solid},
+        {"endsolid", Keyword::end_solid}};
+    const std::string_view word = cursor.word();
+    for (const auto& [name, keyword] : keywords)
+      if (is(word, name)) return keyword;
+    if (!is(word, "end")) return Keyword::none;
+    cursor.skip_blanks();
+    const std::string_view what = cursor.word();
+    return is(what, "loop")    ? Keyword::end_loop
+           : is(what, "facet") ? Keyword::end_facet
+           : is(what, "solid") ? Keyword::end_solid
+                               : Keyword::none;
+  }
+
+  void read_vertex(TextCursor& cursor) {
+    Eigen::Vector3d point;
+    for (double& x : point) {
+      cursor.skip_space();
+      x = cursor.number<double>("a number");
+    }
+    add_corner(point);
+  }
+
+  void add_corner(const Eigen::Vector3d& point) {
+    if (!point.allFinite())
+      builder_.fail("point " + std::to_string(corners_.size()) + " of triangle " + std::to_string(polygons_) +
+                    " (both count from 0) has a coordinate that is not a finite number");
+    corners_.push_back(merger_.add(point));
+  }
+
+  void end_polygon() {
+    builder_.add_polygon(corners_);
+    corners_.clear();
+    ++polygons_;
+  }
+
+  std::string_view bytes_;
+  MeshBuilder& builder_;
+  PointMerger merger_;
+  std::vector<std::int64_t> corners_;
+  std::size_t polygons_ = 0, solids_ = 0, unknown_ = 0, first_unknown_ = 0;
+  Keyword last_ = Keyword::none;
+};
+
+}  // namespace
+
+bool is_binary_stl(std::string_view bytes) {
+  return bytes.size() >= header_size &&
+         bytes.size() == header_size + triangle_size * declared_triangles(bytes);
+}
+
+/// Binary files that begin with "solid" exist, so that word alone does not decide. Text has no zero byte but
+/// as padding, and the count of a binary file has one.
+void read_stl(std::string_view bytes, MeshBuilder& builder) {
+  const auto has_zero = [](std::string_view part) { return part.find('\0') != std::string_view::npos; };
+  const bool text = !is_binary_stl(bytes) && !has_zero(without_padding(bytes).substr(0, 1000)) &&
+                    (bytes.size() < header_size || !has_zero(bytes.substr(0, header_size)));
+  StlReader reader(bytes, builder);
+  if (text)
+    reader.read_text();
+  else
+    reader.read_binary();
+}
+
+}  // namespace hermesh::mesh_formats

@@ -1,0 +1,359 @@
+// The writers of mesh_file.h.
+#include <zlib.h>
+
+#include <Eigen/Geometry>
+#include <bit>
+#include <cerrno>
+
+#include "algorithms/io/atomic_file.h"
+#include "algorithms/io/mesh_file_formats.h"
+
+namespace hermesh {
+
+namespace {
+
+using namespace mesh_formats;
+
+/// Collects bytes and hands them to zlib, which passes them through where the file is not compressed. A full
+/// disk shows in any of its calls, the last one included.
+class Output {
+ public:
+  Output(const std::filesystem::path& temporary, const std::filesystem::path& target, bool gzipped,
+         RunContext& context)
+      : target_(target.string()),
+        context_(context),
+        file_(gzopen(temporary.c_str(), gzipped ? "wb6" : "wbT")) {
+    if (!file_) fail();
+    gzbuffer(file_, 1 << 18);
+    buffer_.reserve(capacity + 4096);
+  }
+  ~Output() {
+    if (file_) gzclose(file_);
+  }
+  Output(const Output&) = delete;
+  Output& operator=(const Output&) = delete;
+
+  void text(std::string_view text) {
+    buffer_.append(text);
+    if (buffer_.size() >= capacity) flush();
+  }
+  /// Little-endian, whatever the machine.
+  template <class T>
+  void binary(T value) {
+    std::array<char, sizeof(T)> bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
+    if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
+    text({bytes.data(), bytes.size()});
+  }
+  /// The shortest text that reads back as the same number.
+  template <class T>
+  void number(T value) {
+    char digits[32];
+    text({digits, std::to_chars(digits, digits + sizeof digits, value).ptr});
+  }
+  void close() {
+    flush();
+    const gzFile file = std::exchange(file_, nullptr);
+    errno = 0;
+    if (gzclose(file) != Z_OK) fail();
+  }
+
+ private:
+  static constexpr std::size_t capacity = 1 << 20;
+
+  void flush() {
+    context_.check();
+    errno = 0;
+    if (!buffer_.empty() && gzwrite(file_, buffer_.data(), static_cast<unsigned>(buffer_.size())) <= 0)
+      fail();
+    buffer_.clear();
+  }
+  [[noreturn]] void fail() const {
+    throw Error("cannot write " + in_quotes(target_) +
+                (errno ? std::string(": ") + std::strerror(errno) : ""));
+  }
+
+  std::string target_;
+  RunContext& context_;
+  gzFile file_;
+  std::string buffer_;
+};
+
+void write_numbers(Output& out, std::string_view lead, const Eigen::Vector3d& numbers) {
+  out.text(lead);
+  for (const double x : numbers) {
+    out.text(" ");
+    out.number(x);
+  }
+  out.text("\n");
+}
+
+/// The nearest float. Volatile because GCC 12 drops the rounding from a vector's
+/// `.cast<float>().cast<double>()` when it vectorises straight-line code.
+Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& point) {
+  volatile float x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
+                 z = static_cast<float>(point.z());
+  return {x, y, z};
+}
+
+bool fits_single_precision(const MeshFile& mesh) {
+  for (const Eigen::Vector3d& point : mesh.points)
+    if (point != rounded_to_single(point)) return false;
+  return true;
+}
+
+/// An attribute of points as PLY's properties, by the names under which read_mesh_file() finds it again. Colours become
+/// bytes, which is what other programs read.
+struct PlyAttribute {
+  const MeshAttribute& attribute;
+  std::vector<std::string> properties;
+  bool bytes = false;
+};
+
+std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
+  const auto is = [&](const char* name, int least, int most) {
+    return attribute.name == name && attribute.components >= least && attribute.components <= most;
+  };
+  std::vector<std::string> names;
+  if (is("normal", 3, 3)) names = {"nx", "ny", "nz"};
+  if (is("colour", 3, 4)) names = {"red", "green", "blue", "alpha"};
+  if (is("uv", 2, 2)) names = {"u", "v"};
+  names.resize(static_cast<std::size_t>(attribute.components));
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!names[i].empty()) continue;
+    names[i] = attribute.name + (attribute.components == 1 ? "" : "_" + std::string(1, "xyzw"[i]));
+    std::ranges::replace_if(names[i], is_space, '_');
+  }
+  return names;
+}
+
+/// By the element that they are properties of. Of corners PLY as others read it has a place for texture coordinates alone.
+struct PlyAttributes {
+  std::vector<PlyAttribute> points, polygons;
+  const MeshAttribute* corner_uv = nullptr;
+};
+
+PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
+  PlyAttributes result;
+  const std::size_t polygons = mesh.triangles.size() + mesh.quads.size();
+  const std::array<std::size_t, 3> elements = {mesh.points.size(), 3 * mesh.triangles.size() + 4 * mesh.quads.size(),
+                                               polygons};
+  for (const MeshAttribute& attribute : mesh.attributes) {
+    const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
+    const bool fits = values == elements[static_cast<std::size_t>(attribute.domain)] *
+                                    static_cast<std::size_t>(attribute.components);
+    const bool uv = attribute.name == "uv" && attribute.components == 2 && attribute.values.index() == 0;
+    if (!fits || (attribute.domain == AttributeDomain::corner && !uv)) {
+      context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name + ", which was left out");
+      continue;
+    }
+    const bool bytes = attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
+    if (attribute.domain == AttributeDomain::corner)
+      result.corner_uv = &attribute;
+    else
+      (attribute.domain == AttributeDomain::point ? result.points : result.polygons)
+          .push_back({attribute, ply_properties(attribute), bytes});
+  }
+  return result;
+}
+
+void write_ply_value(Output& out, const PlyAttribute& from, std::size_t i) {
+  if (from.attribute.values.index() == 1) return out.binary(std::get<1>(from.attribute.values)[i]);
+  const float value = std::get<0>(from.attribute.values)[i];
+  if (!from.bytes) return out.binary(value);
+  out.binary(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f))));
+}
+
+void declare_ply_properties(Output& out, const std::vector<PlyAttribute>& attributes) {
+  for (const PlyAttribute& each : attributes)
+    for (const std::string& name : each.properties)
+      out.text(std::string("property ") + (each.bytes ? "uchar " : each.attribute.values.index() == 1 ? "int " : "float ") +
+               name + "\n");
+}
+
+void write_ply_values(Output& out, const std::vector<PlyAttribute>& attributes, std::size_t element) {
+  for (const PlyAttribute& each : attributes)
+    for (std::size_t j = 0; j < each.properties.size(); ++j)
+      write_ply_value(out, each, element * each.properties.size() + j);
+}
+
+void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attributes) {
+  const bool single = fits_single_precision(mesh);
+  const std::string type = single ? "float" : "double";
+  out.text("ply\nformat binary_little_endian 1.0\n");
+  if (mesh.origin) write_numbers(out, "comment origin", *mesh.origin);
+  out.text("element vertex " + std::to_string(mesh.points.size()) + "\n");
+  for (const char* axis : {" x\n", " y\n", " z\n"}) out.text("property " + type + axis);
+  declare_ply_properties(out, attributes.points);
+  out.text("element face " + std::to_string(mesh.triangles.size() + mesh.quads.size()) + "\n");
+  // Most programs know signed indices only.
+  out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\n"
+                                            : "property list uchar uint vertex_indices\n");
+  declare_ply_properties(out, attributes.polygons);
+  if (attributes.corner_uv) out.text("property list uchar float texcoord\n");
+  out.text("end_header\n");
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    for (const double x : mesh.points[i]) single ? out.binary(static_cast<float>(x)) : out.binary(x);
+    write_ply_values(out, attributes.points, i);
+  }
+  std::size_t number = 0, uv = 0;
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.binary(static_cast<std::uint8_t>(polygon.size()));
+      for (const std::uint32_t corner : polygon) out.binary(corner);
+      write_ply_values(out, attributes.polygons, number++);
+      if (!attributes.corner_uv) continue;
+      out.binary(static_cast<std::uint8_t>(2 * polygon.size()));
+      for (std::size_t i = 0; i < 2 * polygon.size(); ++i) out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+/// Text is read in double precision, so it is written in double precision: the few digits that would identify
+/// a float among floats are another double.
+void write_obj(Output& out, const MeshFile& mesh) {
+  if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
+  for (const Eigen::Vector3d& point : mesh.points) write_numbers(out, "v", point);
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.text("f");
+      for (const std::uint32_t corner : polygon) {
+        out.text(" ");
+        out.number(std::uint64_t(corner) + 1);
+      }
+      out.text("\n");
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+void write_off(Output& out, const MeshFile& mesh) {
+  out.text("OFF\n");
+  if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
+  out.text(std::to_string(mesh.points.size()) + " " +
+           std::to_string(mesh.triangles.size() + mesh.quads.size()) + " 0\n");
+  for (const Eigen::Vector3d& point : mesh.points) {
+    for (int axis = 0; axis < 3; ++axis) {
+      out.number(point[axis]);
+      out.text(axis < 2 ? " " : "\n");
+    }
+  }
+  const auto write_polygons = [&](const auto& polygons) {
+    for (const auto& polygon : polygons) {
+      out.number(polygon.size());
+      for (const std::uint32_t corner : polygon) {
+        out.text(" ");
+        out.number(corner);
+      }
+      out.text("\n");
+    }
+  };
+  write_polygons(mesh.triangles);
+  write_polygons(mesh.quads);
+}
+
+std::vector<bool> used_points(const MeshFile& mesh) {
+  std::vector<bool> used(mesh.points.size(), false);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) used[corner] = true;
+  for (const Quad& quad : mesh.quads)
+    for (const std::uint32_t corner : quad) used[corner] = true;
+  return used;
+}
+
+/// Says what STL cannot hold of this mesh.
+void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContext& context) {
+  const std::vector<bool> used = used_points(mesh);
+  std::size_t unused = 0, moved = 0;
+  double largest_shift = 0.0;
+  std::vector<Eigen::Vector3d> before, after;
+  PointMerger merge_before(before), merge_after(after);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    unused += !used[i];
+    if (!used[i]) continue;
+    const Eigen::Vector3d rounded = rounded_to_single(mesh.points[i]);
+    if (!rounded.allFinite())
+      throw Error("cannot write " + in_quotes(name) + ": a coordinate is too large for STL");
+    moved += rounded != mesh.points[i];
+    largest_shift = std::max(largest_shift, (rounded - mesh.points[i]).norm());
+    merge_before.add(mesh.points[i]);
+    merge_after.add(rounded);
+  }
+  if (moved > 0) {
+    char shift[32];
+    const std::string_view shift_text(
+        shift, std::to_chars(shift, shift + sizeof shift, largest_shift, std::chars_format::general, 3).ptr);
+    context.note(in_quotes(name) + ": STL has single precision only: " + std::to_string(moved) +
+                 " points moved, by at most " + std::string(shift_text) + ", and " +
+                 std::to_string(before.size() - after.size()) + " became equal to another");
+  }
+  if (unused > 0)
+    context.note(in_quotes(name) + ": STL holds triangles only: " + std::to_string(unused) +
+                 " points that no polygon uses were left out");
+}
+
+void write_stl_triangle(Output& out, const std::array<Eigen::Vector3d, 3>& corners) {
+  const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const double length = across.norm();
+  const bool degenerate = !(length > 0.0 && std::isfinite(length));
+  for (const double x : across) out.binary(degenerate ? 0.0f : static_cast<float>(x / length));
+  for (const Eigen::Vector3d& corner : corners)
+    for (const double x : corner) out.binary(static_cast<float>(x));
+  out.binary(std::uint16_t(0));
+}
+
+void write_stl(Output& out, const MeshFile& mesh) {
+  if (mesh.triangle_count() > 0xffffffff) throw Error("an STL file cannot hold more than 2^32 triangles");
+  std::string header = "binary STL";
+  header.resize(80, ' ');
+  out.text(header);
+  out.binary(static_cast<std::uint32_t>(mesh.triangle_count()));
+  const auto write = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    write_stl_triangle(out, {rounded_to_single(mesh.points[a]), rounded_to_single(mesh.points[b]),
+                             rounded_to_single(mesh.points[c])});
+  };
+  for (const auto& [a, b, c] : mesh.triangles) write(a, b, c);
+  for (const auto& [a, b, c, d] : mesh.quads) {
+    write(a, b, c);
+    write(a, c, d);
+  }
+}
+
+void check_mesh(const std::string& name, const MeshFile& mesh) {
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    if (!mesh.points[i].allFinite())
+      throw Error("cannot write " + in_quotes(name) + ": point " + std::to_string(i) + " is not finite");
+}
+
+}  // namespace
+
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
+  const Stage stage(context, "write");
+  const std::optional<MeshPath> named = parse_mesh_path(path);
+  if (!named) throw_unknown_extension(path);
+  const MeshFile file = to_mesh_file(mesh);
+  check_mesh(path.string(), file);
+  if (named->format == Format::stl) note_losses_of_stl(path.string(), file, context);
+  AtomicFile aside(path);
+  Output out(aside.path(), path, named->gzipped, context);
+  switch (named->format) {
+    case Format::ply:
+      write_ply(out, file, ply_attributes(file, path.string(), context));
+      break;
+    case Format::obj:
+      write_obj(out, file);
+      break;
+    case Format::off:
+      write_off(out, file);
+      break;
+    case Format::stl:
+      write_stl(out, file);
+      break;
+  }
+  out.close();
+  aside.commit();
+}
+
+}  // namespace hermesh

@@ -1,0 +1,411 @@
+#include "algorithms/io/vdb_structure.h"
+
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/GridDescriptor.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "algorithms/core/error.h"
+#include "algorithms/core/shown.h"
+
+namespace hermesh {
+namespace {
+
+namespace fs = std::filesystem;
+using openvdb::Coord;
+using openvdb::io::GridDescriptor;
+
+constexpr std::string_view kHalfSuffix = "_HalfFloat";
+constexpr char kSeparator = '\x1e';  ///< between a grid's name and its number, see io/GridDescriptor.cc
+
+/// How the values of a tree lie in a file and in memory.
+struct ValueLayout {
+  std::uint32_t bytes = 0;       ///< of a value
+  std::uint32_t half_bytes = 0;  ///< where reals are saved with half precision; 0: no reals, never halved
+  enum class Leaf { values, truths, mask } leaf = Leaf::values;
+};
+
+const ValueLayout* layout_of(const std::string& type) {
+  using Leaf = ValueLayout::Leaf;
+  static const std::map<std::string, ValueLayout> known = {{"bool", {1, 0, Leaf::truths}},
+                                                           {"mask", {1, 0, Leaf::mask}},
+                                                           {"float", {4, 2, Leaf::values}},
+                                                           {"double", {8, 2, Leaf::values}},
+                                                           {"int32", {4, 0, Leaf::values}},
+                                                           {"int64", {8, 0, Leaf::values}},
+                                                           {"vec3i", {12, 0, Leaf::values}},
+                                                           {"vec3s", {12, 6, Leaf::values}},
+                                                           {"vec3d", {24, 6, Leaf::values}},
+                                                           {"hermite_float", {52, 0, Leaf::values}},
+                                                           {"hermite_directed", {12, 0, Leaf::values}},
+                                                           {"hermite_thesis", {10, 0, Leaf::values}},
+                                                           {"hermite_fixed", {10, 0, Leaf::values}}};
+  const std::string prefix = "Tree_", suffix = "_5_4_3";
+  if (!type.starts_with(prefix) || !type.ends_with(suffix) || type.size() < prefix.size() + suffix.size()) return nullptr;
+  const auto found = known.find(type.substr(prefix.size(), type.size() - prefix.size() - suffix.size()));
+  return found == known.end() ? nullptr : &found->second;
+}
+
+/// Blosc's header: version, format, flags, size of an item; then 32 bits each for the bytes unpacked, of a block, and packed.
+void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked) {
+  file.need(packed);
+  const std::string header = file.ahead(16);
+  if (packed < 16 || header.size() < 16) file.damaged("a block of packed values is too short");
+  std::array<std::uint32_t, 3> sizes;
+  std::memcpy(sizes.data(), header.data() + 4, sizeof sizes);
+  // OpenVDB fills what is shorter up to this length before it packs it, and reads into as much.
+  constexpr std::uint64_t kLeast = 128;
+  if (sizes[0] > std::max(unpacked, kLeast) || sizes[2] > packed) file.damaged("a block of packed values is not as long as it says");
+}
+
+/// What OpenVDB keeps for reading leaves later: their number, masks and packed sizes (io/DelayedLoadMetadata.cc).
+void check_delayed_load(BoundedFile& file) {
+  const std::uint64_t leaves = file.number<std::uint32_t>();
+  const auto list = [&](std::uint64_t bytes, std::uint64_t item_bytes) {
+    if (bytes > 0) check_blosc(file, bytes, leaves * item_bytes);
+    file.skip(bytes > 0 ? bytes : leaves * item_bytes);
+  };
+  list(file.number<std::uint32_t>(), 1);
+  const std::uint32_t sizes = file.number<std::uint32_t>();
+  if (sizes != ~std::uint32_t{0}) list(sizes, 8);
+}
+
+/// Steps over metadata. @returns their bytes, count and all
+std::string checked_metadata(BoundedFile& file) {
+  const std::uint64_t start = file.position();
+  for (std::uint32_t left = file.number<std::uint32_t>(); left > 0; --left) {
+    file.text();
+    const std::string type = file.text();
+    const std::uint32_t bytes = file.number<std::uint32_t>();
+    file.need(bytes);
+    const std::uint64_t end = file.position() + bytes;
+    if (type == "__delayedload") {
+      if (bytes > 0) check_delayed_load(file);
+      if (file.position() > end) file.damaged("its metadata are longer than they say");
+    } else if (type != "string" && openvdb::Metadata::isRegisteredType(type)) {
+      // OpenVDB reads what the type takes, whatever the file says.
+      if (openvdb::Metadata::createMetadata(type)->size() != bytes) file.damaged("its metadata are not as long as they say");
+    }
+    file.seek(end);
+  }
+  const std::uint64_t end = file.position();
+  file.seek(start);
+  std::string bytes = file.ahead(end - start);
+  file.seek(end);
+  return bytes;
+}
+
+/// Steps over a transform (math/Maps.h).
+void check_transform(BoundedFile& file) {
+  static const std::map<std::string, std::uint64_t> affine = {{"AffineMap", 128},
+                                                              {"UnitaryMap", 128},
+                                                              {"ScaleMap", 120},
+                                                              {"UniformScaleMap", 120},
+                                                              {"TranslationMap", 24},
+                                                              {"ScaleTranslateMap", 144},
+                                                              {"UniformScaleTranslateMap", 144}};
+  std::string type = file.text();
+  if (type == "NonlinearFrustumMap") {
+    file.skip(8 * sizeof(double));  // its box, taper and depth
+    type = file.text();
+  }
+  const auto found = affine.find(type);
+  if (found == affine.end()) file.damaged("it has a transform of an unknown kind, '" + shown(type, 30) + "'");
+  file.skip(found->second);
+}
+
+int count_bits(const std::uint64_t* words, int count) {
+  int bits = 0;
+  for (int i = 0; i < count; ++i) bits += std::popcount(words[i]);
+  return bits;
+}
+
+/// Steps over a tree of the usual configuration: nodes of 32³ and 16³ children, and leaves of 8³ values.
+class TreeWalk {
+ public:
+  TreeWalk(BoundedFile& file, const ValueLayout& layout, std::uint32_t compression, bool halved)
+      : file_(file),
+        layout_(layout),
+        compression_(compression),
+        value_bytes_(halved && layout.half_bytes > 0 ? layout.half_bytes : layout.bytes),
+        halved_(halved && layout.half_bytes > 0) {}
+
+  /// @returns bytes that the tree takes in memory
+  double walk() {
+    if (file_.number<std::int32_t>() != 1) file_.damaged("its tree has several buffers");
+    file_.skip(layout_.bytes);  // the background
+    const std::uint32_t tiles = file_.number<std::uint32_t>(), children = file_.number<std::uint32_t>();
+    std::set<Coord> places;
+    openvdb::CoordBBox box;
+    const auto place = [&] {
+      const auto at = file_.number<std::array<std::int32_t, 3>>();
+      const Coord lower(at[0], at[1], at[2]);
+      for (const std::int32_t index : at)
+        if (index % kUpperDim != 0 || index < -kLargestIndex - kUpperDim || index > kLargestIndex)
+          file_.damaged("a node lies where none can be");
+      box.expand(lower);
+      // The number of samples across must be a whole number of 32 bits, too.
+      for (int axis = 0; axis < 3; ++axis)
+        if (std::int64_t{box.max()[axis]} - box.min()[axis] > 2LL * kLargestIndex - 2 * kUpperDim)
+          file_.damaged("its nodes lie too far apart");
+      if (!places.insert(lower).second) file_.damaged("two nodes lie at one place");
+      return lower;
+    };
+    for (std::uint32_t i = 0; i < tiles; ++i) {
+      place();
+      file_.skip(layout_.bytes);
+      if (file_.number<std::uint8_t>() > 1) file_.damaged("a tile is neither active nor inactive");
+    }
+    for (std::uint32_t i = 0; i < children; ++i) {
+      const Coord lower = place();
+      leaves_ = &leaves_of_[lower];
+      node<5>(lower);
+    }
+    // The values of leaves follow in the order of the tree, which is not that of the file.
+    for (const auto& [lower, leaves] : leaves_of_)
+      for (const Leaf& leaf : leaves) values_of(leaf);
+    return memory_;
+  }
+
+ private:
+  struct Leaf {
+    Coord lower;
+    int active;
+  };
+  static constexpr std::int32_t kUpperDim = 4096, kLargestIndex = 1 << 30;
+  static constexpr std::uint64_t kLeafMask = 64, kPerLeaf = 512;
+
+  template <int kLog2>
+  void node(const Coord& lower) {
+    constexpr int kSlots = 1 << (3 * kLog2), kWords = kSlots / 64, kChildDim = kLog2 == 5 ? 128 : 8;
+    std::vector<std::uint64_t> children(kWords), active(kWords);
+    file_.read(children.data(), kSlots / 8);
+    file_.read(active.data(), kSlots / 8);
+    for (int i = 0; i < kWords; ++i)
+      if (children[i] & active[i]) file_.damaged("a place in its tree is both a node and an active tile");
+    values(kSlots, count_bits(active.data(), kWords), kSlots / 8);
+    memory_ += double(kSlots) * std::max<double>(8, layout_.bytes) + kSlots / 4;
+    for (int word = 0; word < kWords; ++word)
+      for (std::uint64_t left = children[word]; left != 0; left &= left - 1) {
+        const int slot = 64 * word + std::countr_zero(left), mask = (1 << kLog2) - 1;
+        const Coord there = lower.offsetBy(kChildDim * (slot >> (2 * kLog2)), kChildDim * (slot >> kLog2 & mask),
+                                           kChildDim * (slot & mask));
+        if constexpr (kLog2 == 5)
+          node<4>(there);
+        else
+          leaf(there);
+      }
+  }
+
+  void leaf(const Coord& lower) {
+    const auto mask = file_.number<std::array<std::uint64_t, 8>>();
+    leaves_->push_back({lower, count_bits(mask.data(), 8)});
+    memory_ += 100 + double(layout_.leaf == ValueLayout::Leaf::values ? kPerLeaf * layout_.bytes : kLeafMask);
+  }
+
+  void values_of(const Leaf& leaf) {
+    file_.skip(kLeafMask);
+    if (layout_.leaf == ValueLayout::Leaf::values) return values(kPerLeaf, leaf.active, kLeafMask);
+    // OpenVDB puts such a leaf where the file says, wherever its node is.
+    const auto at = file_.number<std::array<std::int32_t, 3>>();
+    if (Coord(at[0], at[1], at[2]) != leaf.lower) file_.damaged("a leaf says that it lies elsewhere");
+    if (layout_.leaf == ValueLayout::Leaf::truths) file_.skip(kLeafMask);
+  }
+
+  /// As readCompressedValues() of io/Compression.h.
+  void values(std::uint64_t count, int active, std::uint64_t mask_bytes) {
+    using namespace openvdb::io;
+    const int kept = file_.number<std::int8_t>();
+    if (kept < NO_MASK_OR_INACTIVE_VALS || kept > NO_MASK_AND_ALL_VALS) file_.damaged("a node packs its values in an unknown way");
+    if (kept == NO_MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_ONE_INACTIVE_VAL) file_.skip(layout_.bytes);
+    if (kept == MASK_AND_TWO_INACTIVE_VALS) file_.skip(2 * layout_.bytes);
+    if (kept == MASK_AND_NO_INACTIVE_VALS || kept == MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_TWO_INACTIVE_VALS)
+      file_.skip(mask_bytes);
+    if ((compression_ & COMPRESS_ACTIVE_MASK) && kept != NO_MASK_AND_ALL_VALS) count = std::uint64_t(active);
+    if (halved_ && count == 0) return;
+    chunk(count * value_bytes_);
+  }
+
+  void chunk(std::uint64_t unpacked) {
+    using namespace openvdb::io;
+    if (!(compression_ & (COMPRESS_BLOSC | COMPRESS_ZIP))) return file_.skip(unpacked);
+    const auto packed = file_.number<std::int64_t>();
+    if (packed <= 0) {  // it is not packed
+      if (std::uint64_t{0} - std::uint64_t(packed) != unpacked) file_.damaged("a block of values is not as long as it must be");
+      return file_.skip(unpacked);
+    }
+    if (compression_ & COMPRESS_BLOSC) check_blosc(file_, std::uint64_t(packed), unpacked);
+    file_.skip(std::uint64_t(packed));
+  }
+
+  BoundedFile& file_;
+  const ValueLayout& layout_;
+  std::uint32_t compression_;
+  std::uint64_t value_bytes_;
+  bool halved_;
+  std::map<Coord, std::vector<Leaf>> leaves_of_;  ///< by child of the root
+  std::vector<Leaf>* leaves_ = nullptr;
+  double memory_ = 0.0;
+};
+
+}  // namespace
+
+BoundedFile::BoundedFile(fs::path path) : path_(std::move(path)), in_(path_, std::ios::binary) {
+  if (!in_) throw Error(path_.string() + " cannot be opened for reading");
+  size_ = fs::file_size(path_);
+}
+
+void BoundedFile::damaged(std::string_view why) const {
+  throw Error(path_.string() + " is damaged or truncated: " + std::string(why));
+}
+
+void BoundedFile::need(std::uint64_t bytes) const {
+  if (bytes > size_ - position_) damaged("it speaks of more than it holds");
+}
+
+void BoundedFile::seek(std::uint64_t position) {
+  if (position > size_) damaged("it speaks of more than it holds");
+  position_ = position;
+}
+
+void BoundedFile::skip(std::uint64_t bytes) {
+  need(bytes);
+  position_ += bytes;
+}
+
+void BoundedFile::read(void* to, std::size_t bytes) {
+  need(bytes);
+  constexpr std::size_t kBuffer = std::size_t{1} << 18;
+  char* out = static_cast<char*>(to);
+  while (bytes > 0) {
+    if (position_ < buffer_start_ || position_ >= buffer_start_ + buffer_.size()) {
+      buffer_.resize(std::min<std::uint64_t>(kBuffer, size_ - position_));
+      buffer_start_ = position_;
+      in_.seekg(static_cast<std::streamoff>(position_));
+      if (!in_.read(buffer_.data(), static_cast<std::streamsize>(buffer_.size()))) damaged("it cannot be read to its end");
+    }
+    const std::size_t at = position_ - buffer_start_, part = std::min(bytes, buffer_.size() - at);
+    std::memcpy(out, buffer_.data() + at, part);
+    out += part, bytes -= part, position_ += part;
+  }
+}
+
+std::string BoundedFile::text() {
+  const auto length = number<std::uint32_t>();
+  need(length);
+  std::string text(length, ' ');
+  read(text.data(), length);
+  return text;
+}
+
+std::string BoundedFile::ahead(std::uint64_t at_most) {
+  const std::uint64_t start = position_;
+  std::string bytes(std::min(at_most, size_ - position_), ' ');
+  read(bytes.data(), bytes.size());
+  position_ = start;
+  return bytes;
+}
+
+/// What stands before a grid's tree.
+struct VdbStructure::GridHead {
+  std::uint32_t compression = 0;
+  bool halved = false;
+};
+
+VdbStructure::VdbStructure(const fs::path& path) : file_(std::make_unique<BoundedFile>(path)) {
+  file_->skip(sizeof(std::int64_t));  // the magic number
+  version_ = file_->number<std::uint32_t>();
+  if (version_ < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
+    throw Error(path.string() + " is of a version of .vdb files older than OpenVDB 2, or damaged");
+  if (version_ > openvdb::OPENVDB_FILE_VERSION)
+    throw Error(path.string() + " is of a newer version of .vdb files than " +
+                std::to_string(openvdb::OPENVDB_FILE_VERSION) + ", or damaged");
+  file_->skip(2 * sizeof(std::uint32_t));  // the library's version
+  has_offsets_ = file_->number<char>() != 0;
+  file_->skip(36);  // the identifier
+  checked_metadata(*file_);
+  for (auto left = file_->number<std::int32_t>(); left > 0; --left) {
+    grids_.push_back(read_descriptor());
+    const VdbDescriptor& grid = grids_.back();
+    if (!has_offsets_) {
+      walk(grid);
+      continue;
+    }
+    const std::uint64_t here = file_->position();
+    if (grid.start < here || grid.end < grid.start) file_->damaged("its grids do not follow one another");
+    file_->seek(grid.end);
+  }
+}
+
+VdbDescriptor VdbStructure::read_descriptor() {
+  VdbDescriptor grid;
+  grid.unique_name = file_->text();
+  grid.type = file_->text();
+  if (grid.type.ends_with(kHalfSuffix)) grid.type.resize(grid.type.size() - kHalfSuffix.size());
+  grid.parent = file_->text();
+  if (!openvdb::GridBase::isRegistered(grid.type))
+    throw openvdb::LookupError("the type '" + shown(grid.type, 30) + "'");
+  const auto offsets = file_->number<std::array<std::uint64_t, 3>>();
+  if (has_offsets_) grid.start = offsets[0], grid.end = offsets[2];
+  if (!has_offsets_) grid.start = file_->position();
+  return grid;
+}
+
+std::vector<const VdbDescriptor*> VdbStructure::find(const std::string& name) const {
+  const std::string plain = GridDescriptor::stripSuffix(GridDescriptor::stringAsUniqueName(name));
+  std::vector<const VdbDescriptor*> found;
+  for (const VdbDescriptor& grid : grids_) {
+    const std::string own = GridDescriptor::stripSuffix(grid.unique_name);
+    if (own == name || own == plain) found.push_back(&grid);
+  }
+  return found;
+}
+
+bool VdbStructure::is_known(const std::string& type) { return layout_of(type) != nullptr; }
+
+VdbStructure::GridHead VdbStructure::read_head() {
+  GridHead head;
+  head.compression = file_->number<std::uint32_t>();
+  std::istringstream bytes(checked_metadata(*file_));
+  openvdb::MetaMap metadata;
+  metadata.readMeta(bytes);
+  if (const auto saved = metadata[openvdb::GridBase::META_SAVE_HALF_FLOAT]) head.halved = saved->asBool();
+  check_transform(*file_);
+  return head;
+}
+
+void VdbStructure::check_metadata(const VdbDescriptor& grid) {
+  file_->seek(grid.start);
+  read_head();
+}
+
+double VdbStructure::walk(const VdbDescriptor& grid) {
+  file_->seek(grid.start);
+  const GridHead head = read_head();
+  if (!grid.parent.empty()) return 0.0;
+  const ValueLayout* layout = layout_of(grid.type);
+  if (!layout) throw openvdb::LookupError("the type '" + shown(grid.type, 30) + "'");
+  return TreeWalk(*file_, *layout, head.compression, head.halved).walk();
+}
+
+double VdbStructure::check_tree(const VdbDescriptor& grid) {
+  if (grid.parent.empty()) return walk(grid);
+  walk(grid);
+  const auto parent = std::ranges::find(grids_, grid.parent, &VdbDescriptor::unique_name);
+  if (parent == grids_.end()) file_->damaged("a grid shares the tree of one that is not there");
+  // Of several grids of one name OpenVDB might take another one.
+  const auto same = [&](const VdbDescriptor& other) { return other.unique_name == grid.parent; };
+  const bool one = std::ranges::count_if(grids_, same) == 1 &&
+                   (grid.parent.find(kSeparator) != std::string::npos || find(grid.parent).size() == 1);
+  if (!one || parent->type != grid.type || !parent->parent.empty())
+    file_->damaged("a grid shares a tree that it cannot share");
+  return walk(*parent);
+}
+
+}  // namespace hermesh

@@ -1,0 +1,221 @@
+// The leaves of a scalar volume by number, with their signs as bits and their neighbours found without a search.
+// Heavy (OpenVDB): include it from .cpp files.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "algorithms/lattice/blocks.h"
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/level_set.h"
+#include "algorithms/lattice/read_signs.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+/// For a sample of a volume. @throws Error
+[[noreturn]] void throw_not_finite();
+
+/// Where the leaves of a volume are, and where their samples; no sample is read. Leaves are numbered in the
+/// order of the tree, which is that of a walk over its lowest internal nodes.
+class LeafPlaces {
+ public:
+  /// @throws Error if the isovalue or the background is not finite.
+  LeafPlaces(const LevelSet& level_set, double isovalue, RunContext& context);
+  LeafPlaces(const LeafPlaces&) = delete;
+  LeafPlaces& operator=(const LeafPlaces&) = delete;
+
+  std::size_t size() const { return leaves_.size(); }
+  const InsideRule& rule() const { return rule_; }
+  const openvdb::FloatTree& tree() const { return *tree_; }
+
+  /// Of a leaf, or for what neighbour() gives: where there is no leaf all samples are infinite.
+  const float* values(std::int64_t leaf) const { return values_[static_cast<std::size_t>(leaf + kUniforms)]; }
+  /// Samples of the band, at the bits of BlockMask.
+  BlockMask active(std::size_t leaf) const;
+  openvdb::Coord lower(std::size_t leaf) const {
+    // The leaf itself lies where no cache has it.
+    const Place place = places_[leaf];
+    const auto at = [&](int shift) { return static_cast<std::int32_t>(8 * (place.slot >> shift & 15)); };
+    return nodes_[place.node].lower.offsetBy(at(8), at(4), at(0));
+  }
+
+  /// A leaf's number, or kUniformOutside or kUniformInside where there is none; each offset −1, 0 or 1.
+  std::int32_t neighbour(std::size_t leaf, int dx, int dy, int dz) const {
+    return around_[leaf][kStepX * dx + kStepY * dy + dz];
+  }
+  /// Asks for the numbers of the neighbours above along x and y, which may lie where no cache has them.
+  [[gnu::always_inline]] void ask_for_neighbours(std::size_t leaf) const {
+    __builtin_prefetch(around_[leaf] + kStepX);
+    __builtin_prefetch(around_[leaf] + kStepY);
+  }
+  /// The leaf itself and its seven neighbours one step up (`side` 1) or down (−1) along each axis or not: at
+  /// |dx| + 2|dy| + 4|dz|.
+  std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const {
+    std::array<std::int32_t, 8> result;
+    for (int i = 0; i < 8; ++i) result[i] = neighbour(leaf, side * (i & 1), side * (i >> 1 & 1), side * (i >> 2));
+    return result;
+  }
+  /// All neighbours, by neighbour_slot(), and the leaf itself at 13.
+  std::array<std::int32_t, 27> surroundings(std::size_t leaf) const {
+    std::array<std::int32_t, 27> result;
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        std::copy_n(around_[leaf] + kStepX * dx + kStepY * dy - 1, 3, &result[neighbour_slot(dx, dy, -1)]);
+    return result;
+  }
+  /// Leaves of the same x.
+  struct Slab {
+    std::span<const std::uint32_t> nodes;  ///< in ascending order of their coordinates
+    int x;                                 ///< within the nodes
+  };
+  /// All leaves, in ascending order of x; they last as long as this does.
+  std::vector<Slab> slabs() const;
+  /// Calls f(leaf) for every leaf of the slab, in ascending order of (y, z).
+  template <class F>
+  void for_each_leaf(const Slab& slab, F&& f) const;
+  /// Calls f(first, end) for ranges that together are the numbers of all leaves of the slab, in any order.
+  template <class F>
+  void for_each_range(const Slab& slab, F&& f) const {
+    for (const std::uint32_t node : slab.nodes) f(nodes_[node].first_at[slab.x], nodes_[node].first_at[slab.x + 1]);
+  }
+
+  /// Whether a tile of one sign meets a tile of the other, so that edges change sign and start in no leaf.
+  bool tiles_of_both_signs_meet(RunContext& context) const;
+  /// Whether an edge along the axis that ends in the leaf, of which `inside` are the signs, changes sign and
+  /// starts in no leaf.
+  bool differs_from_tile_below(std::size_t leaf, const BlockMask& inside, int axis) const {
+    const std::int32_t there = neighbour(leaf, -(axis == 0), -(axis == 1), -(axis == 2));
+    return there < 0 && !is_first_layer(inside, axis, there == kUniformInside);
+  }
+  /// The signed value of that tile inside that is nearest to the isovalue, of those as small as a leaf.
+  std::optional<float> nearest_tile_inside() const;
+
+ protected:
+  /// Without leaves: they must be numbered, and their samples found.
+  LeafPlaces(const LevelSet& level_set, double isovalue);
+  void number_leaves(RunContext& context, bool with_values);
+  /// The leaf lies where no cache has it: ask_for() it long before.
+  void find_values(std::size_t leaf) { values_[leaf + kUniforms] = leaves_[leaf]->buffer().data(); }
+  [[gnu::always_inline]] void ask_for(std::size_t leaf) const { __builtin_prefetch(leaves_[leaf]); }
+
+  openvdb::FloatTree::ConstPtr tree_;
+  InsideRule rule_;
+
+ private:
+  static constexpr float kNoTile = -std::numeric_limits<float>::infinity();
+  using Leaf = openvdb::FloatTree::LeafNodeType;
+  using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
+  using TreeNode = LargeNode::ChildNodeType;
+  static constexpr int kWords = 64;  ///< of a mask of 16³ bits
+  using NodeMask = std::array<std::uint64_t, kWords>;
+  /// What lies in a node and one step around it is found at once, with neither a search nor a count of bits:
+  /// 18³ leaves' numbers or kUniform…, less than the node's own table takes. (From masks and counts of bits, which the
+  /// caches hold, a conversion to Hermite data takes up to 7 % longer with two cores: there are dozens of lookups a leaf.)
+  static constexpr int kStepY = 18, kStepX = 18 * kStepY;
+  using Numbers = std::array<std::int32_t, 18 * kStepX>;
+  static constexpr int number_slot(int x, int y, int z) { return kStepX * (x + 1) + kStepY * (y + 1) + z + 1; }
+
+  struct Node {
+    openvdb::Coord lower;
+    const TreeNode* source = nullptr;
+    NodeMask child{}, tile_inside{};
+    std::array<std::uint32_t, 17> first_at{};   ///< number of the first leaf at every x, and behind the last
+    std::array<std::int32_t, 27> neighbours{};  ///< by neighbour_slot(); a node's number or kUniform…
+    float nearest_inside = kNoTile;             ///< signed value of the inside tile that is nearest to the isovalue
+  };
+  struct Place {
+    std::uint32_t node;
+    std::uint32_t slot;  ///< in the node, 256x+16y+z
+  };
+
+  static constexpr int kUniforms = 2;  ///< kUniformOutside and kUniformInside are −1 and −2
+  static bool is_first_layer(const BlockMask& signs, int axis, bool inside);
+
+  void find_tiles(Node& node) const;
+  void number(Node& node, std::uint32_t index, std::uint32_t next);
+  void number_around(std::size_t node);
+  bool tiles_meet(const Node& node) const;
+  std::vector<openvdb::CoordBBox> large_tiles_unlike_background(RunContext& context) const;
+  bool meets_background(const openvdb::CoordBBox& tile) const;
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> nodes_in_order_;  ///< of their coordinates
+  LargeArray<Numbers> numbers_;                ///< by node
+  LargeArray<Place> places_;
+  LargeArray<const Leaf*> leaves_;
+  LargeArray<const float*> values_;         ///< from leaf −kUniforms on
+  LargeArray<const std::int32_t*> around_;  ///< a leaf's own place among its node's numbers
+};
+
+template <class F>
+void LeafPlaces::for_each_leaf(const Slab& slab, F&& f) const {
+  const auto y_of = [&](std::size_t i) { return nodes_[slab.nodes[i]].lower.y(); };
+  std::vector<std::uint32_t> next;  // leaf of each node of a column; in a node their order is the same
+  for (std::size_t column = 0, end; column < slab.nodes.size(); column = end) {
+    next.clear();
+    for (end = column; end < slab.nodes.size() && y_of(end) == y_of(column); ++end)
+      next.push_back(nodes_[slab.nodes[end]].first_at[slab.x]);
+    for (int word = 4 * slab.x; word < 4 * slab.x + 4; ++word) {
+      std::uint64_t any = 0;
+      for (std::size_t i = column; i < end; ++i) any |= nodes_[slab.nodes[i]].child[word];
+      if (any == 0) continue;
+      for (int row = 0; row < 4; ++row)
+        for (std::size_t i = column; i < end; ++i) {
+          const auto leaves = static_cast<std::uint16_t>(nodes_[slab.nodes[i]].child[word] >> (16 * row));
+          for (int left = std::popcount(leaves); left > 0; --left) f(next[i - column]++);
+        }
+    }
+  }
+}
+
+/// With their signs as bits.
+class LeafTable : public LeafPlaces {
+ public:
+  /// Reads every sample once. Where a tile of one sign meets a tile of the other, or a leaf's first layer,
+  /// the tree is copied and the tile made a leaf, so that every edge with a change of sign starts in a leaf.
+  /// @throws Error if a sample, the isovalue or the background is not finite.
+  LeafTable(const LevelSet& level_set, double isovalue, RunContext& context);
+
+  const BlockMask& inside(std::size_t leaf) const { return inside_[leaf]; }
+  /// inside() for what neighbour() gives.
+  const BlockMask& signs(std::int32_t leaf) const {
+    return leaf >= 0 ? inside_[static_cast<std::size_t>(leaf)] : leaf == kUniformInside ? kAllInside : kAllOutside;
+  }
+  /// Whether a sample that is inside and not active is less than `distance` from the isovalue.
+  bool has_inactive_inside_nearer_than(float distance) const;
+
+ private:
+  static constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+
+  void read_signs(RunContext& context);
+  bool is_complete(RunContext& context) const;
+  std::vector<openvdb::Coord> missing_leaves(RunContext& context) const;
+
+  LargeArray<BlockMask> inside_;
+};
+
+/// As FloatTree::evalActiveVoxelBoundingBox(), which reads where a leaf is from the leaf itself, and so waits for memory as
+/// often as there are leaves. Most lie within the box of those before them, and then the node above tells.
+openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
+
+/// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
+/// @throws Error for a grid with perspective.
+IndexToWorld placement_of(const openvdb::FloatGrid& grid);
+
+/// The rule for a grid. @throws Error if the isovalue or the background is not finite.
+InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue);
+
+/// Tiles, as origins of 8³ blocks, that meet a sample of the other sign in another tile. @throws Error: beyond memory.
+std::vector<openvdb::Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
+                                                RunContext& context);
+
+}  // namespace hermesh

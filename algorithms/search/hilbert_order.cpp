@@ -1,0 +1,179 @@
+#include "algorithms/search/hilbert_order.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+constexpr int kBits = 10;                ///< of a cell's coordinate; also the digit of the radix sort
+constexpr std::size_t kBatch = 256;      ///< triangles whose codes are computed together
+constexpr std::size_t kChunk = 1 << 15;  ///< keys that one task sorts
+constexpr std::size_t kCrowded = 32;     ///< triangles in a cell beyond which it gets a curve of its own
+
+/// Code along the curve in the upper half, triangle number in the lower.
+using SortKey = std::uint64_t;
+using Cells = std::array<std::array<std::uint32_t, kBatch>, 3>;
+
+struct Box {
+  Eigen::Vector3f lower = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Vector3f upper = -lower;
+};
+
+/// Cell coordinates to place along the curve, in place and transposed: the code's bits are those of x, y and
+/// z in turn (Skilling, Programming the Hilbert Curve, AIP Conf. Proc. 707, 2004). Without branches, over
+/// many cells at a time.
+void to_hilbert(Cells& cells) {
+  for (std::uint32_t bit = 1u << (kBits - 1); bit > 1; bit >>= 1)
+    for (int a = 0; a < 3; ++a)
+      for (std::size_t i = 0; i < kBatch; ++i) {
+        const std::uint32_t x = cells[0][i], y = cells[a][i];
+        const std::uint32_t invert = (y & bit) ? bit - 1 : 0;
+        const std::uint32_t exchange = (x ^ y) & (bit - 1) & ~invert;
+        cells[a][i] = y ^ exchange;
+        cells[0][i] = (a == 0 ? y : x) ^ exchange ^ invert;
+      }
+  for (std::size_t i = 0; i < kBatch; ++i) {
+    cells[1][i] ^= cells[0][i];
+    cells[2][i] ^= cells[1][i];
+    std::uint32_t gray = cells[2][i];  // bit k becomes the exclusive or of the bits above k
+    for (int shift = 1; shift < kBits; shift *= 2) gray ^= gray >> shift;
+    gray >>= 1;
+    for (int a = 0; a < 3; ++a) cells[a][i] ^= gray;
+  }
+}
+
+/// Moves bit k of ten to bit 3k.
+std::uint32_t spread(std::uint32_t v) {
+  v = (v | (v << 16)) & 0x030000ffu;
+  v = (v | (v << 8)) & 0x0300f00fu;
+  v = (v | (v << 4)) & 0x030c30c3u;
+  return (v | (v << 2)) & 0x09249249u;
+}
+
+template <class F>
+void for_chunks(std::size_t n, std::size_t size, F&& f) {
+  tbb::parallel_for(std::size_t{0}, (n + size - 1) / size,
+                    [&](std::size_t chunk) { f(chunk * size, std::min(n, (chunk + 1) * size)); });
+}
+
+/// Stable least-significant-digit radix sort by code. Each chunk counts, then writes to places of its own.
+void radix_sort(std::span<SortKey> keys) {
+  constexpr std::size_t kDigits = std::size_t{1} << kBits;
+  std::vector<SortKey> other(keys.size());
+  std::span<SortKey> from = keys, to = other;
+  std::vector<std::array<std::uint32_t, kDigits>> counts((keys.size() + kChunk - 1) / kChunk);
+  for (int shift = 32; shift < 32 + 3 * kBits; shift += kBits) {
+    const auto digit = [shift](SortKey key) { return (key >> shift) & (kDigits - 1); };
+    for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+      auto& count = counts[begin / kChunk];
+      count.fill(0);
+      for (std::size_t i = begin; i < end; ++i) ++count[digit(from[i])];
+    });
+    std::uint32_t total = 0;
+    for (std::size_t d = 0; d < kDigits; ++d)
+      for (auto& count : counts) total += std::exchange(count[d], total);
+    for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+      auto& next = counts[begin / kChunk];
+      for (std::size_t i = begin; i < end; ++i) to[next[digit(from[i])]++] = from[i];
+    });
+    std::swap(from, to);
+  }
+  for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+    std::copy(from.begin() + begin, from.begin() + end, keys.begin() + begin);
+  });
+}
+
+class CurveSorter {
+ public:
+  CurveSorter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
+      : points_(points), triangles_(triangles) {}
+
+  /// Orders the keys by a curve through the cube that holds their triangles' centres.
+  void sort(std::span<SortKey> keys) const {
+    const Box box = bounds_of_centres(keys);
+    const double side = (box.upper.cast<double>() - box.lower.cast<double>()).maxCoeff();
+    if (!(side > 0)) return;  // keys of equal code are in order of number already
+    const double cells_per_unit = ((1 << kBits) - 0.5) / side;
+    for_chunks(keys.size(), kBatch, [&](std::size_t begin, std::size_t end) {
+      compute_codes(keys.subspan(begin, end - begin), box.lower.cast<double>(), cells_per_unit);
+    });
+    if (keys.size() < kChunk)
+      std::sort(keys.begin(), keys.end());
+    else
+      radix_sort(keys);
+    sort_crowded_cells(keys);
+  }
+
+ private:
+  /// Halves first, for the sum of two finite floats may be none.
+  Eigen::Vector3f centre(SortKey key) const {
+    const Triangle& t = triangles_[static_cast<std::uint32_t>(key)];
+    const Eigen::Vector3f &a = points_[t[0]], &b = points_[t[1]], &c = points_[t[2]];
+    return 0.5f * a.cwiseMin(b).cwiseMin(c) + 0.5f * a.cwiseMax(b).cwiseMax(c);
+  }
+
+  Box bounds_of_centres(std::span<const SortKey> keys) const {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, keys.size(), kChunk), Box(),
+        [&](const tbb::blocked_range<std::size_t>& range, Box box) {
+          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const Eigen::Vector3f c = centre(keys[i]);
+            box.lower = box.lower.cwiseMin(c);
+            box.upper = box.upper.cwiseMax(c);
+          }
+          return box;
+        },
+        [](Box a, const Box& b) {
+          a.lower = a.lower.cwiseMin(b.lower);
+          a.upper = a.upper.cwiseMax(b.upper);
+          return a;
+        });
+  }
+
+  void compute_codes(std::span<SortKey> keys, const Eigen::Vector3d& lower, double cells_per_unit) const {
+    Cells cells{};
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const Eigen::Vector3d place = (centre(keys[i]).cast<double>() - lower) * cells_per_unit;
+      for (int a = 0; a < 3; ++a)
+        cells[a][i] = static_cast<std::uint32_t>(static_cast<std::int32_t>(place[a]));
+    }
+    to_hilbert(cells);
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const std::uint32_t code = spread(cells[0][i]) << 2 | spread(cells[1][i]) << 1 | spread(cells[2][i]);
+      keys[i] = SortKey{code} << 32 | static_cast<std::uint32_t>(keys[i]);
+    }
+  }
+
+  void sort_crowded_cells(std::span<SortKey> keys) const {
+    std::vector<std::span<SortKey>> crowded;
+    for (std::size_t begin = 0, end; begin < keys.size(); begin = end) {
+      for (end = begin + 1; end < keys.size() && (keys[end] ^ keys[begin]) >> 32 == 0;) ++end;
+      if (end - begin > kCrowded) crowded.push_back(keys.subspan(begin, end - begin));
+    }
+    tbb::parallel_for(std::size_t{0}, crowded.size(), [&](std::size_t i) { sort(crowded[i]); });
+  }
+
+  std::span<const Eigen::Vector3f> points_;
+  std::span<const Triangle> triangles_;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> hilbert_order(std::span<const Eigen::Vector3f> points,
+                                         std::span<const Triangle> triangles) {
+  std::vector<SortKey> keys(triangles.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) keys[i] = i;
+  CurveSorter(points, triangles).sort(keys);
+  std::vector<std::uint32_t> order(keys.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) order[i] = static_cast<std::uint32_t>(keys[i]);
+  return order;
+}
+
+}  // namespace hermesh

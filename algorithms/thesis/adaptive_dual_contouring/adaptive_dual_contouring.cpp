@@ -1,0 +1,247 @@
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "algorithms/core/large_array.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/thesis/adaptive_dual_contouring/block_regions.h"
+#include "algorithms/extraction/hermite_input.h"
+
+namespace hermesh {
+namespace {
+
+/// The point of each active cell. Numbers within blocks are half as many bytes to touch as those of the mesh, and touching
+/// fresh memory is what the grid costs.
+struct MaskGrid {
+  LargeArray<std::uint16_t> numbers;  ///< by block and cell; of cells that are not active whatever the memory held
+  std::vector<std::uint64_t> first;   ///< by block: its first point
+};
+
+/// The points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
+class CellsAround {
+ public:
+  CellsAround(const HermiteView& view, const MaskGrid& mask, std::size_t block, int axis)
+      : numbers_(mask.numbers.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
+    for (int side = 0; side < 4; ++side) {
+      int d[3] = {0, 0, 0};
+      d[(axis + 1) % 3] = -(side & 1);
+      d[(axis + 2) % 3] = -(side >> 1);
+      const std::int64_t there = view.blocks()[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
+      // Coordinate −1 is 7 there. A block that is not there has no cell of a crossing edge, and is not asked for.
+      cell_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
+      first_[side] = there < 0 ? 0 : static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(there)]);
+    }
+  }
+
+  /// @return false if one of the cells has no point.
+  bool find(int sample, Quad& points) const {
+    const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
+    const std::uint16_t n[4] = {numbers_[cell_[low_u + low_v] + sample - u_ - v_], numbers_[cell_[low_v] + sample - v_],
+                                numbers_[cell_[0] + sample], numbers_[cell_[low_u] + sample - u_]};
+    points = {first_[low_u + low_v] + n[0], first_[low_v] + n[1], first_[0] + n[2], first_[low_u] + n[3]};
+    return n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
+  }
+
+ private:
+  static constexpr int kStep[3] = {64, 8, 1};
+  const std::uint16_t* numbers_;
+  const int u_, v_;
+  std::int64_t cell_[4];
+  std::uint32_t first_[4];
+};
+
+/// One run, stage by stage.
+class Contourer {
+ public:
+  Contourer(const FloatHermite& hermite, const AdaptiveOptions& options, const AdaptivityField* field,
+            RunContext& context)
+      : context_(context),
+        hermite_(hermite),
+        options_(options),
+        field_(field, hermite.placement),
+        view_(make_view(hermite, context)),
+        input_{hermite, view_, options_, field_},
+        blocks_(view_.blocks().size()),
+        groups_((blocks_ + kGroup - 1) / kGroup) {}
+
+  PolygonMesh run() {
+    PolygonMesh mesh;
+    mesh.origin = hermite_.placement.origin;
+    merge();
+    number_points(mesh);
+    connect(mesh);
+    if (field_.leaves_out_outside()) drop_unused_points(mesh);
+    report();
+    return mesh;
+  }
+
+ private:
+  static constexpr std::size_t kGroup = 64;
+  using View = decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>()));
+
+  static View make_view(const FloatHermite& hermite, RunContext& context) {
+    Stage stage(context, "blocks");
+    return view_of(hermite, context);
+  }
+
+  /// Groups of blocks keep their points until it is known how many there are before them: far fewer than active cells.
+  void merge() {
+    Stage stage(context_, "merge cells");
+    mask_.numbers.resize(512 * blocks_);
+    results_.resize(blocks_);
+    places_.resize(groups_);
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      std::array<Eigen::Vector3f, 512> points;
+      for_each_block(g, [&](std::size_t b) {
+        std::uint16_t* mask = mask_.numbers.data() + 512 * b;
+        if (field_.leaves_out_outside()) std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
+        results_[b] = merge_block(input_, static_cast<std::int32_t>(b), mask, points.data());
+        places_[g].insert(places_[g].end(), points.begin(), points.begin() + results_[b].points);
+      });
+    });
+  }
+
+  void number_points(PolygonMesh& mesh) {
+    Stage stage(context_, "number points");
+    mask_.first.resize(blocks_);
+    for (std::size_t b = 0; b < blocks_; ++b) mask_.first[b] = results_[b].points;
+    mesh.points.resize(exclusive_scan(mask_.first, "points"));
+    const IndexToWorld& placement = hermite_.placement;
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      const Eigen::Vector3f* place = places_[g].data();
+      for_each_block(g, [&](std::size_t b) {
+        Eigen::Vector3d lower;
+        for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
+        for (std::uint32_t i = 0; i < results_[b].points; ++i)
+          mesh.points[mask_.first[b] + i] = placement.local(lower + (place++)->cast<double>()).cast<float>();
+      });
+    });
+    places_ = {};
+  }
+
+  /// And their polygons: far fewer than crossing edges.
+  void connect(PolygonMesh& mesh) {
+    Stage stage(context_, "connect");
+    std::vector<std::vector<Quad>> quads(groups_);
+    std::vector<std::vector<Triangle>> triangles(groups_);
+    std::vector<std::uint64_t> first_quad(groups_), first_triangle(groups_);
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      for_each_block(g, [&](std::size_t b) {
+        for_each_polygon(b, [&](const Quad& polygon, int corners) {
+          if (corners == 4)
+            quads[g].push_back(polygon);
+          else
+            triangles[g].push_back({polygon[0], polygon[1], polygon[2]});
+        });
+      });
+      first_quad[g] = quads[g].size();
+      first_triangle[g] = triangles[g].size();
+    });
+    mesh.quads.resize(exclusive_scan(first_quad, "quads"));
+    mesh.triangles.resize(exclusive_scan(first_triangle, "triangles"));
+    parallel_blocks(groups_, context_, [&](std::size_t g) {
+      std::copy(quads[g].begin(), quads[g].end(), mesh.quads.begin() + static_cast<std::ptrdiff_t>(first_quad[g]));
+      std::copy(triangles[g].begin(), triangles[g].end(),
+                mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first_triangle[g]));
+    });
+  }
+
+  /// Calls f(points, 3 or 4) for each polygon (§6.5).
+  template <class F>
+  void for_each_polygon(std::size_t b, F&& f) const {
+    const HermiteView::Block& block = view_.blocks()[b];
+    const bool mirrors = hermite_.placement.mirrors();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!any(block.crossing[axis])) continue;
+      const CellsAround around(view_, mask_, b, axis);
+      for_each_bit(block.crossing[axis], [&](int sample) {
+        Quad polygon;
+        if (!around.find(sample, polygon)) return;
+        int corners = 0;
+        // Cells of one region follow one another: it is a cube.
+        for (int i = 0; i < 4; ++i)
+          if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
+        if (corners < 3) return;
+        if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
+        f(polygon, corners);
+      });
+    }
+  }
+
+  template <class F>
+  void for_each_block(std::size_t group, F&& f) const {
+    for (std::size_t b = group * kGroup; b < std::min(blocks_, (group + 1) * kGroup); ++b) f(b);
+  }
+
+  void report() const {
+    const auto sum = [&](auto&& of) {
+      return std::accumulate(results_.begin(), results_.end(), 0.0,
+                             [&](double total, const BlockResult& result) { return total + of(result); });
+    };
+    for (std::size_t level = 0; level < 3; ++level)
+      context_.figure("regions_" + std::to_string(level + 1),
+                      sum([&](const BlockResult& r) { return r.regions[level]; }));
+    float largest = 0.0f;
+    for (const BlockResult& result : results_) largest = std::max(largest, result.largest_plane_distance);
+    context_.figure("largest_plane_distance", largest);
+    context_.figure("escaped", sum([](const BlockResult& r) { return r.escaped; }));
+  }
+
+  RunContext& context_;
+  const FloatHermite& hermite_;
+  const AdaptiveOptions options_;
+  const FieldEvaluator field_;
+  const View view_;
+  const RegionInput input_;
+  const std::size_t blocks_, groups_;
+  /// By group, of its blocks one after another: voxels from the block's first sample.
+  std::vector<std::vector<Eigen::Vector3f>> places_;
+  MaskGrid mask_;
+  std::vector<BlockResult> results_;
+};
+
+}  // namespace
+
+PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
+                                     const AdaptivityField* field, RunContext& context) {
+  return Contourer(hermite, options, field, context).run();
+}
+
+PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
+  AdaptiveOptions options;
+  if (input.options.is("placement", "average")) options.placement = AdaptiveOptions::Placement::average;
+  options.threshold = input.options.number("threshold");
+  options.truncation = input.options.number("truncation");
+  const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
+  const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
+  return adaptive_dual_contouring(hermite, options, input.field, input.context);
+}
+
+std::vector<OptionSpec> adaptive_dual_contouring_options() {
+  std::vector<OptionSpec> options = {
+      {"threshold",
+       "0.1",
+       "square voxels: cells are merged while the sum of the squared distances to their planes is less; larger merges "
+       "more, 0 nothing",
+       {},
+       0.0,
+       1e300},
+      {"placement",
+       "optimal",
+       "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the mean of "
+       "its crossings",
+       {"optimal", "average"}},
+      {"truncation",
+       "0.1",
+       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features",
+       {},
+       0.001,
+       1.0}};
+  const std::vector<OptionSpec> of_hermite = hermite_options();
+  options.insert(options.end(), of_hermite.begin(), of_hermite.end());
+  return options;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,38 @@
+// The regions of one block: which of its cells are merged, and where the points go (Aldén 2011, §6.4).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/thesis/adaptive_dual_contouring/qef_sum.h"
+#include "algorithms/thesis/adaptive_dual_contouring/region_topology.h"
+#include "algorithms/hermite/hermite_view.h"
+
+namespace hermesh {
+
+/// Hermite data as blocks, with what decides about regions.
+struct RegionInput {
+  const FloatHermite& hermite;
+  const HermiteView& view;  ///< of the same data
+  const AdaptiveOptions& options;
+  const FieldEvaluator& field;
+};
+
+/// Entry of the mask grid for a cell that gets no point although the surface passes through it.
+inline constexpr std::uint16_t kNoPoint = 0xffff;
+
+/// What merging one block came to.
+struct BlockResult {
+  std::uint32_t points = 0;
+  std::array<std::uint32_t, 3> regions{};  ///< of 2³, 4³, 8³ cells
+  std::uint32_t escaped = 0;
+  float largest_plane_distance = 0.0f;  ///< voxels
+};
+
+/// Merges, writes for each active one of the 512 cells the number of its point within the block to `mask`, whose other
+/// entries stay as they are, and that many points, voxels from the block's first sample, to `points`, which has room for
+/// 512. Cells are active whose corners differ in sign, less those that the field leaves out.
+BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points);
+
+}  // namespace hermesh

@@ -1,0 +1,94 @@
+#include "algorithms/thesis/adaptive_dual_contouring/qef_sum.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <random>
+#include <vector>
+
+#include "algorithms/extraction/dual_contouring/qef.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+struct Planes {
+  QefSum sum;
+  Qef slow{Vector3d::Zero()};
+
+  Planes() { sum.clear(); }
+  void add(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) {
+    sum += QefSum::of_plane({point[0], point[1], point[2]}, {normal[0], normal[1], normal[2]});
+    slow.add_plane(point.cast<double>(), normal.cast<double>());
+  }
+};
+
+Vector3d minimiser(const QefSum& sum, double truncation) {
+  const QefSum* const one[] = {&sum};
+  Vector3d result;
+  minimisers(one, truncation, &result);
+  return result;
+}
+
+/// Planes about a place in a block, all within an angle of some normal: from flat to a corner.
+Planes random_planes(std::mt19937& random, float spread) {
+  std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
+  const auto vector = [&] { return Vector3f(unit(random), unit(random), unit(random)); };
+  const Vector3f middle = 3.0f * vector(), normal = vector().normalized();
+  Planes planes;
+  const int count = 3 + static_cast<int>(random() % 60);
+  for (int i = 0; i < count; ++i) planes.add(middle + vector(), (normal + spread * vector()).normalized());
+  return planes;
+}
+
+TEST(QefSum, TheSameMinimisersAndErrorsAsInDoublePrecision) {
+  std::mt19937 random(1);
+  for (const float spread : {0.0f, 1e-3f, 0.03f, 0.3f, 1.0f, 10.0f}) {
+    std::vector<Planes> cases;
+    std::vector<const QefSum*> sums;
+    for (int i = 0; i < 500; ++i) cases.push_back(random_planes(random, spread));
+    for (const Planes& planes : cases) sums.push_back(&planes.sum);
+    std::vector<Vector3d> places(cases.size());
+    minimisers(sums, 0.1, places.data());
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      // A singular value next to the limit may fall on either side of it.
+      const Vector3d a = cases[i].slow.minimiser(0.0999), b = cases[i].slow.minimiser(0.1001);
+      EXPECT_LT(std::min((places[i] - a).norm(), (places[i] - b).norm()), 2e-5) << spread;
+      EXPECT_NEAR(cases[i].sum.error(places[i]), cases[i].slow.error(places[i]), 1e-9);
+    }
+  }
+}
+
+TEST(QefSum, ALanesResultDoesNotDependOnTheOthers) {
+  std::mt19937 random(2);
+  std::vector<Planes> cases;
+  std::vector<const QefSum*> sums;
+  for (int i = 0; i < 37; ++i) cases.push_back(random_planes(random, 0.5f));
+  for (const Planes& planes : cases) sums.push_back(&planes.sum);
+  std::vector<Vector3d> places(cases.size());
+  minimisers(sums, 0.1, places.data());
+  for (std::size_t i = 0; i < cases.size(); ++i) EXPECT_EQ(places[i], minimiser(cases[i].sum, 0.1));
+}
+
+TEST(QefSum, ThreePlanesMeetInTheirCorner) {
+  const Vector3f corner(0.25f, -3.5f, 1.75f);
+  Planes planes;
+  for (int axis = 0; axis < 3; ++axis) planes.add(corner + 0.5f * Vector3f::Unit((axis + 1) % 3), Vector3f::Unit(axis));
+  EXPECT_LT((minimiser(planes.sum, 0.1) - corner.cast<double>()).norm(), 1e-6);
+}
+
+TEST(QefSum, SumsAddUp) {
+  std::mt19937 random(3);
+  Planes a = random_planes(random, 0.2f);
+  const Planes b = random_planes(random, 0.2f);
+  const Vector3d x(0.3, -0.7, 2.0);
+  const double expected = a.sum.error(x) + b.sum.error(x);
+  a.sum += b.sum;
+  EXPECT_NEAR(a.sum.error(x), expected, 1e-9);
+  EXPECT_EQ(a.sum.planes(), a.slow.planes() + b.slow.planes());
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,190 @@
+#include "algorithms/thesis/thesis_fracture.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/core/stopwatch.h"
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
+#include "algorithms/fracture/labelled_solid.h"
+#include "algorithms/hermite/combine.h"
+
+namespace hermesh {
+namespace {
+
+using At = Cutters::At;
+using Codes = std::array<CutCode, 512>;
+
+/// All blocks of a box around the object, those of the outermost layer being outside of every solid.
+class CodeSolid {
+ public:
+  CodeSolid(const FloatHermite& object, const Cutters& cutters, CutCode code)
+      : placement_(object.placement), cutters_(cutters), code_(code) {
+    At lower, upper;
+    lower.fill(std::numeric_limits<std::int32_t>::max());
+    upper.fill(std::numeric_limits<std::int32_t>::min());
+    for (const SignLeaf& leaf : object.leaves)
+      for (int a = 0; a < 3; ++a) {
+        lower[a] = std::min(lower[a], leaf.lower[a]);
+        upper[a] = std::max(upper[a], leaf.lower[a]);
+      }
+    for (int a = 0; a < 3; ++a) {
+      first_[a] = lower[a] - 16;
+      size_[a] = (upper[a] - lower[a]) / 8 + 5;
+    }
+    masks_.resize(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]));
+  }
+
+  FloatHermite run(RunContext& context) {
+    parallel_blocks(masks_.size(), context, [&](std::size_t b) {
+      if (is_border(b)) return;
+      Codes codes;
+      cutters_.codes(lower_of(b), codes);
+      for (int i = 0; i < 512; ++i)
+        if (codes[static_cast<std::size_t>(i)] == code_) masks_[b][i >> 6] |= std::uint64_t{1} << (i & 63);
+    });
+    std::vector<std::vector<EdgeCrossing>> crossings(masks_.size());
+    std::vector<SignLeaf> leaves(masks_.size());
+    parallel_blocks(masks_.size(), context, [&](std::size_t b) {
+      leaves[b] = leaf_at(b);
+      const std::array<BlockMask, 3> edges = crossing_edges(leaves[b]);
+      if (any(edges[0]) || any(edges[1]) || any(edges[2])) crossings[b] = crossings_of(leaves[b], edges);
+    });
+    FloatHermite result;
+    result.placement = placement_;
+    for (std::size_t b = 0; b < masks_.size(); ++b) {
+      if (crossings[b].empty()) continue;
+      leaves[b].first = static_cast<std::uint32_t>(result.crossings.size());
+      result.leaves.push_back(leaves[b]);
+      result.crossings.insert(result.crossings.end(), crossings[b].begin(), crossings[b].end());
+    }
+    return result;
+  }
+
+ private:
+  std::array<std::int32_t, 3> place(std::size_t b) const {
+    const auto y = static_cast<std::size_t>(size_[1]), z = static_cast<std::size_t>(size_[2]);
+    return {static_cast<std::int32_t>(b / (y * z)), static_cast<std::int32_t>(b / z % y),
+            static_cast<std::int32_t>(b % z)};
+  }
+  At lower_of(std::size_t b) const {
+    const auto p = place(b);
+    return {first_[0] + 8 * p[0], first_[1] + 8 * p[1], first_[2] + 8 * p[2]};
+  }
+  bool is_border(std::size_t b) const {
+    const auto p = place(b);
+    for (int a = 0; a < 3; ++a)
+      if (p[a] == 0 || p[a] == size_[a] - 1) return true;
+    return false;
+  }
+
+  SignLeaf leaf_at(std::size_t b) const {
+    SignLeaf leaf{lower_of(b), 0, masks_[b], {}};
+    const std::size_t steps[3] = {std::size_t(size_[1]) * std::size_t(size_[2]), std::size_t(size_[2]), 1};
+    const auto p = place(b);
+    for (int axis = 0; axis < 3; ++axis)
+      if (p[axis] + 1 < size_[axis]) leaf.beyond[axis] = first_layer(masks_[b + steps[axis]], axis);
+    return leaf;
+  }
+
+  std::vector<EdgeCrossing> crossings_of(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges) const {
+    std::array<Codes, 4> codes;
+    cutters_.codes(leaf.lower, codes[3]);
+    std::vector<EdgeCrossing> result;
+    for (int axis = 0; axis < 3; ++axis) {
+      At next = leaf.lower;
+      next[axis] += 8;
+      cutters_.codes(next, codes[axis]);
+      for_each_bit(edges[axis], [&](int sample) {
+        int to[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+        ++to[axis];
+        const auto there = static_cast<std::size_t>(sample_index(to[0] & 7, to[1] & 7, to[2] & 7));
+        const CutCode first = codes[3][static_cast<std::size_t>(sample)],
+                      second = codes[to[axis] > 7 ? axis : 3][there];
+        result.push_back(crossing(leaf, sample, axis, first, second));
+      });
+    }
+    return result;
+  }
+
+  /// The normal looks out of the solid. Where the box cuts it off there is no crossing to ask for.
+  EdgeCrossing crossing(const SignLeaf& leaf, int sample, int axis, CutCode first, CutCode second) const {
+    const At at{leaf.lower[0] + (sample >> 6), leaf.lower[1] + ((sample >> 3) & 7),
+                leaf.lower[2] + (sample & 7)};
+    EdgeCrossing result{0.5f, {}};
+    result.normal[axis] = 1.0f;
+    if (first != second)
+      if (const auto found = cutters_.crossing(at, axis, first, second)) result = found->crossing;
+    const bool inside_first = test(leaf.inside, sample);
+    if ((result.normal[axis] >= 0) != inside_first)
+      for (float& n : result.normal) n = -n;
+    return result;
+  }
+
+  const IndexToWorld placement_;
+  const Cutters& cutters_;
+  const CutCode code_;
+  At first_{};
+  std::array<std::int32_t, 3> size_{};
+  std::vector<BlockMask> masks_;
+};
+
+PolygonMesh meshed(const FloatHermite& piece, double threshold, RunContext& context) {
+  if (piece.leaves.empty()) return {};
+  if (threshold > 0) return adaptive_dual_contouring(piece, {.threshold = threshold}, nullptr, context);
+  return dual_contouring(view_of(piece, context), {}, context);
+}
+
+}  // namespace
+
+FloatHermite solid_of_code(const FloatHermite& object, const Cutters& cutters, CutCode code,
+                           RunContext& context) {
+  return CodeSolid(object, cutters, code).run(context);
+}
+
+std::vector<CutCode> codes_within(const FloatHermite& object, const Cutters& cutters, RunContext& context) {
+  LabelledSolid solid = whole_solid(object, context);
+  label_by_codes(solid, cutters, context);
+  return solid.code_values;
+}
+
+void thesis_fracture(const FloatHermite& object, const Cutters& cutters, double threshold,
+                     const std::function<void(ThesisPiece&&)>& hand_over, RunContext& context) {
+  FloatHermite rest = object;
+  const bool solids = cutters.count() > 0 && !cutters.plane_sides() && cutters.signs(0, {}).has_value();
+  std::vector<CutCode> codes = codes_within(object, cutters, context);
+  if (solids) {  // each is a solid of its own, and what is left is no cutter's
+    codes.resize(cutters.count());
+    for (std::size_t k = 0; k < codes.size(); ++k) codes[k] = k;
+  }
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    context.check();
+    ThesisPiece piece;
+    piece.name = cutters.name_of(codes[i]);
+    Stopwatch watch;
+    const FloatHermite* solid = solids ? cutters.solid(codes[i]) : nullptr;
+    FloatHermite made;
+    if (!solids) made = solid_of_code(object, cutters, codes[i], context);
+    piece.conversion_seconds = watch.seconds();
+    FloatHermite taken;
+    if (!solids) solid = &made;
+    if (solid) {
+      taken = combine(Boolean::intersect, rest, *solid, context);
+      rest = combine(Boolean::subtract, rest, *solid, context);
+    }
+    piece.csg_seconds = watch.seconds();
+    piece.mesh = meshed(taken, threshold, context);
+    piece.extraction_seconds = watch.seconds();
+    context.progress("fracture", double(i + 1) / double(codes.size()));
+    hand_over(std::move(piece));
+  }
+  if (rest.leaves.empty()) return;
+  Stopwatch watch;
+  ThesisPiece last{"what no cutter takes", meshed(rest, threshold, context), 0.0, 0.0, 0.0};
+  last.extraction_seconds = watch.seconds();
+  hand_over(std::move(last));
+}
+
+}  // namespace hermesh

@@ -1,0 +1,316 @@
+#include "algorithms/voxelization/distance/band.h"
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cstring>
+#include <deque>
+#include <numeric>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/lattice/sample_side.h"
+
+namespace hermesh {
+namespace {
+
+using kernels::Batch;
+using kernels::kBatch;
+using kernels::Kernels;
+
+/// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer,
+/// a triangle for its voxels. Where the two take equally long, measured.
+constexpr std::size_t kMany = 1000;
+
+/// Up to sixteen triangles on their way to the kernels.
+struct Pending {
+  kernels::MeshCorners corners;
+  std::int32_t id[kBatch];
+  int count = 0;
+
+  void add(const kernels::MeshCorners& from, int j, std::uint32_t triangle) {
+    for (int i = 0; i < 9; ++i) corners.corner[i][count] = from.corner[i][j];
+    id[count++] = std::int32_t(triangle);
+  }
+  /// Makes the unused places copies of the first triangle, so that they change nothing.
+  void fill() {
+    for (int j = count; j < kBatch; ++j) {
+      for (auto& row : corners.corner) row[j] = row[0];
+      id[j] = id[0];
+    }
+  }
+};
+
+/// One leaf at a time; its buffers serve the next.
+class LeafWork {
+ public:
+  /// `without`: triangles to leave out, ascending; may be null.
+  LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids,
+           const std::vector<std::uint32_t>* without = nullptr)
+      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(kernels::chosen()) {}
+
+  /// False when no voxel is within reach.
+  bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
+           kernels::EdgeBits& crossed) {
+    frame_ = {soup_.scale(), {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0}};
+    side_frame_ = frame_;
+    for (std::size_t a = 0; a < 3; ++a) side_frame_.origin[a] += kSideShift[a];
+    for (float& d : distances_.squared) d = float(reach_ * reach_) * 2.0f;
+    if (ids_) std::memset(distances_.id, 0xff, sizeof distances_.id);
+    crossed = {};
+    crossed_ = &crossed;
+    gather(block);
+    if (triangles_ > kMany && !without_)
+      look_from_voxels();
+    else
+      for (const TriangleBins::Cluster& cluster : clusters_) add(cluster.triangles);
+    const std::span<const std::uint32_t> large = bins_.large(number);
+    for (std::size_t i = 0; i < large.size(); i += kBatch)
+      add(large.subspan(i, std::min<std::size_t>(kBatch, large.size() - i)));
+    flush();
+    flush_crossing();
+    return kernels_.finish(distances_, float(reach_), voxel_size, values, active);
+  }
+
+  const kernels::Distances& distances() const { return distances_; }
+
+ private:
+  double gap2(const VoxelBox& box) const {
+    double sum = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double gap =
+          std::max({0.0, box.low[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.high[a]});
+      sum += gap * gap;
+    }
+    return sum;
+  }
+
+  void gather(const BlockAt& block) {
+    clusters_.clear();
+    triangles_ = 0;
+    bins_.for_each_cluster(block, [&](const TriangleBins::Cluster& cluster) {
+      if (gap2(cluster.box) > reach_ * reach_) return;
+      clusters_.push_back(cluster);
+      triangles_ += cluster.triangles.size();
+    });
+  }
+
+  /// At most 16.
+  void fetch(std::span<const std::uint32_t> triangles, kernels::MeshCorners& to) const {
+    for (std::size_t j = 0; j < triangles.size(); ++j) {
+      const Triangle t = soup_.triangle(triangles[j]);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Eigen::Vector3f& point = soup_.point(t[c]);
+        for (int a = 0; a < 3; ++a) to.corner[3 * c + std::size_t(a)][j] = point[a];
+      }
+    }
+  }
+
+  /// At most 16 triangles look for their voxels and edges.
+  void add(std::span<const std::uint32_t> triangles) {
+    fetch(triangles, fetched_);
+    const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
+    unsigned there = (2u << (triangles.size() - 1)) - 1;
+    if (without_)
+      for (std::size_t j = 0; j < triangles.size(); ++j)
+        if (std::binary_search(without_->begin(), without_->end(), triangles[j])) there &= ~(1u << j);
+    for (unsigned bits = near.within_reach & there; bits; bits &= bits - 1) {
+      const int j = __builtin_ctz(bits);
+      pending_.add(fetched_, j, triangles[std::size_t(j)]);
+      if (pending_.count == kBatch) flush();
+    }
+    add_crossing(near.at_edges & there, triangles);
+  }
+
+  void add_crossing(unsigned bits, std::span<const std::uint32_t> triangles) {
+    for (; bits; bits &= bits - 1) {
+      const int j = __builtin_ctz(bits);
+      crossing_.add(fetched_, j, triangles[std::size_t(j)]);
+      if (crossing_.count == kBatch) flush_crossing();
+    }
+  }
+
+  void flush() {
+    if (pending_.count == 0) return;
+    set_up(pending_, batch_);
+    kernels_.update(batch_, pending_.count, float(reach_), ids_, distances_);
+    pending_.count = 0;
+  }
+
+  void flush_crossing() {
+    if (crossing_.count == 0) return;
+    crossing_.fill();
+    kernels_.to_leaf(crossing_.corners, side_frame_, corners_);
+    kernels_.cross(corners_, crossing_.count, *crossed_);
+    crossing_.count = 0;
+  }
+
+  void set_up(Pending& triangles, Batch& batch) {
+    triangles.fill();
+    std::memcpy(batch.id, triangles.id, sizeof batch.id);
+    kernels_.to_leaf(triangles.corners, frame_, corners_);
+    for (unsigned thin = kernels_.set_up(corners_, batch); thin; thin &= thin - 1)
+      kernels::set_up_segment(corners_, __builtin_ctz(thin), batch);
+  }
+
+  void look_from_voxels() {
+    boxes_.resize((clusters_.size() + kBatch - 1) / kBatch);
+    for (std::size_t i = 0; i < boxes_.size() * kBatch; ++i) set_box(i);
+    pointers_.assign(clusters_.size(), nullptr);
+    used_ = 0;
+    const kernels::LazyBatches lazy{boxes_.data(), pointers_.data(), int(clusters_.size()), &prepare, this};
+    kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
+    for (const TriangleBins::Cluster& cluster : clusters_) {
+      if (!meets_edges(cluster.box)) continue;
+      fetch(cluster.triangles, fetched_);
+      const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
+      add_crossing(kernels_.near(fetched_, frame_, 1.0f).at_edges & there, cluster.triangles);
+    }
+  }
+
+  void set_box(std::size_t i) {
+    kernels::Boxes& boxes = boxes_[i / kBatch];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool there = i < clusters_.size();
+      // Rounding outwards by far more than single precision's error at this range.
+      boxes.side[a][0][i % kBatch] =
+          there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
+      boxes.side[a][1][i % kBatch] =
+          there ? float(clusters_[i].box.high[a] - frame_.origin[a]) + 1e-5f : 1e18f;
+    }
+  }
+
+  static const Batch* prepare(void* self, int i) {
+    return static_cast<LeafWork*>(self)->prepare_batch(std::size_t(i));
+  }
+
+  const Batch* prepare_batch(std::size_t i) {
+    if (used_ == pool_.size()) pool_.emplace_back();
+    Batch& batch = pool_[used_++];
+    const std::span<const std::uint32_t> triangles = clusters_[i].triangles;
+    fetch(triangles, pending_.corners);
+    std::copy(triangles.begin(), triangles.end(), pending_.id);
+    pending_.count = int(triangles.size());
+    set_up(pending_, batch);
+    pending_.count = 0;
+    return &batch;
+  }
+
+  /// Whether an edge of this leaf may meet the box: at least two of its sides must reach across a whole
+  /// number.
+  bool meets_edges(const VoxelBox& box) const {
+    int across = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double low = box.low[a] - frame_.origin[a] - 1e-5, high = box.high[a] - frame_.origin[a] + 1e-5;
+      if (high < 0.0 || low > 8.0) return false;
+      across += std::floor(high) >= std::ceil(low) ? 1 : 0;
+    }
+    return across >= 2;
+  }
+
+  const IndexSoup& soup_;
+  const TriangleBins& bins_;
+  double reach_;
+  bool ids_;
+  const std::vector<std::uint32_t>* without_;
+  const Kernels& kernels_;
+  kernels::LeafFrame frame_{}, side_frame_{};  ///< of the samples, and of the places of their sides
+  std::vector<TriangleBins::Cluster> clusters_;
+  std::size_t triangles_ = 0;  ///< in the clusters
+  kernels::Distances distances_;
+  kernels::MeshCorners fetched_{};
+  Pending pending_, crossing_;
+  kernels::Corners corners_;
+  Batch batch_;
+  kernels::EdgeBits* crossed_ = nullptr;
+  std::vector<kernels::Boxes> boxes_;
+  std::vector<const Batch*> pointers_;
+  std::deque<Batch> pool_;
+  std::size_t used_ = 0;
+};
+
+std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, const std::uint64_t* active) {
+  auto leaf = std::make_unique<FloatLeaf>(
+      openvdb::PartialCreate(), openvdb::Coord(block[0] * 8, block[1] * 8, block[2] * 8), 0.0f, false);
+  leaf->buffer().allocate();
+  std::memcpy(leaf->buffer().data(), values, 512 * sizeof(float));
+  FloatLeaf::NodeMaskType mask;
+  for (openvdb::Index x = 0; x < 8; ++x) mask.getWord<openvdb::Index64>(x) = active[x];
+  leaf->setValueMask(mask);
+  return leaf;
+}
+
+/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. A part of a slab at a time, so that
+/// this thread can report between them. Few blocks to a task: one of a fine mesh takes a good part of a
+/// millisecond, and a slab's last tasks are waited for.
+template <class F>
+void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span<const std::uint32_t> blocks,
+                   RunContext& context, F&& f) {
+  std::vector<std::vector<std::uint32_t>> slabs(bins.slab_count());
+  for (const std::uint32_t block : blocks) slabs[bins.slab_of(at[block])].push_back(block);
+  const std::size_t part = std::max<std::size_t>(1024, blocks.size() / 64);
+  std::size_t done = 0;
+  for (std::size_t slab = 0; slab < slabs.size(); ++slab) {
+    if (slabs[slab].empty()) continue;
+    bins.go_to_slab(slab);
+    for (std::size_t first = 0; first < slabs[slab].size(); first += part) {
+      context.progress("distances", double(done + first) / double(blocks.size()));
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, std::min(slabs[slab].size(), first + part), 2),
+                        [&](const auto& range) {
+                          context.check();
+                          for (std::size_t i = range.begin(); i != range.end(); ++i) f(slabs[slab][i]);
+                        });
+    }
+    done += slabs[slab].size();
+  }
+  bins.forget_slabs();
+}
+
+LeafTriangles nearest_triangles(const kernels::Distances& distances) {
+  LeafTriangles result;
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z)
+        result[std::size_t(x * 64 + y * 8 + z)] = distances.id[kernels::position(x, y, z)];
+  return result;
+}
+
+}  // namespace
+
+void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
+                 const std::function<void(const FoundLeaf&)>& found) {
+  const std::vector<BlockAt> at = bins.blocks().blocks();
+  std::vector<std::uint32_t> all;
+  if (!work.blocks) {
+    all.resize(at.size());
+    std::iota(all.begin(), all.end(), 0u);
+  }
+  tbb::enumerable_thread_specific<LeafWork> works(
+      [&] { return LeafWork(soup, bins, work.reach, work.nearest, work.without); });
+  for_each_slab(bins, at, work.blocks ? *work.blocks : all, context, [&](std::uint32_t block) {
+    LeafWork& of_thread = works.local();
+    FoundLeaf leaf;
+    leaf.block = block;
+    leaf.any =
+        of_thread.run(at[block], block, float(work.voxel_size), leaf.values, leaf.active, leaf.crossed);
+    if (work.nearest && leaf.any) leaf.nearest = nearest_triangles(of_thread.distances());
+    found(leaf);
+  });
+}
+
+Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context) {
+  Band band;
+  band.voxel_size = work.voxel_size;
+  band.blocks = bins.blocks().blocks();
+  band.leaves.resize(band.blocks.size());
+  band.crossed.resize(band.blocks.size());
+  if (work.nearest) band.nearest.resize(band.blocks.size());
+  find_leaves(soup, bins, work, context, [&](const FoundLeaf& leaf) {
+    band.crossed[leaf.block] = leaf.crossed;
+    if (!leaf.any) return;
+    band.leaves[leaf.block] = make_leaf(band.blocks[leaf.block], leaf.values, leaf.active);
+    if (work.nearest) band.nearest[leaf.block] = std::make_unique<LeafTriangles>(leaf.nearest);
+  });
+  return band;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,511 @@
+#include "algorithms/voxelization/distance/triangle_bins.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+namespace {
+
+/// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
+/// each, so small ones are filed once; but then a block must look at all that are filed around it.
+constexpr double kLargest = 4.0;
+/// Triangles of a slab, about, and slabs at most: few enough triangles that the clusters of three slabs are
+/// small beside the volume, few enough slabs that each keeps all threads busy.
+constexpr std::size_t kInSlab = 1 << 16;
+constexpr std::size_t kMostSlabs = 16;
+/// A thread that asks in any order keeps the bins around its block, and more while they are small: as many
+/// bins, or as many triangles.
+constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
+/// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
+constexpr std::size_t kMany = 256;
+
+std::int32_t block_of(double voxel) { return static_cast<std::int32_t>(std::floor(voxel)) >> 3; }
+
+BlockAt block_of_centre(const VoxelBox& box) {
+  BlockAt block;
+  for (std::size_t a = 0; a < 3; ++a) block[a] = block_of(0.5 * (box.low[a] + box.high[a]));
+  return block;
+}
+
+double gap(double low, double high, double from, double to) { return std::max({0.0, low - to, from - high}); }
+
+/// Calls f(block) for the blocks with a voxel nearer than `reach` to the box.
+template <class F>
+void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
+  BlockAt from, to;
+  for (int a = 0; a < 3; ++a) {
+    from[a] = block_of(std::ceil(box.low[a] - reach));
+    to[a] = block_of(std::floor(box.high[a] + reach));
+  }
+  const auto gap2 = [&](int axis, std::int32_t b) {
+    const double g = gap(box.low[axis], box.high[axis], 8.0 * b, 8.0 * b + 7.0);
+    return g * g;
+  };
+  for (std::int32_t x = from[0]; x <= to[0]; ++x)
+    for (std::int32_t y = from[1]; y <= to[1]; ++y) {
+      const double gap_xy = gap2(0, x) + gap2(1, y);
+      if (gap_xy > reach * reach) continue;
+      for (std::int32_t z = from[2]; z <= to[2]; ++z)
+        if (gap_xy + gap2(2, z) <= reach * reach) f(BlockAt{x, y, z});
+    }
+}
+
+/// Whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes
+/// through its edges.
+class TriangleSlab {
+ public:
+  explicit TriangleSlab(const TriangleCorners& c) {
+    const Eigen::Map<const Eigen::Vector3d> p0(c.data()), p1(c.data() + 3), p2(c.data() + 6);
+    const Eigen::Vector3d normal = (p1 - p0).cross(p2 - p0);
+    if (!(normal.squaredNorm() > 0)) return;
+    add(normal.normalized(), p0);
+    for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) {
+      const Eigen::Vector3d outward = (b - a).cross(normal);
+      if (outward.squaredNorm() > 0) add(outward.normalized(), a);
+    }
+  }
+  bool near(const BlockAt& block, double reach) const {
+    const Eigen::Vector3d centre(block[0] * 8.0 + 3.5, block[1] * 8.0 + 3.5, block[2] * 8.0 + 3.5);
+    for (int i = 0; i < count_; ++i) {
+      const double d = normal_[i].dot(centre) - offset_[i];
+      if ((i == 0 ? std::abs(d) : d) > reach + radius_[i]) return false;
+    }
+    return true;
+  }
+
+ private:
+  void add(const Eigen::Vector3d& normal, const Eigen::Vector3d& point) {
+    normal_[count_] = normal;
+    offset_[count_] = normal.dot(point);
+    // Half the extent of a block's voxels along the normal, and some for rounding.
+    radius_[count_] = 3.5 * normal.cwiseAbs().sum() + 1e-6;
+    ++count_;
+  }
+  Eigen::Vector3d normal_[4];
+  double offset_[4], radius_[4];
+  int count_ = 0;
+};
+
+/// Pieces of the work whose number depends on its size alone, so that every thread count gives the same
+/// result.
+struct Chunks {
+  std::size_t items, size, count;
+  explicit Chunks(std::size_t n, std::size_t smallest = 8192)
+      : items(n), size(std::max(smallest, (n + 63) / 64)), count((n + size - 1) / size) {}
+  std::size_t begin(std::size_t chunk) const { return chunk * size; }
+  std::size_t end(std::size_t chunk) const { return std::min(items, (chunk + 1) * size); }
+};
+
+template <class F>
+void parallel_chunks(const Chunks& chunks, const RunContext& context, F&& f) {
+  tbb::parallel_for(std::size_t(0), chunks.count, [&](std::size_t chunk) {
+    context.check();
+    f(chunk);
+  });
+}
+
+struct Centre {
+  Eigen::Vector3f at;
+  std::uint32_t triangle;
+};
+
+/// Orders triangles so that each sixteen in a row are close together: halves the longest side, again and
+/// again.
+void make_compact(std::span<Centre> centres) {
+  while (centres.size() > kClusterSize) {
+    Eigen::Vector3f low = centres[0].at, high = low;
+    for (const Centre& c : centres) {
+      low = low.cwiseMin(c.at);
+      high = high.cwiseMax(c.at);
+    }
+    int axis = 0;
+    (high - low).maxCoeff(&axis);
+    // Whole clusters on the lower side.
+    const std::size_t half = (centres.size() / 2 + kClusterSize - 1) / kClusterSize * kClusterSize;
+    std::nth_element(centres.begin(), centres.begin() + std::ptrdiff_t(half), centres.end(),
+                     [&](const Centre& a, const Centre& b) {
+                       return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.triangle < b.triangle;
+                     });
+    make_compact(centres.first(half));
+    centres = centres.subspan(half);
+  }
+}
+
+/// Orders many triangles along the Morton curve through cells of half a voxel, in linear time. Fills
+/// `sorted`.
+void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, double scale,
+                  std::vector<std::uint32_t>& cell, std::vector<Centre>& sorted) {
+  constexpr int kBits = 4;
+  std::vector<std::uint32_t> next((1 << 3 * kBits) + 1, 0);
+  cell.resize(centres.size());
+  for (std::size_t i = 0; i < centres.size(); ++i) {
+    std::uint32_t key = 0;
+    for (int a = 0; a < 3; ++a) {
+      // A centre is stored as the sum of the ends of its box.
+      const double place = 0.5 * double(centres[i].at[a]) * scale - 8.0 * block[std::size_t(a)];
+      const std::uint32_t c = std::uint32_t(std::clamp(place * 2.0, 0.0, 15.0));
+      for (int bit = 0; bit < kBits; ++bit) key |= (c >> bit & 1u) << (3 * bit + a);
+    }
+    cell[i] = key;
+    ++next[key + 1];
+  }
+  for (std::size_t c = 1; c < next.size(); ++c) next[c] += next[c - 1];
+  sorted.resize(centres.size());
+  for (std::size_t i = 0; i < centres.size(); ++i) sorted[next[cell[i]]++] = centres[i];
+}
+
+std::size_t packed_size(std::uint32_t step) {
+  std::size_t bytes = 1;
+  for (; step >= 128; step >>= 7) ++bytes;
+  return bytes;
+}
+
+void write_packed(std::uint32_t step, std::uint8_t*& at) {
+  for (; step >= 128; step >>= 7) *at++ = std::uint8_t(step | 128);
+  *at++ = std::uint8_t(step);
+}
+
+/// What a piece of the work files in a bin.
+struct BinRun {
+  explicit BinRun(std::uint32_t of_bin) : code(of_bin) {}
+  std::uint32_t code;  ///< of the bin in the piece's set
+  BinBox box;
+  std::uint32_t count = 0, first = 0, last = 0;  ///< triangles
+  std::uint64_t bytes = 0;                       ///< packed, of all but the first; later, where they go
+};
+
+/// Numbers for the codes of a set, in the order in which they first come.
+class CodeNumbers {
+ public:
+  /// The code's number, which is `next` if it has none.
+  std::uint32_t operator()(std::uint32_t code, std::uint32_t next) {
+    if (code >= numbers_.size()) numbers_.resize((code | 511) + 1, BlockTable::kNone);
+    if (numbers_[code] == BlockTable::kNone) numbers_[code] = next;
+    return numbers_[code];
+  }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+};
+
+}  // namespace
+
+/// What a first pass over the triangles tells, by piece of the work.
+struct TriangleBins::Survey {
+  std::vector<BlockSet> bins;  ///< of small triangles
+  std::vector<std::vector<BinRun>> runs;
+};
+
+void BinBox::add(const VoxelBox& box, const BlockAt& bin) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[a] - 3.0;
+    low[a] = std::min(low[a], std::uint8_t(std::clamp(16.0 * (box.low[a] - start), 0.0, 255.0)));
+    high[a] = std::max(high[a], std::uint8_t(std::clamp(16.0 * (box.high[a] - start) + 1.0, 0.0, 255.0)));
+  }
+}
+
+void BinBox::add(const BinBox& other) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    low[a] = std::min(low[a], other.low[a]);
+    high[a] = std::max(high[a], other.high[a]);
+  }
+}
+
+VoxelBox BinBox::in_voxels(const BlockAt& bin) const {
+  VoxelBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[a] - 3.0;
+    box.low[a] = start + low[a] / 16.0;
+    box.high[a] = start + high[a] / 16.0;
+  }
+  return box;
+}
+
+bool TriangleBins::is_large(const VoxelBox& box) {
+  double longest = 0;
+  for (std::size_t a = 0; a < 3; ++a) longest = std::max(longest, box.high[a] - box.low[a]);
+  return longest > kLargest;
+}
+
+TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& context)
+    : soup_(soup), context_(context), reach_(reach), rings_(int(std::ceil((reach + 0.5 * kLargest) / 8.0))) {
+  Survey found = survey();
+  choose_blocks(found);
+  pack(found);
+  choose_slabs();
+  if (slabs_.size() == 1) go_to_slab(0);
+}
+
+TriangleBins::Survey TriangleBins::survey() {
+  const Chunks chunks(soup_.size());
+  Survey found;
+  found.bins.resize(chunks.count);
+  found.runs.resize(chunks.count);
+  all_large_.resize(chunks.count);
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) {
+    std::vector<BinRun>& runs = found.runs[chunk];
+    CodeNumbers numbers;
+    for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
+      const VoxelBox box = in_voxels(box_of(t));
+      if (is_large(box)) {
+        all_large_[chunk].push_back(t);
+        continue;
+      }
+      const BlockAt block = block_of_centre(box);
+      const std::uint32_t code = found.bins[chunk].insert(block);
+      const std::uint32_t number = numbers(code, std::uint32_t(runs.size()));
+      if (number == runs.size()) runs.emplace_back(code);
+      BinRun& run = runs[number];
+      run.box.add(box, block);
+      if (run.count++ == 0)
+        run.first = t;
+      else
+        run.bytes += packed_size(t - run.last);
+      run.last = t;
+    }
+  });
+  bins_ = BlockTable(found.bins);
+  bin_at_ = bins_.blocks();
+  return found;
+}
+
+/// The boxes are made again rather than remembered, which for ten million triangles would take more memory
+/// than the volume.
+void TriangleBins::pack(Survey& survey) {
+  const std::size_t bins = bins_.size();
+  first_byte_.assign(bins + 1, 0);
+  count_.assign(bins, 0);
+  box_of_bin_.assign(bins, {});
+  std::vector<std::uint32_t> before(bins, 0);  // the last triangle so far
+  for (std::size_t chunk = 0; chunk < survey.runs.size(); ++chunk) {
+    const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
+    for (BinRun& run : survey.runs[chunk]) {
+      const std::uint32_t bin = bins_.number(translation, run.code);
+      const std::uint64_t size = run.bytes + packed_size(run.first - before[bin]);
+      run.bytes = std::exchange(first_byte_[bin], first_byte_[bin] + size);
+      count_[bin] += run.count;
+      box_of_bin_[bin].add(run.box);
+      run.first = std::exchange(before[bin], run.last);
+    }
+  }
+  std::uint64_t total = 0;
+  for (std::uint64_t& bytes : first_byte_) total += std::exchange(bytes, total);
+  packed_.resize(total);
+  const Chunks chunks(soup_.size());
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) {
+    std::vector<BinRun>& runs = survey.runs[chunk];
+    const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
+    std::vector<std::uint8_t*> to;
+    CodeNumbers numbers;
+    for (const BinRun& run : runs) {
+      numbers(run.code, std::uint32_t(to.size()));
+      to.push_back(packed_.data() + first_byte_[bins_.number(translation, run.code)] + run.bytes);
+    }
+    for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
+      const VoxelBox box = in_voxels(box_of(t));
+      if (is_large(box)) continue;
+      const std::uint32_t run = numbers(survey.bins[chunk].insert(block_of_centre(box)), 0);
+      write_packed(t - std::exchange(runs[run].first, t), to[run]);
+    }
+    runs = {};
+  });
+}
+
+/// Across x unless another side is much longer: blocks are numbered along x first, so that those who ask for
+/// them in their order stay in a slab for long.
+void TriangleBins::choose_slabs() {
+  place_.resize(bins_.size());
+  std::array<std::map<std::int32_t, std::size_t>, 3> layers;  // how many triangles
+  for (std::size_t bin = 0; bin < bins_.size(); ++bin)
+    for (std::size_t a = 0; a < 3; ++a) layers[a][bin_at_[bin][a]] += count_[bin];
+  for (std::size_t a = 1; a < 3; ++a)
+    if (layers[a].size() > 2 * layers[axis_].size()) axis_ = a;
+  std::size_t left = 0, filed = 0;
+  for (const auto& [layer, count] : layers[axis_]) left += count;
+  const std::size_t share = std::max(kInSlab, (left + kMostSlabs - 1) / kMostSlabs);
+  std::int32_t begin = left == 0 ? 0 : layers[axis_].begin()->first;
+  for (const auto& [layer, count] : layers[axis_]) {
+    filed += count;
+    left -= count;
+    // A slab at least as thick as triangles reach, so that none but its neighbours matter to it.
+    if (left == 0 || filed < share || layer + 1 - begin < rings_) continue;
+    slabs_.push_back({.end = begin = layer + 1, .bins = {}, .files = {}});
+    filed = 0;
+  }
+  slabs_.push_back({.end = std::numeric_limits<std::int32_t>::max(), .bins = {}, .files = {}});
+  for (std::uint32_t bin = 0; bin < bins_.size(); ++bin) {
+    std::vector<std::uint32_t>& bins = slabs_[slab_of(bin_at_[bin])].bins;
+    place_[bin] = std::uint32_t(bins.size());
+    bins.push_back(bin);
+  }
+}
+
+void TriangleBins::choose_blocks(const Survey& survey) {
+  const std::size_t chunks = survey.bins.size();
+  std::vector<BlockSet> sets(2 * chunks);
+  std::vector<Pairs> pairs(chunks);
+  tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {
+    for (const BinRun& run : survey.runs[chunk]) {
+      context_.check();
+      for_each_block_near(run.box.in_voxels(survey.bins[chunk].block(run.code)), reach_,
+                          [&](const BlockAt& block) { sets[chunk].insert(block); });
+    }
+    pairs[chunk] = file_large(all_large_[chunk], sets[chunks + chunk]);
+  });
+  blocks_ = BlockTable(sets);
+  first_large_.assign(blocks_.size() + 1, 0);
+  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+    const std::vector<std::uint32_t> translation = blocks_.translation(sets[chunks + chunk]);
+    for (auto& [block, triangle] : pairs[chunk]) ++first_large_[block = blocks_.number(translation, block)];
+  }
+  std::uint64_t total = 0;
+  for (std::uint64_t& count : first_large_) total += std::exchange(count, total);
+  large_.resize(total);
+  std::vector<std::uint64_t> next(first_large_.begin(), first_large_.end() - 1);
+  for (Pairs& chunk : pairs) {
+    for (const auto& [block, triangle] : chunk) large_[next[block]++] = triangle;
+    chunk = {};
+  }
+  all_large_ = {};
+}
+
+TriangleBins::Pairs TriangleBins::file_large(const std::vector<std::uint32_t>& triangles,
+                                             BlockSet& blocks) const {
+  Pairs pairs;
+  for (const std::uint32_t t : triangles) {
+    context_.check();
+    const TriangleSlab slab(soup_.corners(t));
+    for_each_block_near(in_voxels(box_of(t)), reach_, [&](const BlockAt& block) {
+      if (slab.near(block, reach_)) pairs.emplace_back(blocks.insert(block), t);
+    });
+  }
+  return pairs;
+}
+
+// ---- Clusters.
+
+std::size_t TriangleBins::slab_of(const BlockAt& block) const {
+  std::size_t slab = 0;
+  while (block[axis_] >= slabs_[slab].end && slab + 1 < slabs_.size()) ++slab;
+  return slab;
+}
+
+void TriangleBins::go_to_slab(std::size_t slab) {
+  for (std::size_t i = 0; i < slabs_.size(); ++i)
+    if (i + 1 < slab || i > slab + 1) slabs_[i].files.reset();
+  for (std::size_t i = slab == 0 ? 0 : slab - 1; i < std::min(slab + 2, slabs_.size()); ++i)
+    if (!slabs_[i].files)
+      slabs_[i].files = std::make_unique<Files>(make_files(slabs_[i].bins, Purpose::all_blocks));
+}
+
+void TriangleBins::forget_slabs() {
+  if (slabs_.size() == 1) return;
+  for (Slab& slab : slabs_) slab.files.reset();
+}
+
+std::size_t TriangleBins::bytes_in_memory() const {
+  std::size_t bytes = packed_.size() + bins_.size() * (sizeof(BlockAt) + sizeof(BinBox) + 16);
+  for (const Slab& slab : slabs_)
+    if (slab.files) bytes += 4 * slab.files->order.size() + sizeof(FloatBox) * slab.files->clusters.size();
+  return bytes;
+}
+
+/// The thread's own. They serve few questions, so the triangles stay in the mesh's order: where that goes
+/// along the surface, its sixteens are compact, too.
+const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
+  std::unordered_map<std::uint32_t, Files>& lent = lent_.local();
+  const auto known = lent.find(bin);
+  if (known != lent.end()) return known->second;
+  std::size_t triangles = 0;
+  for (const auto& [other, files] : lent) triangles += files.order.size();
+  if (lent.size() >= kLentBins && triangles > kLentTriangles) lent.clear();
+  return lent.emplace(bin, make_files({bin}, Purpose::few_questions)).first->second;
+}
+
+/// Buffers of one thread.
+struct TriangleBins::Sorter {
+  std::vector<Centre> centres, sorted;
+  std::vector<std::uint32_t> cells;
+};
+
+TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& bins, Purpose purpose) const {
+  Files files;
+  files.first.resize(bins.size() + 1);
+  files.first_cluster.resize(bins.size() + 1);
+  std::uint32_t triangles = 0, clusters = 0;
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    files.first[i] = triangles;
+    files.first_cluster[i] = clusters;
+    triangles += count_[bins[i]];
+    clusters += (count_[bins[i]] + std::uint32_t(kClusterSize) - 1) / std::uint32_t(kClusterSize);
+  }
+  files.first.back() = triangles;
+  files.first_cluster.back() = clusters;
+  files.order.resize(triangles);
+  files.clusters.resize(clusters);
+  const auto some = [&](std::size_t begin, std::size_t end) {
+    Sorter sorter;
+    for (std::size_t i = begin; i < end; ++i) {
+      context_.check();
+      const std::span<std::uint32_t> of_bin(files.order.data() + files.first[i], count_[bins[i]]);
+      unpack(bins[i], of_bin.data());
+      if (purpose == Purpose::all_blocks) sort(bins[i], of_bin, sorter);
+      enclose(of_bin, files.clusters.data() + files.first_cluster[i]);
+    }
+  };
+  if (purpose == Purpose::few_questions) {
+    some(0, bins.size());
+    return files;
+  }
+  const Chunks chunks(bins.size(), 4);
+  parallel_chunks(chunks, context_, [&](std::size_t chunk) { some(chunks.begin(chunk), chunks.end(chunk)); });
+  return files;
+}
+
+void TriangleBins::unpack(std::uint32_t bin, std::uint32_t* to) const {
+  const std::uint8_t* at = packed_.data() + first_byte_[bin];
+  std::uint32_t triangle = 0;
+  for (std::uint32_t i = 0; i < count_[bin]; ++i) {
+    int shift = 0;
+    for (; *at & 128; shift += 7) triangle += std::uint32_t(*at++ & 127) << shift;
+    triangle += std::uint32_t(*at++) << shift;
+    *to++ = triangle;
+  }
+}
+
+/// Orders the triangles of a bin so that each sixteen in a row are close together.
+void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, Sorter& sorter) const {
+  if (triangles.size() <= kClusterSize) return;
+  std::vector<Centre>& centres = sorter.centres;
+  centres.clear();
+  for (const std::uint32_t t : triangles) {
+    const FloatBox box = box_of(t);
+    centres.push_back({box.low + box.high, t});
+  }
+  if (centres.size() > kMany) {
+    sort_by_cell(centres, bin_at_[bin], soup_.scale(), sorter.cells, sorter.sorted);
+    centres.swap(sorter.sorted);
+  } else {
+    make_compact(centres);
+  }
+  std::transform(centres.begin(), centres.end(), triangles.begin(),
+                 [](const Centre& c) { return c.triangle; });
+}
+
+void TriangleBins::enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const {
+  for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++clusters) {
+    *clusters = box_of(triangles[first]);
+    for (std::size_t i = first + 1; i < std::min(first + kClusterSize, triangles.size()); ++i) {
+      const FloatBox box = box_of(triangles[i]);
+      clusters->low = clusters->low.cwiseMin(box.low);
+      clusters->high = clusters->high.cwiseMax(box.high);
+    }
+  }
+}
+
+}  // namespace hermesh

@@ -1,0 +1,198 @@
+// Which triangles can be near which block of voxels. Small triangles are filed once each, under the block of
+// their box's centre, in clusters of sixteen with a box of their own; large ones under every block that they
+// come near. The clusters exist for a slab of space at a time, for all of them together can outweigh the
+// volume that is made; what is kept of the rest are the triangles' numbers, packed.
+#pragma once
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "algorithms/lattice/block_table.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/voxelization/distance/index_soup.h"
+
+namespace hermesh {
+
+/// Box in voxels relative to the mesh's origin; never smaller than what it holds.
+struct VoxelBox {
+  std::array<double, 3> low, high;
+};
+
+/// From a block's first voxel to its last and `margin` more.
+inline VoxelBox around(const BlockAt& block, double margin) {
+  VoxelBox box;
+  for (std::size_t a = 0; a < 3; ++a) {
+    box.low[a] = block[a] * 8.0 - margin;
+    box.high[a] = block[a] * 8.0 + 7.0 + margin;
+  }
+  return box;
+}
+
+inline constexpr std::size_t kClusterSize = 16;
+
+/// The box of small triangles that are filed in a bin: sixteenths of a voxel from three voxels before the
+/// bin's first, rounded outwards. A small triangle reaches two voxels beyond its bin.
+struct BinBox {
+  std::array<std::uint8_t, 3> low{255, 255, 255}, high{0, 0, 0};
+
+  void add(const VoxelBox& box, const BlockAt& bin);
+  void add(const BinBox& other);
+  VoxelBox in_voxels(const BlockAt& bin) const;
+};
+
+class TriangleBins {
+ public:
+  /// `reach`: how far from a triangle, in voxels, its distance matters. The soup and the context have to
+  /// outlive the bins. @throws Cancelled.
+  TriangleBins(const IndexSoup& soup, double reach, RunContext& context);
+
+  /// Blocks with a voxel that may be nearer than the reach to a triangle; some have none.
+  const BlockTable& blocks() const { return blocks_; }
+
+  struct Cluster {
+    std::span<const std::uint32_t> triangles;  ///< numbers, at most kClusterSize
+    VoxelBox box;
+  };
+  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are
+  /// within reach. From any thread, but not from within f, where the slabs around the block are not in
+  /// memory: the clusters are made then, and kept for this thread's next call.
+  template <class F>
+  void for_each_cluster(const BlockAt& block, F&& f) const {
+    for_each_cluster(block, around(block, reach_), f);
+  }
+  /// The same for the clusters that may meet a box, which reaches no farther around the block's voxels than
+  /// the reach. The smaller the box, the fewer clusters have to be made.
+  template <class F>
+  void for_each_cluster(const BlockAt& block, const VoxelBox& near, F&& f) const;
+  /// Large triangles within reach of block number `i`, in ascending order.
+  std::span<const std::uint32_t> large(std::uint32_t i) const {
+    return {large_.data() + first_large_[i], first_large_[i + 1] - first_large_[i]};
+  }
+
+  /// Space is cut across one axis into slabs; the triangles that matter to a block are in its own and the two
+  /// beside it.
+  std::size_t slab_count() const { return slabs_.size(); }
+  std::size_t slab_of(const BlockAt& block) const;
+  /// Makes the clusters of a slab and its neighbours, and forgets those of the others. For work that goes
+  /// from slab to slab; not while another thread asks for clusters. @throws Cancelled.
+  void go_to_slab(std::size_t slab);
+  /// Forgets all clusters, unless there is but one slab.
+  void forget_slabs();
+  /// What the small triangles take now.
+  std::size_t bytes_in_memory() const;
+
+ private:
+  struct FloatBox {
+    Eigen::Vector3f low, high;  ///< world units relative to the mesh's origin, exact
+  };
+  /// Triangles of some bins, and their clusters; clusters do not reach across bins.
+  struct Files {
+    std::vector<std::uint32_t> first, order;  ///< bin b: order[first[b]] …
+    std::vector<std::uint32_t> first_cluster;
+    std::vector<FloatBox> clusters;
+  };
+  struct Slab {
+    std::int32_t end = 0;             ///< first layer of blocks beyond it
+    std::vector<std::uint32_t> bins;  ///< numbers, ascending
+    std::unique_ptr<Files> files;     ///< may be absent
+  };
+  struct Survey;
+
+  Survey survey();
+  void pack(Survey& survey);
+  void choose_slabs();
+  void choose_blocks(const Survey& survey);
+  using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  ///< a block and a large triangle
+  Pairs file_large(const std::vector<std::uint32_t>& triangles, BlockSet& blocks) const;
+  enum class Purpose { all_blocks, few_questions };
+  Files make_files(const std::vector<std::uint32_t>& bins, Purpose purpose) const;
+  void unpack(std::uint32_t bin, std::uint32_t* to) const;
+  struct Sorter;
+  void sort(std::uint32_t bin, std::span<std::uint32_t> triangles, Sorter& sorter) const;
+  void enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const;
+  const Files& own_files(std::uint32_t bin) const;
+  template <class F>
+  void for_each_in(const Files& files, std::uint32_t i, const VoxelBox& near, F&& f) const;
+  static bool meet(const VoxelBox& a, const VoxelBox& b);
+  VoxelBox bin_box(std::uint32_t bin) const { return box_of_bin_[bin].in_voxels(bin_at_[bin]); }
+  static bool is_large(const VoxelBox& box);
+  VoxelBox in_voxels(const FloatBox& box) const;
+  FloatBox box_of(std::size_t triangle) const;
+
+  const IndexSoup& soup_;
+  RunContext& context_;
+  double reach_;
+  int rings_;  ///< how many blocks away a small triangle that matters can be filed
+  BlockTable bins_;
+  std::vector<BlockAt> bin_at_;
+  std::vector<BinBox> box_of_bin_;
+  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte,
+  /// the lowest first, the eighth bit where more follow.
+  std::vector<std::uint8_t> packed_;
+  std::vector<std::uint64_t> first_byte_;
+  std::vector<std::uint32_t> count_;
+  std::size_t axis_ = 0;
+  std::vector<Slab> slabs_;
+  std::vector<std::uint32_t> place_;  ///< of each bin among those of its slab
+  BlockTable blocks_;
+  std::vector<std::vector<std::uint32_t>> all_large_;  ///< large triangles, by piece of the work
+  std::vector<std::uint64_t> first_large_;
+  std::vector<std::uint32_t> large_;
+  /// Files of single bins for those who ask in any order.
+  mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> lent_;
+};
+
+inline bool TriangleBins::meet(const VoxelBox& a, const VoxelBox& b) {
+  bool apart = false;
+  for (std::size_t i = 0; i < 3; ++i) apart |= a.low[i] > b.high[i] || a.high[i] < b.low[i];
+  return !apart;
+}
+
+template <class F>
+void TriangleBins::for_each_in(const Files& files, std::uint32_t i, const VoxelBox& near, F&& f) const {
+  std::uint32_t start = files.first[i];
+  for (std::uint32_t c = files.first_cluster[i]; c < files.first_cluster[i + 1]; ++c) {
+    const std::uint32_t end = std::min<std::uint32_t>(start + kClusterSize, files.first[i + 1]);
+    const VoxelBox box = in_voxels(files.clusters[c]);
+    if (meet(box, near)) f(Cluster{{files.order.data() + start, end - start}, box});
+    start = end;
+  }
+}
+
+template <class F>
+void TriangleBins::for_each_cluster(const BlockAt& block, const VoxelBox& near, F&& f) const {
+  BlockFinder finder(bins_);
+  for (int x = -rings_; x <= rings_; ++x)
+    for (int y = -rings_; y <= rings_; ++y)
+      for (int z = -rings_; z <= rings_; ++z) {
+        const BlockAt at{block[0] + x, block[1] + y, block[2] + z};
+        const std::uint32_t bin = finder.find(at);
+        if (bin == BlockTable::kNone || !meet(bin_box(bin), near)) continue;
+        if (const Files* files = slabs_[slab_of(at)].files.get())
+          for_each_in(*files, place_[bin], near, f);
+        else
+          for_each_in(own_files(bin), 0, near, f);
+      }
+}
+
+inline VoxelBox TriangleBins::in_voxels(const FloatBox& box) const {
+  VoxelBox result;
+  for (int a = 0; a < 3; ++a) {
+    result.low[a] = double(box.low[a]) * soup_.scale();
+    result.high[a] = double(box.high[a]) * soup_.scale();
+  }
+  return result;
+}
+
+inline TriangleBins::FloatBox TriangleBins::box_of(std::size_t triangle) const {
+  const Triangle t = soup_.triangle(triangle);
+  const Eigen::Vector3f &a = soup_.point(t[0]), &b = soup_.point(t[1]), &c = soup_.point(t[2]);
+  return {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};
+}
+
+}  // namespace hermesh

@@ -1,0 +1,347 @@
+#include "algorithms/voxelization/inside/orientation.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "algorithms/core/groups.h"
+#include "algorithms/voxelization/inside/duplicate_faces.h"
+
+namespace hermesh {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+/// Share of the area beyond which faces that tell no side leave the whole mesh without one.
+constexpr double kMost = 0.5;
+/// A flat sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
+constexpr double kNoVolume = 1e-6;
+
+/// The triangles with each point replaced by the lowest number of a point at the same position.
+std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
+                                   std::span<const Triangle> triangles) {
+  struct Place {
+    float x, y, z;
+    std::uint32_t point;
+  };
+  std::vector<Place> places(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    places[i] = {points[i][0], points[i][1], points[i][2], static_cast<std::uint32_t>(i)};
+  tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.x, a.y, a.z, a.point) < std::tie(b.x, b.y, b.z, b.point);
+  });
+  std::vector<std::uint32_t> first(points.size());
+  for_groups(
+      std::span<const Place>(places),
+      [](const Place& a, const Place& b) { return a.x == b.x && a.y == b.y && a.z == b.z; },
+      [&](std::span<const Place> same) {
+        for (const Place& place : same) first[place.point] = same[0].point;
+      });
+  std::vector<Triangle> merged(triangles.begin(), triangles.end());
+  for (Triangle& t : merged)
+    for (std::uint32_t& point : t) point = first[point];
+  return merged;
+}
+
+class Orienter {
+ public:
+  Orienter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
+      : points_(points), triangles_(merge_points(points, triangles)) {
+    result_.turns.assign(triangles_.size(), 1);
+  }
+
+  Orientation run() {
+    drop_duplicates();
+    if (area_ > 0) {
+      link_neighbours();
+      agree();
+    }
+    for (const std::int8_t turn : result_.turns) result_.flipped += turn < 0;
+    if (!(area_ > 0) && !(cancelling_area_ > 0))
+      result_.verdict = Orientation::Verdict::no_area;
+    else if (cancelling_area_ > kMost * area_)
+      result_.verdict = Orientation::Verdict::cancelling;
+    else if (one_sided_area_ > kMost * area_)
+      result_.verdict = Orientation::Verdict::not_orientable;
+    return std::move(result_);
+  }
+
+ private:
+  static constexpr std::uint32_t kDisagrees = 1;
+
+  struct Edge {
+    std::uint32_t low, high;
+    std::uint32_t face_and_way;  ///< twice the face's number, plus 1 if it runs from high to low
+    bool operator<(const Edge& o) const {
+      return std::tie(low, high, face_and_way) < std::tie(o.low, o.high, o.face_and_way);
+    }
+  };
+  struct Patch {
+    std::size_t begin = 0, end = 0;  ///< in queue_
+    bool consistent = true, orientable = true, closed = true;
+    bool has_rim = false;                        ///< an edge that no other face has
+    double given = 0.0, turned = 0.0;  ///< area that keeps the given winding, and that does not
+    double volume = 0.0;               ///< after the turns, about centre_
+    Eigen::Vector3d vector = Eigen::Vector3d::Zero();  ///< sum of the area vectors; zero if it is closed
+  };
+
+  Eigen::Vector3d corner(std::size_t face, int c) const {
+    return points_[triangles_[face][c]].cast<double>();
+  }
+  Eigen::Vector3d area_vector(std::size_t face) const {
+    const Eigen::Vector3d a = corner(face, 0);
+    return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
+  }
+
+  /// Faces that are there with both windings count for the area, so that it is known how much of it cancels; those of
+  /// double walls do not, unless there are no others.
+  void drop_duplicates() {
+    const DuplicateFaces duplicates = find_duplicates(triangles_);
+    result_.duplicates = duplicates.dropped.size();
+    for (const std::uint32_t face : duplicates.dropped) result_.turns[face] = 0;
+    for (const std::uint32_t face : find_double_walls(triangles_, duplicates)) result_.turns[face] = 0;
+    measure();
+    for (const std::uint32_t face : duplicates.cancelling)
+      if (result_.turns[face] != 0 || !(area_ > 0)) cancelling_area_ += area_vector(face).norm();
+  }
+
+  /// The area, its centre, about which volumes are taken, and its box.
+  void measure() {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      if (result_.turns[face] == 0) continue;
+      const double area = area_vector(face).norm();
+      area_ += area;
+      sum += area / 3 * (corner(face, 0) + corner(face, 1) + corner(face, 2));
+      if (area > 0)
+        for (int c = 0; c < 3; ++c) box_.add(corner(face, c));
+    }
+    if (area_ > 0) centre_ = sum / area_;
+  }
+
+  void link_neighbours() {
+    std::vector<Edge> edges;
+    edges.reserve(3 * triangles_.size());
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      const Triangle& t = triangles_[face];
+      if (result_.turns[face] == 0 || is_degenerate(t)) continue;
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t from = t[k], to = t[(k + 1) % 3];
+        edges.push_back({std::min(from, to), std::max(from, to),
+                         static_cast<std::uint32_t>(2 * face + (from > to ? 1 : 0))});
+      }
+    }
+    tbb::parallel_sort(edges.begin(), edges.end());
+    neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
+    on_rim_.assign(triangles_.size(), 0);
+    for_groups(
+        std::span<const Edge>(edges),
+        [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
+        [&](std::span<const Edge> same) {
+          if (same.size() == 1) {
+            ++result_.boundary_edges;
+            on_rim_[same[0].face_and_way >> 1] = 1;
+          }
+          if (same.size() > 2) ++result_.non_manifold_edges;
+          if (same.size() != 2) {
+            if (same.size() > 2) shared_edges_.insert(shared_edges_.end(), same.begin(), same.end());
+            return;
+          }
+          ++two_face_edges_;
+          link(same[0].face_and_way, same[1].face_and_way);
+        });
+    // Faces that most often meet by threes or more form no surface over which a winding could spread.
+    if (result_.non_manifold_edges > two_face_edges_)
+      neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
+  }
+
+  /// Two faces agree if they run along their edge in opposite ways.
+  void link(std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t disagrees = (a & 1) == (b & 1) ? kDisagrees : 0;
+    const auto add = [](std::array<std::uint32_t, 3>& list, std::uint32_t entry) {
+      *std::find(list.begin(), list.end(), kNone) = entry;
+    };
+    add(neighbours_[a >> 1], (b & ~1u) | disagrees);
+    add(neighbours_[b >> 1], (a & ~1u) | disagrees);
+  }
+
+  /// Turns patch by patch, each from its lowest face on.
+  void agree() {
+    std::vector<std::int8_t> turns(triangles_.size(), 0);  // 0: not met yet
+    std::vector<Patch> patches;
+    double given_volume = 0.0;
+    Eigen::Vector3d given_vector = Eigen::Vector3d::Zero();
+    queue_.reserve(triangles_.size());
+    for (std::size_t face = 0; face < triangles_.size(); ++face) {
+      if (turns[face] != 0 || result_.turns[face] == 0 || is_degenerate(triangles_[face])) continue;
+      Patch patch = spread(static_cast<std::uint32_t>(face), turns);
+      if (patch.turned > patch.given) turn_over(patch, turns);
+      given_volume += patch.volume;
+      given_vector += patch.vector;
+      if (!follows_given(patch) && patch.volume < 0) turn_over(patch, turns);
+      patches.push_back(patch);
+    }
+    const bool inside_out = largest_volume(given_volume, given_vector) < -kNoVolume * std::pow(area_, 1.5);
+    for (Patch& patch : patches) {
+      if (inside_out && follows_given(patch)) turn_over(patch, turns);
+      result_.non_orientable_patches += !patch.orientable;
+      if (!patch.orientable) one_sided_area_ += patch.given + patch.turned;
+    }
+    result_.patches = patches.size();
+    leave_out_walls(patches, turns);
+    for (const std::uint32_t face : queue_) result_.turns[face] = turns[face];
+  }
+
+  /// How often the faces of one patch, or all, run along an edge of more than two faces from its low point to its high
+  /// one more than the other way.
+  struct Flow {
+    std::uint32_t patch;
+    std::size_t edge;
+    int own;
+  };
+
+  /// Sorts by patch and edge, and adds up what is of the same.
+  static void merge_by_patch(std::vector<Flow>& flows) {
+    const auto key = [](const Flow& f) { return std::tie(f.patch, f.edge); };
+    tbb::parallel_sort(flows.begin(), flows.end(), [&](const Flow& a, const Flow& b) { return key(a) < key(b); });
+    std::size_t count = 0;
+    for (const Flow& flow : flows)
+      if (count > 0 && key(flows[count - 1]) == key(flow))
+        flows[count - 1].own += flow.own;
+      else
+        flows[count++] = flow;
+    flows.resize(count);
+  }
+
+  /// Leaves out each patch of which the others are independent: at every edge of its border two or more others meet, and
+  /// without it these run along the edge as often one way as the other. So it is a wall within the solid or a fin of no
+  /// thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall would make a solid, too; the
+  /// least area comes first, and no surface within the wall's border has less than a plane one.
+  void leave_out_walls(const std::vector<Patch>& patches, std::vector<std::int8_t>& turns) {
+    if (shared_edges_.empty() || result_.non_manifold_edges > two_face_edges_) return;
+    std::vector<std::uint32_t> patch_of(triangles_.size(), kNone);
+    for (std::uint32_t p = 0; p < patches.size(); ++p)
+      for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) patch_of[queue_[i]] = p;
+    std::vector<int> total;
+    std::vector<Flow> flows;
+    for_groups(
+        std::span<const Edge>(shared_edges_),
+        [](const Edge& a, const Edge& b) { return a.low == b.low && a.high == b.high; },
+        [&](std::span<const Edge> same) {
+          total.push_back(0);
+          for (const Edge& edge : same) {
+            const std::uint32_t face = edge.face_and_way >> 1;
+            flows.push_back({patch_of[face], total.size() - 1, (edge.face_and_way & 1) ? -turns[face] : turns[face]});
+            total.back() += flows.back().own;
+          }
+        });
+    merge_by_patch(flows);
+    std::vector<std::uint32_t> order(patches.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return patches[a].given + patches[a].turned < patches[b].given + patches[b].turned;
+    });
+    for (const std::uint32_t p : order) {
+      // An edge of one face is the border of a hole, and the patch may be what is left of a solid.
+      if (patches[p].has_rim || !patches[p].orientable) continue;
+      const auto [begin, end] = std::ranges::equal_range(flows, p, {}, &Flow::patch);
+      const bool others_are_closed = std::all_of(begin, end, [&](const Flow& f) { return f.own == total[f.edge]; });
+      if (!others_are_closed || std::all_of(begin, end, [](const Flow& f) { return f.own == 0; })) continue;
+      for (auto f = begin; f != end; ++f) total[f->edge] -= f->own;
+      for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) turns[queue_[i]] = 0;
+    }
+  }
+
+  /// The volume of an open surface, which is that of the cone to it, depends on where the cone's apex is: it
+  /// is linear in the apex, and so the largest in one of the corners of the box.
+  double largest_volume(double about_centre, const Eigen::Vector3d& vector) const {
+    double volume = about_centre;
+    for (int a = 0; a < 3; ++a)
+      volume +=
+          std::max(vector[a] * (centre_[a] - box_.lower[a]), vector[a] * (centre_[a] - box_.upper[a])) / 3;
+    return volume;
+  }
+
+  /// Walks over a patch breadth first and turns its faces to agree with its first.
+  Patch spread(std::uint32_t seed, std::vector<std::int8_t>& turns) {
+    Patch patch;
+    patch.begin = queue_.size();
+    turns[seed] = 1;
+    queue_.push_back(seed);
+    for (std::size_t at = patch.begin; at < queue_.size(); ++at) {
+      const std::uint32_t face = queue_[at];
+      const Eigen::Vector3d n = area_vector(face);
+      (turns[face] > 0 ? patch.given : patch.turned) += n.norm();
+      patch.volume += turns[face] * n.dot(corner(face, 0) - centre_) / 3;
+      patch.vector += turns[face] * n;
+      patch.has_rim |= on_rim_[face] != 0;
+      for (const std::uint32_t entry : neighbours_[face]) {
+        if (entry == kNone) {
+          patch.closed = false;
+          continue;
+        }
+        const bool disagrees = entry & kDisagrees;
+        const auto turn = static_cast<std::int8_t>(disagrees ? -turns[face] : turns[face]);
+        if (disagrees) patch.consistent = false;
+        std::int8_t& known = turns[entry >> 1];
+        if (known == 0) queue_.push_back(entry >> 1);
+        if (known == -turn) patch.orientable = false;
+        if (known == 0) known = turn;
+      }
+    }
+    patch.end = queue_.size();
+    return patch;
+  }
+
+  /// Whether the winding is that of the file, and not that of the volume.
+  static bool follows_given(const Patch& patch) {
+    return patch.consistent || !patch.closed || !patch.orientable;
+  }
+  void turn_over(Patch& patch, std::vector<std::int8_t>& turns) const {
+    std::swap(patch.given, patch.turned);
+    patch.volume = -patch.volume;
+    patch.vector = -patch.vector;
+    for (std::size_t i = patch.begin; i < patch.end; ++i) turns[queue_[i]] = -turns[queue_[i]];
+  }
+
+  std::span<const Eigen::Vector3f> points_;
+  std::vector<Triangle> triangles_;  ///< of merged points
+  /// Per face its neighbours over edges of two faces: twice the number, plus kDisagrees.
+  std::vector<std::array<std::uint32_t, 3>> neighbours_;
+  std::vector<char> on_rim_;          ///< faces with an edge that no other has
+  std::vector<Edge> shared_edges_;    ///< of more than two faces, one after the other
+  std::vector<std::uint32_t> queue_;  ///< faces patch by patch
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  Bounds box_;
+  std::size_t two_face_edges_ = 0;
+  double area_ = 0.0, cancelling_area_ = 0.0, one_sided_area_ = 0.0;
+  Orientation result_;
+};
+
+}  // namespace
+
+Orientation orient_faces(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles) {
+  return Orienter(points, triangles).run();
+}
+
+const char* explanation(Orientation::Verdict verdict) {
+  switch (verdict) {
+    case Orientation::Verdict::usable:
+      break;
+    case Orientation::Verdict::no_area:
+      return "every polygon is degenerate, so there is no inside";
+    case Orientation::Verdict::cancelling:
+      return "most polygons are there with both windings and cancel, so there is no inside";
+    case Orientation::Verdict::not_orientable:
+      return "most of the surface has one side only, like a Möbius strip, so there is no inside";
+  }
+  return "";
+}
+
+}  // namespace hermesh

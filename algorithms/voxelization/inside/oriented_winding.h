@@ -1,0 +1,37 @@
+// The winding numbers of a mesh whose faces are first made to agree.
+#pragma once
+
+#include "algorithms/voxelization/distance/index_soup.h"
+#include "algorithms/voxelization/inside/orientation.h"
+#include "algorithms/voxelization/inside/winding_number.h"
+
+namespace hermesh {
+
+/// Keeps a reference to the mesh, and copies its triangles if it has quads.
+class OrientedWinding {
+ public:
+  explicit OrientedWinding(const IndexSoup& soup) : OrientedWinding(soup.mesh(), soup.scale()) {}
+  OrientedWinding(const OrientedWinding&) = delete;
+  OrientedWinding& operator=(const OrientedWinding&) = delete;
+
+  const Orientation& orientation() const { return orientation_; }
+  bool usable() const { return orientation_.verdict == Orientation::Verdict::usable; }
+  /// Of points in voxels.
+  const WindingNumber& number() const { return number_; }
+
+ private:
+  OrientedWinding(const PolygonMesh& mesh, double scale)
+      : triangles_(mesh.quads.empty() ? std::vector<Triangle>() : triangulated(mesh)),
+        faces_(mesh.quads.empty() ? std::span<const Triangle>(mesh.triangles) : triangles_),
+        orientation_(orient_faces(mesh.points, faces_)),
+        tree_(mesh.points, faces_, scale),
+        number_(tree_, orientation_.turns) {}
+
+  std::vector<Triangle> triangles_;
+  std::span<const Triangle> faces_;
+  Orientation orientation_;
+  TriangleTree tree_;
+  WindingNumber number_;
+};
+
+}  // namespace hermesh

@@ -1,0 +1,48 @@
+// Connected regions of voxels that no triangle separates: two neighbours are connected when no triangle
+// crosses the grid edge between them, and all space without blocks is connected through. Needs no normals and
+// no closed mesh; the result does not depend on an order. (Aldén 2011, §5.3, floods the same way, along the
+// surface's shell.)
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "algorithms/lattice/block_table.h"
+#include "algorithms/voxelization/distance/kernels/kernels.h"
+
+namespace hermesh {
+
+class RunContext;
+
+/// 512 voxels of a block: bit (y, z) of word x.
+using VoxelBits = std::array<std::uint64_t, 8>;
+
+/// Voxels of one block that are connected within it.
+struct BlockComponent {
+  VoxelBits voxels;
+  std::uint32_t region;
+};
+
+struct Regions {
+  /// The region that reaches infinity.
+  static constexpr std::uint32_t kOutside = 0;
+  /// Components of block i: components[first[i]] … components[first[i + 1] − 1].
+  std::vector<std::uint32_t> first;
+  std::vector<BlockComponent> components;
+  std::uint32_t count = 0;  ///< of regions; numbered in the order of their first component
+};
+
+/// Upper neighbours in y and z of voxels (y, z) that are in the same word of a block's bits.
+inline constexpr std::uint64_t kBelowTopY = 0x00FFFFFFFFFFFFFFull, kBelowTopZ = 0x7F7F7F7F7F7F7F7Full;
+
+/// The 64 voxels of one side of a block, 0 lower and 1 upper, as bits in the order of the two other axes.
+std::uint64_t face(const VoxelBits& bits, int axis, int side);
+
+/// Bits of the voxels whose upper neighbour along the axis (in `upper`, beyond the block) differs from them.
+VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis);
+
+/// `table` numbers the blocks, `crossed` has an entry for each. @throws Cancelled.
+Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed,
+                     const RunContext& context);
+
+}  // namespace hermesh

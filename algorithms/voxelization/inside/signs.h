@@ -1,0 +1,30 @@
+// On which side of the surface each voxel is: by flooding, or by winding numbers.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "algorithms/voxelization/distance/band.h"
+#include "algorithms/voxelization/inside/regions.h"
+#include "algorithms/voxelization/voxelize.h"
+
+namespace hermesh {
+
+struct Signs {
+  /// Voxels inside, for each block.
+  std::vector<VoxelBits> inside;
+  /// False where no rule can tell; `inside` is empty then.
+  bool usable = true;
+  /// By winding numbers, what closes the holes: the surface on which the number is ½ without a triangle
+  /// there, as triangles in voxels relative to the mesh's origin. Empty for a closed mesh.
+  std::vector<TriangleCorners> caps;
+  /// Voxels inside for the blocks near the caps that the table does not have.
+  std::map<BlockAt, VoxelBits> beyond;
+};
+
+/// The band reaches `reach` voxels. Says in a note when `rule` is automatic and the flood leaked in, and when
+/// the polygons give no inside at all. @throws Cancelled.
+Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band,
+                 double reach, RunContext& context);
+
+}  // namespace hermesh

@@ -1,0 +1,60 @@
+// The generalised winding number of a triangle soup (Jacobson et al., Robust Inside-Outside Segmentation
+// using Generalized Winding Numbers, ACM TOG 32(4), 2013): 1 inside a closed surface that is wound
+// counter-clockwise seen from outside, 0 outside, and something between near holes.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/search/triangle_tree.h"
+#include "algorithms/voxelization/inside/winding_kernels.h"
+
+namespace hermesh {
+
+/// Hierarchical evaluation (Barill et al., Fast Winding Numbers for Soups and Clouds, ACM TOG 37(4), 2018):
+/// boxes far away by their multipoles up to second order, triangles nearby by their exact solid angles.
+/// Refers to the tree and to `turns`, which have to outlive it; about 13 bytes a triangle. Queries may run in
+/// parallel. The error against the exact sum stays below 0.01, most often far below.
+class WindingNumber {
+ public:
+  /// How many radii away a box counts as far.
+  static constexpr double kFar = 2.0;
+
+  /// @param turns for each triangle 1 as given, −1 turned over, 0 left out (Orientation::turns); empty:
+  /// all 1.
+  explicit WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns = {},
+                         double far = kFar);
+
+  /// At a point of index space. On a triangle, one of the values on its two sides.
+  double at(const Eigen::Vector3d& p) const;
+  /// At many points near each other, such as a block's samples in any order: they share one descent.
+  /// Positions count to 1e-7 of the extent of each 512 consecutive points.
+  /// @param values as many as points
+  void at(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
+    evaluate(points, values, far_);
+  }
+  /// The same with an error that is some sixty times smaller, in ten times the time or more.
+  void at_finely(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
+    evaluate(points, values, 4.0 * far_);
+  }
+
+  std::size_t byte_size() const { return multipoles_.size() * sizeof(winding::Multipole); }
+
+ private:
+  void evaluate(std::span<const Eigen::Vector3d> points, std::span<float> values, double far) const;
+
+  const TriangleTree& tree_;
+  std::span<const std::int8_t> turns_;
+  double far_;
+  std::vector<winding::Multipole> multipoles_;  ///< by box number
+};
+
+/// The sum over all triangles by the formula of van Oosterom & Strackee in double precision, in linear time.
+/// @param scale voxels per unit of the points; p is in voxels
+double exact_winding_number(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles,
+                            double scale, const Eigen::Vector3d& p);
+
+}  // namespace hermesh

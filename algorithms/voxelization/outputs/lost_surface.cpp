@@ -1,0 +1,286 @@
+#include "algorithms/voxelization/outputs/lost_surface.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/voxelization/hermesh_voxelizer.h"
+#include "algorithms/voxelization/distance/segment.h"
+#include "algorithms/search/triangle_tree.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kMostPlaces = 200'000;      ///< where every triangle is larger than its share
+constexpr std::size_t kMostProbes = 20'000;  ///< lost places whose thickness is measured
+constexpr std::size_t kChunk = 4096;         ///< triangles to a task
+constexpr double kReach = 2.0;               ///< voxels: how far an opposite wall is looked for
+constexpr double kOff = 1e-4;                ///< voxels: where the way to it begins
+constexpr double kSameDistance =
+    1e-3;                           ///< voxels: up to here a sample's distance is that to the place's polygon
+constexpr double kTouching = 1e-3;  ///< voxels: what is thinner is no wall to be kept
+
+struct LostPlace {
+  Vector3d at, normal;  ///< voxels; of unit length
+};
+
+/// What a part of the triangles came to.
+struct Part {
+  double area = 0.0, lost_area = 0.0;  ///< voxels²
+  std::vector<LostPlace> places;
+};
+
+class Search {
+ public:
+  Search(const PolygonMesh& mesh, const LevelSet& level_set, bool boundary_distances,
+         const RunContext& context)
+      : mesh_(mesh),
+        triangles_(triangulated(mesh)),
+        grid_(*level_set.grid().grid),
+        voxel_size_(level_set.voxel_size()),
+        scale_(1.0 / voxel_size_),
+        boundary_distances_(boundary_distances),
+        context_(context) {
+    const openvdb::Vec3d origin =
+        grid_.transform().worldToIndex(openvdb::Vec3d(mesh.origin.x(), mesh.origin.y(), mesh.origin.z()));
+    origin_ = {origin.x(), origin.y(), origin.z()};
+  }
+
+  LostSurface run() {
+    const double share = std::max(1.0, total_area() / kMostPlaces);
+    std::vector<Part> parts((triangles_.size() + kChunk - 1) / kChunk);
+    tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
+      context_.check();
+      auto samples = grid_.getConstUnsafeAccessor();
+      for (std::size_t t = i * kChunk; t < std::min(triangles_.size(), (i + 1) * kChunk); ++t)
+        look(Facet(corner(t, 0), corner(t, 1), corner(t, 2)), share, samples, parts[i]);
+    });
+    LostSurface result;
+    std::vector<LostPlace> places;
+    for (const Part& part : parts) {
+      result.area += part.area * voxel_size_ * voxel_size_;
+      result.lost_area += part.lost_area * voxel_size_ * voxel_size_;
+      places.insert(places.end(), part.places.begin(), part.places.end());
+    }
+    if (!places.empty()) find_thinnest(places, result);
+    return result;
+  }
+
+ private:
+  using Samples = openvdb::FloatGrid::ConstUnsafeAccessor;
+
+  /// In voxels of the grid, whose placement need not be the mesh's own.
+  Vector3d corner(std::size_t triangle, std::size_t i) const {
+    return origin_ + scale_ * mesh_.points[triangles_[triangle][i]].cast<double>();
+  }
+
+  double total_area() const {
+    std::vector<double> area((triangles_.size() + kChunk - 1) / kChunk, 0.0);
+    tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t i) {
+      for (std::size_t t = i * kChunk; t < std::min(triangles_.size(), (i + 1) * kChunk); ++t) {
+        const Triangle& corners = triangles_[t];
+        const Vector3d a = mesh_.points[corners[0]].cast<double>(),
+                       b = mesh_.points[corners[1]].cast<double>(),
+                       c = mesh_.points[corners[2]].cast<double>();
+        area[i] += 0.5 * (b - a).cross(c - a).norm();
+      }
+    });
+    double sum = 0.0;
+    for (const double part : area) sum += part;
+    return sum / (voxel_size_ * voxel_size_);
+  }
+
+  /// Places at the points of Roberts' sequence R2, which fill a triangle evenly whatever their number.
+  void look(const Facet& facet, double share, Samples& samples, Part& part) const {
+    const Vector3d normal = facet.normal();
+    const double area = 0.5 * normal.norm();
+    if (!(area > 0.0)) return;
+    const auto count = static_cast<std::uint64_t>(std::ceil(area / share));
+    const double weight = area / double(count);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      double u = 1.0 / 3.0, v = 1.0 / 3.0;
+      if (count > 1) {
+        u = std::fmod(0.5 + double(i) * 0.7548776662466927, 1.0);
+        v = std::fmod(0.5 + double(i) * 0.5698402909980532, 1.0);
+        if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+      }
+      const Vector3d at =
+          facet.corner[0] + u * (facet.corner[1] - facet.corner[0]) + v * (facet.corner[2] - facet.corner[0]);
+      const Verdict verdict = look_around(at, samples);
+      if (verdict == Verdict::inner) continue;
+      part.area += weight;
+      if (verdict == Verdict::kept) continue;
+      part.lost_area += weight;
+      part.places.push_back({at, normal / (2.0 * area)});
+    }
+  }
+
+  enum class Verdict { kept, lost, inner };
+
+  /// Whether the leaf that holds a cell's first corner holds all of them.
+  static bool is_in_one_leaf(const openvdb::Coord& cell) {
+    return (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
+  }
+
+  Verdict look_around(const Vector3d& at, Samples& samples) const {
+    const openvdb::Coord cell(int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z())));
+    // All but a third of the cells have their corners in one leaf.
+    if (const auto* leaf = samples.probeConstLeaf(cell); leaf && is_in_one_leaf(cell)) {
+      const float* values = leaf->buffer().data() + leaf->coordToOffset(cell);
+      const bool inside = values[0] < 0.0f;
+      for (const int next : {1, 8, 9, 64, 65, 72, 73})
+        if ((values[next] < 0.0f) != inside) return Verdict::kept;
+    }
+    const bool inside = samples.getValue(cell) < 0.0f;
+    const auto differs = [&](int low, int high) {
+      for (int x = low; x <= high; ++x)
+        for (int y = low; y <= high; ++y)
+          for (int z = low; z <= high; ++z)
+            if ((samples.getValue(cell.offsetBy(x, y, z)) < 0.0f) != inside) return true;
+      return false;
+    };
+    if (differs(0, 1) || differs(-1, 2)) return Verdict::kept;
+    if (!inside) return Verdict::lost;
+    if (!boundary_distances_) return Verdict::inner;
+    for (int i = 0; i < 8; ++i) {
+      const openvdb::Coord sample = cell.offsetBy(i & 1, i >> 1 & 1, i >> 2);
+      const double away = (Vector3d(sample.x(), sample.y(), sample.z()) - at).norm();
+      if (-samples.getValue(sample) / voxel_size_ > away + kSameDistance) return Verdict::inner;
+    }
+    return Verdict::lost;
+  }
+
+  void find_thinnest(const std::vector<LostPlace>& places, LostSurface& result) const {
+    const std::size_t step = (places.size() + kMostProbes - 1) / kMostProbes;
+    std::vector<LostPlace> probes;
+    for (std::size_t i = 0; i < places.size(); i += step) probes.push_back(places[i]);
+    const std::vector<Triangle> about = triangles_about(probes);
+    const TriangleTree tree(mesh_.points, about, 1.0 / voxel_size_);
+    std::vector<double> thickness(probes.size(), kReach);
+    tbb::parallel_for(std::size_t(0), probes.size(), [&](std::size_t i) {
+      context_.check();
+      for (const double side : {-1.0, 1.0})
+        thickness[i] = std::min(thickness[i], gap(tree, probes[i].at - origin_, side * probes[i].normal));
+    });
+    const auto least = std::min_element(thickness.begin(), thickness.end());
+    if (*least >= kReach) return;
+    const Vector3d& at = probes[std::size_t(least - thickness.begin())].at;
+    const openvdb::Vec3d world = grid_.transform().indexToWorld(openvdb::Vec3d(at.x(), at.y(), at.z()));
+    result.thinnest_at = {world.x(), world.y(), world.z()};
+    result.thickness = *least * voxel_size_;
+  }
+
+  /// Those that may be within reach of one of the places: a tree of all of them would take longer than the
+  /// search where little is lost.
+  std::vector<Triangle> triangles_about(const std::vector<LostPlace>& places) const {
+    // Cells as long as the reach: what is within reach of a place and no longer than it has all of its
+    // corners within two cells of the place's.
+    const auto cell_of = [](const Vector3d& at) {
+      return openvdb::Coord(int(std::floor(at.x() / kReach)), int(std::floor(at.y() / kReach)),
+                            int(std::floor(at.z() / kReach)));
+    };
+    openvdb::MaskTree cells;
+    for (const LostPlace& place : places) {
+      const openvdb::Coord cell = cell_of(place.at);
+      cells.fill(openvdb::CoordBBox(cell.offsetBy(-2), cell.offsetBy(2)), true);
+    }
+    std::vector<std::uint8_t> near(mesh_.points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), kChunk), [&](const auto& range) {
+      const openvdb::tree::ValueAccessor<const openvdb::MaskTree> marked(cells);
+      for (std::size_t i = range.begin(); i < range.end(); ++i)
+        near[i] = marked.isValueOn(cell_of(origin_ + scale_ * mesh_.points[i].cast<double>()));
+    });
+    std::vector<Triangle> result;
+    const auto longest = static_cast<float>(kReach * voxel_size_);
+    for (const Triangle& t : triangles_) {
+      const Eigen::Vector3f &a = mesh_.points[t[0]], &b = mesh_.points[t[1]], &c = mesh_.points[t[2]];
+      const bool is_long = (a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c)).maxCoeff() > longest;
+      if (near[t[0]] | near[t[1]] | near[t[2]] | is_long) result.push_back(t);
+    }
+    return result;
+  }
+
+  /// How far it is from the place along a unit vector to the next triangle, in voxels, at most kReach.
+  static double gap(const TriangleTree& tree, const Vector3d& place, const Vector3d& along) {
+    const Vector3d from = place + kOff * along, to = place + kReach * along;
+    const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
+    double nearest = 1.0;
+    std::vector<TriangleTree::BoxRef> boxes;
+    const auto push = [&](std::size_t pack, std::uint32_t level) {
+      const TriangleTree::BoxPack& p = tree.packs()[pack];
+      for (std::size_t k = 0; k < TriangleTree::kFan; ++k) {
+        bool apart = p.lower[0][k] > p.upper[0][k];
+        for (int a = 0; a < 3; ++a)
+          apart = apart || p.lower[a][k] * tree.scale() > high[a] + 1e-6 ||
+                  p.upper[a][k] * tree.scale() < low[a] - 1e-6;
+        if (!apart) boxes.push_back({static_cast<std::uint32_t>(pack * TriangleTree::kFan + k), level});
+      }
+    };
+    push(tree.packs().size() - 1, static_cast<std::uint32_t>(tree.level_count() - 1));
+    while (!boxes.empty()) {
+      const TriangleTree::BoxRef ref = boxes.back();
+      boxes.pop_back();
+      if (ref.level > 0) {
+        push(tree.child_pack(ref), ref.level - 1);
+        continue;
+      }
+      for (const std::uint32_t t : tree.leaf(ref.box)) {
+        const double part = meeting(from, to, Facet(tree.corner(t, 0), tree.corner(t, 1), tree.corner(t, 2)));
+        if (part >= 0.0) nearest = std::min(nearest, part);
+      }
+    }
+    return kOff + nearest * (kReach - kOff);
+  }
+
+  const PolygonMesh& mesh_;
+  const std::vector<Triangle> triangles_;
+  const openvdb::FloatGrid& grid_;
+  double voxel_size_, scale_;
+  Vector3d origin_;  ///< of the mesh, in voxels of the grid
+  bool boundary_distances_;
+  const RunContext& context_;
+};
+
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+}  // namespace
+
+LostSurface find_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set,
+                              bool distances_are_to_the_boundary, const RunContext& context) {
+  if (mesh.triangle_count() == 0 || level_set.grid().grid->getGridClass() != openvdb::GRID_LEVEL_SET)
+    return {};
+  return Search(mesh, level_set, distances_are_to_the_boundary, context).run();
+}
+
+bool leaves_out_inner_polygons(const Voxelizer& voxelizer) { return voxelizer.voxelize == hermesh_voxelizer; }
+
+std::string lost_surface_note(const LostSurface& lost, double voxel_size) {
+  if (!(lost.lost_area > 0.0)) return {};
+  std::string note = short_text(100.0 * lost.share()) +
+                     " % of the area of the polygons that bound the solid has no surface within a voxel of " +
+                     short_text(voxel_size) + ": walls or gaps that are thinner";
+  if (!(lost.thickness > 0.0)) return note;
+  note += "; the thinnest place found is " + short_text(lost.thickness) + " thick, at (" +
+          short_text(lost.thinnest_at.x()) + ", " + short_text(lost.thinnest_at.y()) + ", " +
+          short_text(lost.thinnest_at.z()) + ")";
+  // Where polygons all but touch, as at the tips of needles, no size that anybody would use keeps them apart.
+  if (lost.thickness < kTouching * voxel_size) return note;
+  // Rounded down, for a wall exactly a voxel thick is the thinnest that is kept.
+  const double digit = std::pow(10.0, std::floor(std::log10(lost.thickness)) - 2.0);
+  return note + ", and voxels of " + short_text(std::floor(lost.thickness / digit) * digit) +
+         " would keep it";
+}
+
+}  // namespace hermesh

@@ -1,0 +1,61 @@
+// One fracture by one of the methods, piece by piece: what the command line and the experiment share.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/fracture/fracture.h"
+#include "algorithms/fracture/mass_properties.h"
+#include "experiments/fracture/fracture_cutters.h"
+
+namespace hermesh {
+
+struct FractureObject {
+  FloatHermite hermite;
+  LevelSet level_set;
+  const PolygonMesh* source = nullptr;  ///< whose attributes the pieces take over; null: none
+};
+
+/// Of its mesh before it is broken, at tolerance 0 (world units); 0 if no sample is inside. @throws Cancelled.
+double uncut_volume(const FractureObject& object, RunContext& context);
+
+struct FractureMethod {
+  std::string name = "labelled";  ///< or thesis, openvdb
+  /// labelled: two-sided distance to the finest mesh, in voxels; thesis: the root of adaptive_dual_contouring's
+  /// threshold, in voxels; openvdb: adaptivity, 0 to 1.
+  double tolerance = 0.0;
+  FractureOptions options;
+};
+
+struct PieceOutput {
+  std::uint32_t number = 0;  ///< from 1 on
+  std::string name;
+  std::optional<std::uint64_t> samples;  ///< of the labelled grid
+  PolygonMesh mesh;
+  MassProperties mass;
+  /// By the neighbour's number the triangles and the area (world units) of their seam; of tagged pieces.
+  std::map<std::int32_t, std::pair<std::uint64_t, double>> neighbours;
+  double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
+};
+
+struct FractureSummary {
+  std::uint32_t pieces = 0;
+  std::vector<CutterRecord> cutters;         ///< of `labelled`
+  std::optional<LabelledFracture> labelled;  ///< without its mesh
+  std::vector<std::string> empty;            ///< names of cutters that took nothing, of the other methods
+  double seconds =
+      0.0;  ///< of the method itself: neither handing pieces over nor making polygons of OpenVDB's cutters
+};
+
+/// @throws Error for a method that does not exist, or a tolerance that it does not take; Cancelled.
+FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
+                             const FractureMethod& method,
+                             const std::function<void(PieceOutput&&)>& hand_over, RunContext& context);
+
+/// @throws Error as run_fracture() does.
+void check_method(const FractureMethod& method);
+
+}  // namespace hermesh

@@ -1,0 +1,34 @@
+// The objects that fractures are measured on, at the sizes of the thesis's figures 9.15 and 9.16.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "experiments/fracture/fracture_run.h"
+#include "experiments/measurements/measurements.h"
+
+namespace hermesh {
+
+/// A model at the size of the thesis's figures, or of the case.
+struct FractureSubject {
+  std::string label;
+  std::string source;               ///< case that it is made from
+  std::array<double, 3> size = {};  ///< voxels along each axis; 0: the case's own proportions
+  double longest = 0.0;             ///< voxels
+};
+
+/// Neither object of the figures is at hand: a rough ball and the Armadillo take their places, stretched to
+/// their boxes.
+const std::vector<FractureSubject>& fracture_subjects();
+
+PolygonMesh load_subject(const FractureSubject& subject, const MeasurementInput& input);
+
+struct SampledSubject {
+  FractureObject object;
+  double hermite_seconds = 0.0;  ///< that its Hermite data took
+};
+/// With so many voxels along the longest side.
+SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input);
+
+}  // namespace hermesh

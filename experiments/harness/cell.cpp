@@ -1,0 +1,74 @@
+#include "experiments/harness/cell.h"
+
+#include <algorithm>
+#include <cctype>
+#include <nlohmann/json.hpp>
+
+namespace hermesh {
+
+RunContext child_context(const RunContext& context, bool with_progress) {
+  RunContext child;
+  child.cancel = context.cancel;
+  if (with_progress) child.on_progress = context.on_progress;
+  return child;
+}
+
+std::optional<std::string> attempt(const std::function<void()>& work) {
+  try {
+    work();
+    return std::nullopt;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    return "there is not enough memory";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+Timing::Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
+  contender.budget_seconds = tier.seconds_per_variant;
+  contender.repetitions = tier.repetitions;
+  warm = first_seconds < tier.seconds_per_variant;
+  if (warm) return;
+  contender.seconds = {first_seconds};
+  stages = {std::move(first_stages)};
+}
+
+Json seconds_json(const std::vector<double>& seconds, bool warm) {
+  return {{"median", median(seconds)},
+          {"minimum", *std::min_element(seconds.begin(), seconds.end())},
+          {"repetitions", seconds.size()},
+          {"warm", warm},
+          {"all", seconds}};
+}
+
+Json stages_json(const std::vector<StageSeconds>& repetitions) {
+  Json json = Json::object();
+  for (const auto& [name, seconds] : median_stages(repetitions)) json[name] = seconds;
+  return json;
+}
+
+Json optional_json(const std::optional<std::int64_t>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json case_json(const LoadedCase& input) {
+  Json json = {{"name", input.name},
+               {"origin", input.origin},
+               {"sha256", input.sha256},
+               {"points", input.mesh.points.size()},
+               {"triangles", input.mesh.triangle_count()}};
+  if (input.seed) json["seed"] = *input.seed;
+  return json;
+}
+
+Json variant_json(const VariantEntry& variant, const Options& options) {
+  return {{"name", variant.name}, {"label", variant.label}, {"options", options.canonical()}};
+}
+
+std::string file_name(std::string label) {
+  for (char& c : label)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '-';
+  return label;
+}
+
+}  // namespace hermesh

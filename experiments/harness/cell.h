@@ -1,0 +1,45 @@
+// What the cells of every kind of experiment share: contexts, failures, times, and what a row says of them.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/run_context.h"
+#include "experiments/cases/cases.h"
+#include "experiments/harness/columns.h"
+#include "experiments/harness/experiment_file.h"
+#include "experiments/harness/measure.h"
+
+namespace hermesh {
+
+/// A context for one piece of work: its own stage times, the same cancellation; progress only where wanted,
+/// since a terminal has no business inside a timed repetition.
+RunContext child_context(const RunContext& context, bool with_progress);
+
+/// The sentence of what went wrong, if anything did. Being cancelled is no failure of a variant.
+/// @throws Cancelled.
+std::optional<std::string> attempt(const std::function<void()>& work);
+
+/// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
+/// up and does not count, unless it alone uses up the budget: then it is the only repetition there is.
+struct Timing {
+  Contender contender;
+  std::vector<StageSeconds> stages;
+  std::vector<double> cpu_seconds;
+  bool warm = true;
+
+  Timing(const Tier& tier, double first_seconds, StageSeconds first_stages);
+};
+
+Json seconds_json(const std::vector<double>& seconds, bool warm);
+Json stages_json(const std::vector<StageSeconds>& repetitions);
+Json optional_json(const std::optional<std::int64_t>& value);
+Json case_json(const LoadedCase& input);
+Json variant_json(const VariantEntry& variant, const Options& options);
+
+/// A label as a part of a file's name.
+std::string file_name(std::string label);
+
+}  // namespace hermesh

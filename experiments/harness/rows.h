@@ -1,0 +1,46 @@
+// Rows: one JSON object for every cell of an experiment's matrix, one line each in rows.jsonl.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "algorithms/core/variant.h"
+#include "experiments/harness/columns.h"
+#include "validation/mesh_report.h"
+
+namespace hermesh {
+
+/// The promises as words: "closed", "manifold", "oriented", "no self-intersection".
+std::vector<std::string> promise_words(const Promises& promises);
+
+struct PromiseCheck {
+  std::vector<std::string> broken;     ///< "closed (5 boundary edges)"
+  std::vector<std::string> unchecked;  ///< promised, but not judged in this run
+};
+PromiseCheck check_promises(const Promises& promises, const validation::MeshReport& report);
+
+/// For a picture's caption: "promises closed, oriented: kept", or "BROKEN: closed (5 boundary edges)".
+std::string promise_verdict(const Promises& promises, const PromiseCheck& check);
+/// For a narrow column, a letter for each promise (c, m, o, i): "co kept", "co BROKEN", "coi unchecked",
+/// "none".
+std::string promise_letters(const Promises& promises, const PromiseCheck& check);
+
+/// Sets `time_over_openvdb` in every timed row: its median time divided by that of the first row of variant
+/// "openvdb", below 1 where it is faster. The rows must be of one run, one case, one resolution. Without such
+/// a row, nothing.
+void add_time_ratios(std::vector<Json>& rows);
+
+/// The same for voxelizers, the other way round: sets `openvdb_over_time` (above 1 is faster) and
+/// `peak_over_openvdb` in every timed row, relative to the row of variant "openvdb" with its default options.
+void add_voxelizer_ratios(std::vector<Json>& rows);
+
+/// Appends one line in a single write, so that two runs at once do not tear each other's rows.
+/// @throws Error if the file cannot be written.
+void append_row(const std::filesystem::path& file, const Json& row);
+
+/// All rows of the .jsonl files under a folder (or of the one file given), files in the order of their names.
+/// @throws Error if there are none, or naming file and line of one that is no JSON object.
+std::vector<Json> read_rows(const std::filesystem::path& folder);
+
+}  // namespace hermesh

@@ -1,0 +1,270 @@
+#include "experiments/harness/run_cells.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/voxelization/outputs/lost_surface.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/digest.h"
+#include "experiments/harness/provenance.h"
+#include "validation/geometry/distance.h"
+#include "validation/report_json.h"
+
+namespace hermesh {
+namespace {
+
+struct Cell {
+  const Extractor* extractor = nullptr;
+  Options options;
+  Json row;
+  std::string uniform;              ///< as in VariantEntry
+  std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
+  std::optional<Timing> timing;  ///< absent when the variant failed
+};
+
+class Group {
+ public:
+  Group(const GroupInput& group, RunContext& context)
+      : in_(group),
+        context_(context),
+        voxel_size_(bounds(group.input.mesh).size().maxCoeff() / group.resolution),
+        name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)),
+        voxelizer_(find_variant(in_.tables.voxelizers, in_.voxelizer.name)) {
+    if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.label));
+  }
+
+  std::vector<Json> run() {
+    for (const VariantEntry& variant : in_.variants) cells_.push_back(make_cell(variant));
+    const auto failed = attempt([&] { voxelize(); });
+    source_ = to_mesh_file(in_.input.mesh);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      cells_[i].row["voxelization"] = voxelization_;
+      const auto sentence = failed ? failed : attempt([&] { extract_and_judge(cells_[i], i); });
+      if (sentence) fail(cells_[i], *sentence);
+    }
+    time_all();
+    std::vector<Json> rows;
+    for (Cell& cell : cells_) rows.push_back(cell.row);
+    add_time_ratios(rows);
+    if (in_.tier.pixels > 0) picture(rows);
+    return rows;
+  }
+
+ private:
+  Cell make_cell(const VariantEntry& variant) const {
+    Cell cell;
+    cell.extractor = &find_variant(in_.tables.extractors, variant.name);
+    cell.options = Options(variant.name, cell.extractor->options, variant.options);
+    cell.row = in_.head;
+    cell.row["case"] = case_json(in_.input);
+    cell.row["resolution"] = in_.resolution;
+    cell.row["voxel_size"] = voxel_size_;
+    cell.row["samples"] = in_.tier.samples;
+    cell.row["variant"] = variant_json(variant, cell.options);
+    cell.uniform = variant.uniform;
+    cell.row["variant"]["promises"] = promise_words(cell.extractor->promises);
+    return cell;
+  }
+
+  static void fail(Cell& cell, const std::string& sentence) {
+    cell.row["failed"] = sentence;
+    cell.row["promise_letters"] = "FAILED";
+    cell.row["promise_verdict"] = "FAILED: " + sentence;
+    cell.timing.reset();
+  }
+
+  void voxelize() {
+    const Options options(voxelizer_.name, voxelizer_.options, in_.voxelizer.options);
+    voxelization_ = variant_json(in_.voxelizer, options);
+    const auto once = [&](bool with_progress, std::optional<StageSeconds>* stages) {
+      RunContext child = child_context(context_, with_progress);
+      const double seconds = timed([&] {
+        level_set_ = voxelizer_.voxelize(
+            {.mesh = in_.input.mesh, .voxel_size = voxel_size_, .context = child, .options = options});
+      });
+      if (stages) *stages = child.stage_seconds;
+      return seconds;
+    };
+    const PeakMemory memory;
+    std::optional<StageSeconds> stages;
+    const double first = once(true, &stages);
+    voxelization_["peak_bytes"] = optional_json(memory.bytes());
+    if (!level_set_ || level_set_.active_voxels() == 0)
+      throw Error("the voxelizer " + in_.voxelizer.label + " gave a level set without active voxels");
+    Timing timing(in_.tier, first, *stages);
+    timing.contender.run = [&] {
+      const double seconds = once(false, &stages);
+      timing.stages.push_back(*stages);
+      return seconds;
+    };
+    race(std::span(&timing.contender, 1));
+    voxelization_["seconds"] = seconds_json(timing.contender.seconds, timing.warm);
+    voxelization_["stage_seconds"] = stages_json(timing.stages);
+    voxelization_["digest"] = digest(level_set_);
+    voxelization_["active_voxels"] = level_set_.active_voxels();
+    voxelization_["memory_bytes"] = level_set_.memory_bytes();
+    const LostSurface lost =
+        find_lost_surface(in_.input.mesh, level_set_, leaves_out_inner_polygons(voxelizer_), context_);
+    voxelization_["lost_surface"] = {{"share", lost.share()}, {"thickness", lost.thickness}};
+  }
+
+  PolygonMesh extract(const Cell& cell, RunContext& child) const {
+    return cell.extractor->extract(
+        {.level_set = level_set_, .source = &in_.input.mesh, .options = cell.options, .context = child});
+  }
+
+  void extract_and_judge(Cell& cell, std::size_t number) {
+    context_.check();
+    RunContext child = child_context(context_, true);
+    PolygonMesh mesh;
+    {
+      const PeakMemory memory;
+      const double seconds = timed([&] { mesh = extract(cell, child); });
+      const auto peak = memory.bytes();
+      cell.row["peak_bytes"] = optional_json(peak);
+      if (peak) cell.row["bytes_per_active_voxel"] = static_cast<double>(*peak) / level_set_.active_voxels();
+      cell.timing.emplace(in_.tier, seconds, child.stage_seconds);
+    }
+    cell.row["triangle_count"] = mesh.triangle_count();
+    cell.row["digest"] = digest(mesh);
+    if (mesh.empty()) throw Error("the mesh is empty");
+    const std::filesystem::path folder = in_.out / "meshes" / (in_.experiment.name + "-" + name_);
+    std::filesystem::create_directories(folder);
+    cell.mesh_file =
+        folder / (std::to_string(number + 1) + "-" + file_name(cell.row["variant"]["label"]) + ".ply");
+    write_mesh(cell.mesh_file, mesh, child);
+    cell.row["notes"] = child.notes;
+    for (const auto& [name, value] : child.figures) cell.row["figures"][name] = value;
+    mesh = {};
+    judge_file(cell);
+  }
+
+  /// Judges the mesh as its file holds it, so that the writer and the reader are judged with it.
+  void judge_file(Cell& cell) {
+    RunContext child = child_context(context_, true);
+    validation::JudgeOptions options;
+    options.self_intersections = in_.tier.self_intersections;
+    options.reference = &source_;
+    options.samples = in_.tier.samples;
+    options.voxel_size = voxel_size_;
+    if (in_.experiment.features) {
+      options.features = &source_;
+      options.dihedral_degrees = *in_.experiment.features;
+    }
+    validation::MeshReport report;
+    MeshFile mesh;
+    cell.row["judge_seconds"] = timed([&] {
+      mesh = read_mesh_file(cell.mesh_file, child);
+      report = validation::judge(mesh, options, child);
+    });
+    if (!cell.uniform.empty()) compare_with_uniform(mesh, cell, child);
+    cell.row["report"] = validation::to_json(report);
+
+    const Promises& promises = cell.extractor->promises;
+    const PromiseCheck check = check_promises(promises, report);
+    cell.row["broken"] = check.broken;
+    cell.row["unchecked"] = check.unchecked;
+    cell.row["promise_letters"] = promise_letters(promises, check);
+    cell.row["promise_verdict"] = promise_verdict(promises, check);
+    Json disagreements = Json::array();
+    for (const validation::LibraryCounts& library : report.libraries)
+      for (const std::string& sentence : library.disagreements)
+        disagreements.push_back(library.library + ": " + sentence);
+    cell.row["disagreements"] = std::move(disagreements);
+  }
+
+  /// Both ways; nothing where that mesh failed or was not asked for.
+  void compare_with_uniform(const MeshFile& mesh, Cell& cell, RunContext& child) const {
+    const auto other = std::ranges::find_if(
+        cells_, [&](const Cell& each) { return each.row["variant"]["label"] == cell.uniform; });
+    if (other == cells_.end() || other->mesh_file.empty()) return;
+    const MeshFile uniform = read_mesh_file(other->mesh_file, child);
+    const validation::TriangleSoup ours(mesh), theirs(uniform);
+    const auto add = [&](const char* key, const validation::TriangleSoup& from, const validation::TriangleSoup& to) {
+      const auto found = validation::sampled_distances(from, validation::TriangleTree(to), in_.tier.samples, child);
+      cell.row[key] = {{"rms", found.rms}, {"max", found.max}};
+    };
+    add("to_uniform", ours, theirs);
+    add("from_uniform", theirs, ours);
+  }
+
+  double repeat(Cell& cell) {
+    context_.check();
+    RunContext child = child_context(context_, false);
+    std::optional<PolygonMesh> mesh;
+    const double seconds = timed([&] { mesh.emplace(extract(cell, child)); });
+    cell.timing->stages.push_back(child.stage_seconds);
+    if (digest(*mesh) != cell.row["digest"]) cell.row["repetitions_differ"] = true;
+    return seconds;
+  }
+
+  void time_all() {
+    const Stage stage(context_, "timing");
+    const Json load = load_averages();
+    std::vector<Contender> contenders;
+    std::vector<Cell*> timed_cells;
+    for (Cell& cell : cells_) {
+      if (!cell.timing) continue;
+      contenders.push_back(cell.timing->contender);
+      contenders.back().run = [this, &cell] { return repeat(cell); };
+      timed_cells.push_back(&cell);
+    }
+    race(contenders);
+    for (std::size_t i = 0; i < contenders.size(); ++i) {
+      Json& row = timed_cells[i]->row;
+      row["seconds"] = seconds_json(contenders[i].seconds, timed_cells[i]->timing->warm);
+      row["stage_seconds"] = stages_json(timed_cells[i]->timing->stages);
+      row["nanoseconds_per_active_voxel"] =
+          1e9 * row["seconds"]["median"].get<double>() / static_cast<double>(level_set_.active_voxels());
+      row["load"] = load;
+    }
+  }
+
+  void picture(const std::vector<Json>& rows) {
+    Sheet sheet;
+    sheet.title = in_.input.name + " at resolution " + std::to_string(in_.resolution);
+    sheet.subtitle = in_.input.origin + ", sha256 " + in_.input.sha256.substr(0, 12) + "; voxelizer " +
+                     in_.voxelizer.label;
+    sheet.frame = bounds(in_.input.mesh);
+    sheet.close_up = in_.entry.close_up;
+    sheet.viewpoint = in_.entry.viewpoint;
+    sheet.cell_pixels = in_.tier.pixels;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      std::string size = readable(rows[i].value("triangle_count", 0.0)) + " triangles";
+      if (rows[i].contains("seconds"))
+        size += " · " + readable(rows[i]["seconds"]["median"].get<double>()) + " s";
+      std::vector<std::string> captions = {size};
+      if (rows[i].contains("report") && rows[i]["report"].contains("from_reference"))
+        captions.push_back("rms from input " +
+                           readable(rows[i]["report"]["from_reference"]["rms"].get<double>() / voxel_size_) +
+                           " voxel");
+      captions.push_back(rows[i]["promise_verdict"]);
+      sheet.pictures.push_back({rows[i]["variant"]["label"], captions, [this, i] {
+                                  RunContext child = child_context(context_, false);
+                                  const auto& file = cells_[i].mesh_file;
+                                  return file.empty() ? PolygonMesh{} : read_mesh(file, child);
+                                }});
+    }
+    render_sheet(in_.out / (name_ + ".png"), std::move(sheet), context_);
+  }
+
+  const GroupInput& in_;
+  RunContext& context_;
+  double voxel_size_;
+  std::string name_;
+  const Voxelizer& voxelizer_;
+  LevelSet level_set_;
+  MeshFile source_;
+  Json voxelization_;
+  std::vector<Cell> cells_;
+};
+
+}  // namespace
+
+std::vector<Json> run_group(const GroupInput& group, RunContext& context) {
+  return Group(group, context).run();
+}
+
+}  // namespace hermesh

@@ -1,0 +1,347 @@
+// What the program makes, as digests: proves that a change left every byte as it was, and that neither the
+// number of threads nor the level of vector code matters. `hermesh compare` sets two runs beside each other.
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+
+#include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/hermite/solids.h"
+#include "algorithms/voxelization/outputs/volume_outputs.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/digest.h"
+#include "experiments/fracture/fracture_cutters.h"
+#include "experiments/fracture/fracture_run.h"
+#include "experiments/measurements/measurements.h"
+#include "experiments/harness/run_cells.h"
+
+namespace hermesh {
+namespace {
+
+using Given = std::map<std::string, std::string>;
+
+/// How often the work of a cell is done: once for the digest, and then in each of these ways for the same
+/// digest.
+struct Way {
+  std::string name;
+  int threads = 2;
+  std::optional<SimdLevel> level = {};  ///< none: the highest
+};
+
+/// Sets the level of vector code for as long as it lives.
+class ChosenLevel {
+ public:
+  explicit ChosenLevel(const std::optional<SimdLevel>& level) {
+    if (const char* value = std::getenv(kVariable)) before_ = value;
+    if (level) setenv(kVariable, std::string(name(*level)).c_str(), 1);
+  }
+  ~ChosenLevel() { before_ ? setenv(kVariable, before_->c_str(), 1) : unsetenv(kVariable); }
+  ChosenLevel(const ChosenLevel&) = delete;
+  ChosenLevel& operator=(const ChosenLevel&) = delete;
+
+ private:
+  static constexpr const char* kVariable = "HERMESH_SIMD";
+  std::optional<std::string> before_;
+};
+
+/// Numbers of threads and levels of vector code change together, which tells as surely that all of them give
+/// the same in fewer runs.
+std::vector<Way> ways(const Options& parameters) {
+  std::vector<std::optional<SimdLevel>> levels = {{}};
+  if (parameters.is("simd", "all")) {
+    const std::vector<SimdLevel> available = available_simd_levels();
+    const SimdLevel chosen = chosen_simd_level();
+    for (auto level = available.rbegin(); level != available.rend(); ++level)
+      if (*level < chosen) levels.push_back(*level);
+  }
+  std::vector<int> threads = {2};
+  if (parameters.is("threads", "1 2 7")) threads = {2, 1, 7};
+  std::vector<Way> result;
+  for (std::size_t i = 0; i < std::max(levels.size(), threads.size()); ++i) {
+    const int count = threads[std::min(i, threads.size() - 1)];
+    const std::optional<SimdLevel> level = levels[std::min(i, levels.size() - 1)];
+    result.push_back({std::to_string(count) + " threads" + (level ? " and " + std::string(name(*level)) : ""),
+                      count, level});
+  }
+  return result;
+}
+
+/// A number that is not the option's fallback and leads to other code or another result.
+std::string other_number(const OptionSpec& spec) {
+  const double usual = std::stod(spec.fallback);
+  const double candidates[] = {3.0 * usual, 0.5, 0.5 * usual, spec.minimum};
+  for (const double candidate : candidates)
+    if (candidate != usual && candidate >= spec.minimum && candidate <= spec.maximum)
+      return readable(candidate);
+  return spec.fallback;
+}
+
+/// The setting of another option that a spec's condition "name=value|value" asks for.
+std::pair<std::string, std::string> setting_of(const std::string& condition) {
+  auto [option, values] = parse_option(condition);
+  return {option, values.substr(0, values.find('|'))};
+}
+
+/// The defaults, and each option by itself at its other choices, or at another number; with what it needs
+/// beside it.
+template <class Variant>
+std::vector<Given> variations(const Variant& variant) {
+  std::vector<Given> result = {{}};
+  for (const OptionSpec& spec : variant.options) {
+    std::vector<std::string> values = spec.choices;
+    if (values.empty()) values.push_back(other_number(spec));
+    for (const std::string& value : values) {
+      if (value == spec.fallback) continue;
+      Given given;
+      if (!spec.only_with.empty()) given.insert(setting_of(spec.only_with.front()));
+      given[spec.name] = value;
+      result.push_back(given);
+    }
+  }
+  return result;
+}
+
+/// Whether a set of options is one that the variant takes; what one option does to another it says itself.
+template <class Variant>
+std::optional<Options> checked(const Variant& variant, const Given& given) {
+  try {
+    return Options(variant.name, variant.options, given);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+std::string text(const Given& given) {
+  std::string result;
+  for (const auto& [name, value] : given) result += " " + name + "=" + value;
+  return result;
+}
+
+class Digests {
+ public:
+  explicit Digests(const MeasurementInput& input) : input_(input), ways_(ways(input.parameters)) {}
+
+  std::vector<MeasuredRow> run() {
+    const std::string choice = input_.parameters.text("cases");
+    std::vector<std::string> names = {choice};
+    if (choice == "few") names = {"torus", "cad-part"};
+    if (choice == "all") names = files();
+    std::istringstream resolutions(input_.parameters.text("resolutions"));
+    for (double resolution; resolutions >> resolution;)
+      for (const std::string& name : names) {
+        if (names.size() > 1 && input_.filter.find(',') != std::string::npos &&
+            ("digests/digests/" + name + ",").find(input_.filter.substr(0, input_.filter.find(',') + 1)) ==
+                std::string::npos)
+          continue;
+        input_.context.progress(name + " at " + readable(resolution), 0.0);
+        name_ = name, resolution_ = resolution;
+        if (const auto failure = attempt([&] { digest_case(); })) emit("all", "failed: " + *failure, {});
+      }
+    return {};
+  }
+
+ private:
+  static std::vector<std::string> files() {
+    std::vector<std::string> names;
+    for (const CaseInfo& info : list_cases())
+      if (info.kind == "file" && info.name != "thai-statue") names.push_back(info.name);
+    return names;
+  }
+
+  void digest_case() {
+    RunContext child = child_context(input_.context, false);
+    mesh_ = input_.tables.load(name_, child).mesh;
+    voxel_size_ = bounds(mesh_).size().maxCoeff() / resolution_;
+    if (!(voxel_size_ > 0.0)) return emit("all", "without extent", {});
+    level_sets();
+    level_set_ = voxelized(mesh_, "hermesh", {}, 3.0, child);
+    volumes();
+    if (level_set_.active_voxels() == 0) return;
+    meshes();
+    hermite();
+    solids();
+    pieces();
+  }
+
+  LevelSet voxelized(const PolygonMesh& mesh, const std::string& name, const Options& options, double band,
+                     RunContext& context) const {
+    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, name);
+    return voxelizer.voxelize(
+        {.mesh = mesh,
+         .voxel_size = voxel_size_,
+         .exterior_band = band,
+         .interior_band = band,
+         .context = context,
+         .options = options.canonical().empty() ? Options(voxelizer.name, voxelizer.options, {}) : options});
+  }
+
+  bool references() const { return input_.parameters.is("references", "yes"); }
+  template <class Table>
+  bool is_wanted(const Table& variant) const {
+    if (variant.summary.find("[reference]") == std::string::npos && !is_reference(variant.name)) return true;
+    return references() && variant.name == "openvdb";
+  }
+  static bool is_reference(const std::string& name) {
+    for (const char* each : {"openvdb", "cgal-surface-mesher", "marching-cubes-decimated", "exact"})
+      if (name == each) return true;
+    return false;
+  }
+
+  void level_sets() {
+    for (const Voxelizer& voxelizer : input_.tables.voxelizers) {
+      if (!is_wanted(voxelizer)) continue;
+      std::vector<Given> all = variations(voxelizer);
+      if (voxelizer.name == "thesis") all.push_back({{"shuffle_seed", "7"}});
+      for (const Given& given : all)
+        if (const auto options = checked(voxelizer, given))
+          row("level set: " + voxelizer.name + text(given), [&, options](RunContext& child) {
+            return digest(voxelized(mesh_, voxelizer.name, *options, 3.0, child));
+          });
+      row("level set: " + voxelizer.name + ", bands of 6",
+          [&](RunContext& child) { return digest(voxelized(mesh_, voxelizer.name, {}, 6.0, child)); });
+    }
+  }
+
+  void volumes() {
+    row("volumes", [&](RunContext& child) {
+      VolumeRequest request = parse_volume_request("sdf,triangle-id,closest-point,fog,hermite,attributes");
+      const VolumeOutputs made = make_volume_outputs(mesh_, {.voxel_size = voxel_size_}, request, child);
+      std::string all;
+      for (const openvdb::GridBase::Ptr& grid : made.grids) all += digest(*grid) + " ";
+      return digest_of_text(all + digest(*made.hermite));
+    });
+  }
+
+  void meshes() {
+    for (const Extractor& extractor : input_.tables.extractors) {
+      if (!is_wanted(extractor)) continue;
+      std::vector<Given> all = variations(extractor);
+      if (extractor.name == "manifold-dual-contouring") {
+        all.push_back({{"tolerance", "0"}});
+        for (const char* more : {"flatness=0.05", "largest_cube=4", "placement=average", "tolerance=1"})
+          all.push_back({{"merging", "regions"}, parse_option(more)});
+      }
+      if (extractor.name == "adaptive-dual-contouring")
+        all.push_back({{"representation", "thesis"}, {"threshold", "1"}});
+      for (const Given& given : all)
+        if (const auto options = checked(extractor, given))
+          row("mesh: " + extractor.name + text(given), [&, options](RunContext& child) {
+            return digest(extractor.extract(
+                {.level_set = level_set_, .source = &mesh_, .options = *options, .context = child}));
+          });
+    }
+  }
+
+  void hermite() {
+    row("hermite: from polygons",
+        [&](RunContext& child) { return digest(sample_polygons(level_set_, 0.0, mesh_, child)); });
+    row("hermite: from the level set",
+        [&](RunContext& child) { return digest(sample_level_set(level_set_, 0.25 * voxel_size_, child)); });
+  }
+
+  /// The model and itself, moved by a third of its size.
+  void solids() {
+    PolygonMesh other = mesh_;
+    const Eigen::Vector3f shift = (0.3 * bounds(mesh_).size()).cast<float>();
+    for (Eigen::Vector3f& point : other.points) point += shift;
+    for (const auto& [name, boolean] : {std::pair("union", Boolean::unite),
+                                        {"intersection", Boolean::intersect},
+                                        {"difference", Boolean::subtract}})
+      row("solid: " + std::string(name), [&, boolean](RunContext& child) {
+        const SharedLattice lattice = shared_lattice(mesh_, other, voxel_size_);
+        const auto make = [&](const PolygonMesh& mesh) { return voxelized(mesh, "hermesh", {}, 3.0, child); };
+        const CombinedSolid made = combine(boolean, sample_solid(mesh_, lattice, make, child),
+                                           sample_solid(other, lattice, make, child), child);
+        return digest_of_text(digest(made.level_set) + digest(made.hermite));
+      });
+  }
+
+  void pieces() {
+    RunContext child = child_context(input_.context, false);
+    const FractureObject object{sample_polygons(level_set_, 0.0, mesh_, child), level_set_, &mesh_};
+    if (object.hermite.leaves.empty()) return;
+    struct Break {
+      const char *cutters, *method;
+      double tolerance;
+    };
+    std::vector<Break> all = {{"voronoi:8", "labelled", 0.0},
+                              {"chunks:8", "labelled", 0.0},
+                              {"planes:2", "labelled", 0.0},
+                              {"voronoi:8", "labelled", 0.2},
+                              {"voronoi:4", "thesis", 0.1}};
+    if (references()) all.push_back({"voronoi:4", "openvdb", 0.0});
+    for (const Break& each : all)
+      row("pieces: " + std::string(each.method) + " " + each.cutters +
+              " tolerance=" + readable(each.tolerance),
+          [&](RunContext& context) {
+            CutterChoices choices;
+            choices.seed = input_.seed;
+            const MadeCutters made =
+                make_cutters(parse_cutters(each.cutters), object.hermite, choices, context);
+            std::vector<PolygonMesh> meshes;
+            run_fracture(
+                object, made, {.name = each.method, .tolerance = each.tolerance, .options = {}},
+                [&](PieceOutput&& piece) { meshes.push_back(std::move(piece.mesh)); }, context);
+            return digest(meshes);
+          });
+  }
+
+  /// The digest, or the sentence of what went wrong; in all ways the same.
+  void row(const std::string& what, const std::function<std::string(RunContext&)>& make) {
+    const std::string label = name_ + ", " + what;
+    if (("digests/digests/" + label).find(input_.filter) == std::string::npos) return;
+    std::string first;
+    std::vector<std::string> broken;
+    for (const Way& way : ways_) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(way.threads));
+      const ChosenLevel level(way.level);
+      RunContext child = child_context(input_.context, false);
+      std::string made;
+      if (const auto failure = attempt([&] { made = make(child); })) made = "failed: " + *failure;
+      if (first.empty())
+        first = made;
+      else if (made != first)
+        broken.push_back("with " + way.name + " the digest is " + made);
+    }
+    emit(what, first, broken);
+  }
+
+  void emit(const std::string& what, const std::string& digest,
+            const std::vector<std::string>& broken) const {
+    const Json values = {{"resolution", int(resolution_)}, {"digest", digest}, {"ways", ways_.size()}};
+    input_.emit({{"digests", name_ + ", " + what, values, broken}});
+  }
+
+  const MeasurementInput& input_;
+  const std::vector<Way> ways_;
+  std::string name_;
+  double resolution_ = 0.0, voxel_size_ = 0.0;
+  PolygonMesh mesh_;
+  LevelSet level_set_;
+};
+
+}  // namespace
+
+Measurement digests_measurement() {
+  std::vector<std::string> cases = case_choices();
+  cases.insert(cases.begin(), {"few", "all"});
+  return {.name = "digests",
+          .summary = "digests of all that the program makes, in every way of making it",
+          .parameters = {{"cases", "few", "two small ones, all models, or one case", cases},
+                         {"resolutions", "50", "voxels along the longest side", {"50", "200", "50 200"}},
+                         {"threads", "1 2 7", "numbers of threads that must give the same", {"2", "1 2 7"}},
+                         {"simd", "all", "levels of vector code that must give the same", {"all", "highest"}},
+                         {"references", "no", "whether OpenVDB's are among them", {"no", "yes"}}},
+          .tables = {{"digests",
+                      "what was made",
+                      "case, what",
+                      {{"resolution", "voxels", "along the longest side"},
+                       {"digest", "digest", "of what was made, or the sentence of why nothing was"},
+                       {"ways", "ways", "numbers of threads and levels of vector code that gave the same"}},
+                      true,
+                      true}},
+          .measure = [](const MeasurementInput& input) { return Digests(input).run(); }};
+}
+
+}  // namespace hermesh

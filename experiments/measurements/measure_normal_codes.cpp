@@ -1,0 +1,342 @@
+// Error and speed of the 16-bit normals: trap T1 of the notes on the thesis, and what mends it.
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "algorithms/hermite/normal_code.h"
+#include "experiments/harness/measure.h"
+#include "experiments/measurements/measurements.h"
+
+namespace hermesh {
+namespace {
+
+using Normal = std::array<float, 3>;
+using Vector = std::array<double, 3>;
+
+constexpr std::size_t kCodes = 65'536;
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+/// By the chord, since the cosine of a small angle has lost its digits.
+double degrees_between(const Normal& p, const Normal& q) {
+  const double x = double(p[0]) - q[0], y = double(p[1]) - q[1], z = double(p[2]) - q[2];
+  return 2.0 * std::asin(std::min(1.0, 0.5 * std::sqrt(x * x + y * y + z * z))) * kDegrees;
+}
+
+/// The i-th of n points that cover the sphere evenly, the spherical Fibonacci lattice.
+Normal sphere_point(std::size_t i, std::size_t n) {
+  static const double golden_angle = std::numbers::pi * (3.0 - std::sqrt(5.0));
+  const double z = 1.0 - (2.0 * double(i) + 1.0) / double(n), r = std::sqrt(1.0 - z * z);
+  const double angle = golden_angle * double(i);
+  return {float(r * std::cos(angle)), float(r * std::sin(angle)), float(z)};
+}
+
+struct Sweep {
+  std::vector<float> errors;                  ///< degrees, of every normal
+  std::vector<std::optional<Normal>> member;  ///< by code: one of the normals that have it
+};
+
+template <NormalCode Code>
+Sweep sweep_sphere(std::size_t points, const RunContext& context) {
+  Sweep sweep;
+  sweep.errors.resize(points);
+  sweep.member.resize(kCodes);
+  for (std::size_t i = 0; i < points; ++i) {
+    if (i % 65'536 == 0) context.check();
+    const Normal normal = sphere_point(i, points);
+    const std::uint16_t code = Code::pack(normal);
+    sweep.errors[i] = float(degrees_between(normal, Code::unpack(code)));
+    sweep.member[code] = normal;
+  }
+  return sweep;
+}
+
+/// Where the great circle from `start` along the unit tangent has got after an angle in radians.
+Normal walk(const Vector& start, const Vector& tangent, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  return {float(c * start[0] + s * tangent[0]), float(c * start[1] + s * tangent[1]),
+          float(c * start[2] + s * tangent[2])};
+}
+
+/// Two unit vectors that are perpendicular to a unit vector and to one another (Duff et al., Building an
+/// Orthonormal Basis, Revisited, JCGT 2017).
+std::array<Vector, 2> tangents(const Vector& n) {
+  const double sign = std::copysign(1.0, n[2]), a = -1.0 / (sign + n[2]), b = n[0] * n[1] * a;
+  return {{{1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}}};
+}
+
+/// The largest error on the border of the cell of normals that share a code, from one of its members. A cell
+/// is seen whole from each of its points, and none is wider than the walk is long.
+template <NormalCode Code>
+double error_on_border(std::uint16_t code, const Normal& member, int directions) {
+  constexpr int kHalvings = 20;
+  constexpr double kReach = 4.0 / kDegrees;
+  const Vector start = {member[0], member[1], member[2]};
+  const auto [u, v] = tangents(start);
+  const Normal decoded = Code::unpack(code);
+  double largest = 0.0;
+  for (int direction = 0; direction < directions; ++direction) {
+    const double turn = 2.0 * std::numbers::pi * direction / directions;
+    const double c = std::cos(turn), s = std::sin(turn);
+    const Vector tangent = {c * u[0] + s * v[0], c * u[1] + s * v[1], c * u[2] + s * v[2]};
+    double inside = 0.0, outside = kReach;
+    for (int i = 0; i < kHalvings; ++i) {
+      const double middle = 0.5 * (inside + outside);
+      (Code::pack(walk(start, tangent, middle)) == code ? inside : outside) = middle;
+    }
+    largest = std::max(largest, degrees_between(decoded, walk(start, tangent, inside)));
+  }
+  return largest;
+}
+
+template <NormalCode Code>
+double largest_error_on_borders(const Sweep& sweep, int directions, const RunContext& context) {
+  double largest = 0.0;
+  for (std::size_t code = 0; code < kCodes; ++code) {
+    if (code % 1024 == 0) context.check();
+    if (sweep.member[code])
+      largest =
+          std::max(largest, error_on_border<Code>(std::uint16_t(code), *sweep.member[code], directions));
+  }
+  return largest;
+}
+
+template <NormalCode Code>
+double largest_length_error() {
+  double largest = 0.0;
+  for (std::size_t code = 0; code < kCodes; ++code) {
+    const Normal n = Code::unpack(std::uint16_t(code));
+    largest = std::max(largest, std::abs(std::hypot(double(n[0]), double(n[1]), double(n[2])) - 1.0));
+  }
+  return largest;
+}
+
+/// Mean and maximum in degrees as the notes on the thesis state them (trap T1); they know no `nearest`.
+std::optional<std::array<double, 2>> expected(NormalCodeId id) {
+  switch (id) {
+    case NormalCodeId::thesis:
+      return {{1.32, 2.56}};
+    case NormalCodeId::baptista:
+      return {{0.81, 1.92}};
+    case NormalCodeId::rounded:
+      return {{0.34, 0.96}};
+    case NormalCodeId::octahedral:
+      return {{0.34, 0.95}};
+    case NormalCodeId::nearest:
+      break;
+  }
+  return std::nullopt;
+}
+
+double percentile(std::vector<float>& errors, double share) {
+  const auto at = errors.begin() + std::ptrdiff_t(share * double(errors.size() - 1));
+  std::nth_element(errors.begin(), at, errors.end());
+  return *at;
+}
+
+MeasuredRow error_row(NormalCodeId id, std::vector<float>& errors) {
+  double sum = 0.0, squares = 0.0;
+  for (const double error : errors) {
+    sum += error;
+    squares += error * error;
+  }
+  const double count = double(errors.size());
+  MeasuredRow row{"errors", std::string(name(id)), {}, {}};
+  row.values["mean"] = sum / count;
+  row.values["rms"] = std::sqrt(squares / count);
+  row.values["median"] = percentile(errors, 0.5);
+  row.values["p95"] = percentile(errors, 0.95);
+  row.values["p99"] = percentile(errors, 0.99);
+  row.values["max"] = *std::max_element(errors.begin(), errors.end());
+  if (const auto figures = expected(id)) {
+    row.values["expected_mean"] = (*figures)[0];
+    row.values["expected_max"] = (*figures)[1];
+    if (std::abs(sum / count - (*figures)[0]) > 0.02 * (*figures)[0])
+      row.broken.push_back("the mean error is not the expected one");
+  }
+  return row;
+}
+
+void add_histogram(const std::string& label, const std::vector<float>& errors, const Options& parameters,
+                   std::vector<MeasuredRow>& rows) {
+  const auto bins = std::size_t(parameters.number("bins"));
+  const double width = parameters.number("last_bin") / double(bins);
+  std::vector<std::size_t> counts(bins);
+  for (const double error : errors)
+    if (const auto bin = std::size_t(error / width); bin < bins) ++counts[bin];
+  for (std::size_t bin = 0; bin < bins; ++bin)
+    rows.push_back(
+        {"histogram",
+         label,
+         {{"error", (double(bin) + 0.5) * width}, {"share", double(counts[bin]) / double(errors.size())}},
+         {}});
+}
+
+/// A row of errors, and those of the histogram.
+template <NormalCode Code>
+std::vector<MeasuredRow> measure_errors(NormalCodeId id, const MeasurementInput& input) {
+  const auto points = std::size_t(input.parameters.number("points"));
+  Sweep sweep = sweep_sphere<Code>(points, input.context);
+  std::vector<MeasuredRow> rows = {error_row(id, sweep.errors)};
+  rows[0].values["codes"] =
+      std::ranges::count_if(sweep.member, [](const auto& member) { return member.has_value(); });
+  rows[0].values["cell_max"] =
+      largest_error_on_borders<Code>(sweep, int(input.parameters.number("directions")), input.context);
+  rows[0].values["length_off"] = largest_length_error<Code>();
+  add_histogram(Code::name, sweep.errors, input.parameters, rows);
+  return rows;
+}
+
+/// The loops that are timed, behind pointers, so that no repetition can be optimised away.
+struct Loops {
+  void (*pack)(const Normal*, std::uint16_t*, std::size_t);
+  void (*unpack)(const std::uint16_t*, Normal*, std::size_t);
+  void (*negate)(const std::uint16_t*, std::uint16_t*, std::size_t);
+};
+
+template <NormalCode Code>
+Loops loops_of(Code) {
+  return {[](const Normal* from, std::uint16_t* to, std::size_t n) {
+            for (std::size_t i = 0; i < n; ++i) to[i] = Code::pack(from[i]);
+          },
+          [](const std::uint16_t* from, Normal* to, std::size_t n) {
+            for (std::size_t i = 0; i < n; ++i) to[i] = Code::unpack(from[i]);
+          },
+          [](const std::uint16_t* from, std::uint16_t* to, std::size_t n) {
+            for (std::size_t i = 0; i < n; ++i) to[i] = Code::negate(from[i]);
+          }};
+}
+
+std::vector<Normal> random_normals(std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> coordinate;
+  std::vector<Normal> normals(count);
+  for (Normal& n : normals) {
+    const double x = coordinate(generator), y = coordinate(generator), z = coordinate(generator);
+    const double length = std::hypot(x, y, z);
+    n = {float(x / length), float(y / length), float(z / length)};
+  }
+  return normals;
+}
+
+/// CPU seconds of this thread, which other programs on the machine do not add to.
+double thread_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
+/// Nanoseconds an element. A chunk of normals and codes is 224 KiB, and is worked on several times while it
+/// is in the second-level cache, so that the code is timed and not the memory.
+template <class From, class To>
+double pass(void (*loop)(const From*, To*, std::size_t), const std::vector<From>& from, std::vector<To>& to) {
+  constexpr std::size_t kChunk = 16'384;
+  constexpr int kRounds = 8;
+  const double start = thread_seconds();
+  for (std::size_t begin = 0; begin < from.size(); begin += kChunk)
+    for (int round = 0; round < kRounds; ++round)
+      loop(&from[begin], &to[begin], std::min(kChunk, from.size() - begin));
+  return 1e9 * (thread_seconds() - start) / (double(from.size()) * kRounds);
+}
+
+/// All codes and operations in turns.
+std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
+  const auto normals = random_normals(std::size_t(input.parameters.number("normals")), input.seed);
+  std::vector<Normal> decoded(normals.size());
+  std::vector<std::vector<std::uint16_t>> codes(kNormalCodes.size(),
+                                                std::vector<std::uint16_t>(normals.size()));
+  std::vector<std::uint16_t> negated(normals.size());
+  std::vector<Contender> contenders;
+  const auto add = [&](std::function<double()> run) {
+    contenders.push_back({.run = std::move(run),
+                          .budget_seconds = 1e9,
+                          .repetitions = int(input.parameters.number("repetitions")),
+                          .seconds = {}});
+  };
+  for (std::size_t i = 0; i < kNormalCodes.size(); ++i) {
+    const Loops loops = with_normal_code(kNormalCodes[i], [](auto code) { return loops_of(code); });
+    loops.pack(normals.data(), codes[i].data(), normals.size());
+    add([&, i, loops] { return pass(loops.pack, normals, codes[i]); });
+    add([&, i, loops] { return pass(loops.unpack, codes[i], decoded); });
+    add([&, i, loops] { return pass(loops.negate, codes[i], negated); });
+  }
+  race(contenders);
+  std::vector<MeasuredRow> rows;
+  constexpr std::array kOperations = {"pack", "unpack", "negate"};
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    if (i % 3 == 0) rows.push_back({"speed", std::string(name(kNormalCodes[i / 3])), {}, {}});
+    const std::vector<double>& nanoseconds = contenders[i].seconds;
+    const std::string operation = kOperations[i % 3];
+    rows.back().values[operation] = median(nanoseconds);
+    rows.back().values[operation + "_min"] = *std::min_element(nanoseconds.begin(), nanoseconds.end());
+  }
+  return rows;
+}
+
+std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+  std::vector<MeasuredRow> rows;
+  for (std::size_t i = 0; i < kNormalCodes.size(); ++i) {
+    input.context.progress("errors", double(i) / double(kNormalCodes.size()));
+    std::ranges::move(
+        with_normal_code(kNormalCodes[i],
+                         [&](auto code) { return measure_errors<decltype(code)>(kNormalCodes[i], input); }),
+        std::back_inserter(rows));
+  }
+  const Stage stage(input.context, "speed");
+  std::ranges::move(measure_speed(input), std::back_inserter(rows));
+  return rows;
+}
+
+}  // namespace
+
+Measurement normal_codes_measurement() {
+  return {
+      .name = "normal-codes",
+      .summary = "error, size and speed of normals in 16 bits",
+      .parameters = {{"points", "20000000", "normals that sweep the sphere", {}, 1000, 1e9},
+                     {"directions", "64", "in which the border of every code's cell is sought", {}, 1, 10000},
+                     {"bins", "60", "of the histogram", {}, 1, 1000},
+                     {"last_bin", "3", "where the histogram ends, degrees", {}, 0.01, 180},
+                     {"normals", "1000000", "random normals that are timed", {}, 1000, 1e8},
+                     {"repetitions", "15", "timed passes over them", {}, 1, 1000}},
+      .tables = {{"errors",
+                  "angle between a normal and what comes back from its code",
+                  "code",
+                  {{"codes", "codes", "different codes among those of the sweep"},
+                   {"mean", "mean [°]", "mean error over the sweep of the sphere"},
+                   {"rms", "rms [°]", "root mean square error"},
+                   {"median", "median [°]", "half of the errors are smaller"},
+                   {"p95", "95 % [°]", "95 % of the errors are smaller"},
+                   {"p99", "99 % [°]", "99 % of the errors are smaller"},
+                   {"max", "max [°]", "largest error of the sweep"},
+                   {"cell_max", "cell max [°]",
+                    "largest error on the borders of the cells of all codes, each sought from one normal in "
+                    "the cell"},
+                   {"expected_mean", "expected mean [°]", "the mean that the notes on the thesis give"},
+                   {"expected_max", "expected max [°]", "the maximum that they give"},
+                   {"length_off", "length off",
+                    "largest difference of a length from 1, of all 65,536 codes"}}},
+                 {"speed",
+                  "CPU time a normal on one thread, in chunks that stay in the second-level cache",
+                  "code",
+                  {{"pack", "pack [ns]", "median time to pack a normal"},
+                   {"pack_min", "min [ns]", "shortest"},
+                   {"unpack", "unpack [ns]", "median time to unpack a code"},
+                   {"unpack_min", "min [ns]", "shortest"},
+                   {"negate", "negate [ns]", "median time to negate a code"},
+                   {"negate_min", "min [ns]", "shortest"}}},
+                 {.name = "histogram",
+                  .title = "share of the errors by size",
+                  .first_column = "code",
+                  .columns = {{"error", "error [°]", "middle of the bin"},
+                              {"share", "share", "of the sweep's normals that are in the bin"}},
+                  .printed = false}},
+      .measure = measure};
+}
+
+}  // namespace hermesh

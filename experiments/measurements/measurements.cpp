@@ -1,0 +1,117 @@
+#include "experiments/measurements/measurements.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "experiments/harness/cell.h"
+#include "experiments/harness/experiment_file.h"
+#include "experiments/harness/provenance.h"
+#include "experiments/harness/run_cells.h"
+
+namespace hermesh {
+namespace {
+
+/// @throws Error for what the measurement did not declare: no report would show it.
+const MeasuredTable& table_of(const MeasuredRow& row, const Measurement& measurement) {
+  const auto named = [](const std::string& name) {
+    return [&](const auto& each) { return each.name == name; };
+  };
+  const std::string who = "the measurement " + measurement.name + " gave a row of ";
+  const auto table = std::ranges::find_if(measurement.tables, named(row.table));
+  if (table == measurement.tables.end()) throw Error(who + "an unknown table \"" + row.table + "\"");
+  for (const auto& [key, value] : row.values.items())
+    if (std::ranges::none_of(table->columns, named(key)))
+      throw Error(who + row.table + " with an unknown column \"" + key + "\"");
+  return *table;
+}
+
+const Measurement& find_measurement(std::span<const Measurement> table, const std::string& name) {
+  const auto found = std::ranges::find(table, name, &Measurement::name);
+  if (found == table.end()) throw Error("there is no measurement \"" + name + "\"");
+  return *found;
+}
+
+/// Everything that a report needs, so that it does not depend on the program that made the row.
+Json to_json(const MeasuredTable& table) {
+  Json columns = Json::array();
+  for (const MeasuredColumn& column : table.columns)
+    columns.push_back({{"name", column.name}, {"header", column.header}, {"meaning", column.meaning}});
+  Json result = {{"title", table.title},
+                 {"first_column", table.first_column},
+                 {"columns", columns},
+                 {"printed", table.printed}};
+  if (table.additive) result["additive"] = true;
+  return result;
+}
+
+Json row_json(const Json& head, const std::string& table, const std::string& label) {
+  Json row = head;
+  row["case"] = {{"name", table}};
+  row["variant"] = {{"name", label}, {"label", label}};
+  return row;
+}
+
+}  // namespace
+
+std::vector<std::string> case_choices() {
+  std::vector<std::string> names;
+  for (const CaseInfo& info : list_cases())
+    if (info.kind != "volume") names.push_back(info.name);
+  return names;
+}
+
+std::span<const Measurement> all_measurements() {
+  static const std::vector<Measurement> table = {
+      normal_codes_measurement(),       lost_crossings_measurement(), hermite_memory_measurement(),
+      hermite_csg_measurement(),        hermite_speed_measurement(),  table_9_2_measurement(),
+      tables_9_3_and_9_4_measurement(), volumes_measurement(),        guarantee_measurement(),
+      fracture_measurement(),           fracture_speed_measurement(),
+      fracture_guarantee_measurement(), digests_measurement()};
+  return table;
+}
+
+std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
+                                  const std::filesystem::path& out, const std::string& filter,
+                                  const Json& head, RunContext& context,
+                                  const std::function<void(const Json&)>& keep) {
+  const Measurement& measurement = find_measurement(tables.measurements, experiment.measurement);
+  const Options parameters(measurement.name, measurement.parameters, tier.parameters);
+  Json full_head = head;
+  full_head["measurement"] = {
+      {"name", measurement.name}, {"parameters", parameters.canonical()}, {"seed", experiment.seed}};
+  full_head["load"] = load_averages();
+
+  std::vector<Json> rows;
+  const auto add = [&](Json row) {
+    if (keep) keep(row);
+    rows.push_back(std::move(row));
+  };
+  const auto start = std::chrono::steady_clock::now();
+  const auto take = [&](const std::vector<MeasuredRow>& measured) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    full_head["measurement"]["seconds"] = elapsed.count();
+    for (const MeasuredRow& each : measured) {
+      const MeasuredTable& table = table_of(each, measurement);
+      if ((measurement.name + "/" + each.table + "/" + each.label).find(filter) == std::string::npos) continue;
+      Json row = row_json(full_head, each.table, each.label);
+      row["table"] = to_json(table);
+      row["values"] = each.values.is_null() ? Json::object() : each.values;
+      if (!each.broken.empty()) row["broken"] = each.broken;
+      add(std::move(row));
+    }
+  };
+  std::vector<MeasuredRow> measured;
+  const auto failure = attempt([&] {
+    measured = measurement.measure({parameters, experiment.seed, tables, out, context, filter, take});
+  });
+  if (failure) {
+    Json row = row_json(full_head, measurement.name, measurement.name);
+    row["failed"] = *failure;
+    add(std::move(row));
+    return rows;
+  }
+  take(measured);
+  return rows;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,236 @@
+#include "experiments/pictures/render.h"
+
+#include <cairo.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <sstream>
+
+#include "algorithms/io/atomic_file.h"
+#include "experiments/pictures/ray_scene.h"
+
+namespace hermesh {
+namespace {
+
+struct Tone {
+  double red, green, blue;
+};
+constexpr Tone kPaper{1.0, 1.0, 1.0}, kInk{0.11, 0.13, 0.17}, kQuiet{0.38, 0.41, 0.46},
+    kMark{0.85, 0.33, 0.16};
+
+constexpr double kMargin = 24, kGap = 14, kTitleSize = 22, kSubtitleSize = 13, kLabelSize = 15,
+                 kCaptionSize = 12.5;
+
+/// A Cairo surface with its context; text is drawn from its base line.
+class Canvas {
+ public:
+  Canvas(int width, int height)
+      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height), cairo_surface_destroy),
+        cairo_(cairo_create(surface_.get()), cairo_destroy) {
+    if (cairo_status(cairo_.get()) != CAIRO_STATUS_SUCCESS)
+      throw Error("a picture of " + std::to_string(width) + " by " + std::to_string(height) +
+                  " pixels cannot be made; show fewer variants");
+    tone(kPaper);
+    cairo_paint(cairo_.get());
+  }
+
+  /// Shortens the text with an ellipsis where it is wider than `room` pixels.
+  void text(double x, double y, std::string words, double size, Tone colour, double room, bool bold = false) {
+    tone(colour);
+    font(size, bold);
+    if (width_of(words) > room) {
+      while (!words.empty() && width_of(words + "…") > room) drop_last_letter(words);
+      words += "…";
+    }
+    cairo_move_to(cairo_.get(), x, y);
+    cairo_show_text(cairo_.get(), words.c_str());
+  }
+
+  /// Lines no wider than `room` pixels, broken between words; a word that is wider has one to itself.
+  std::vector<std::string> lines(const std::string& text, double size, double room) {
+    font(size, false);
+    std::vector<std::string> lines;
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+      if (!lines.empty() && width_of(lines.back() + " " + word) <= room)
+        lines.back() += " " + word;
+      else
+        lines.push_back(word);
+    }
+    return lines;
+  }
+
+  void image(double x, double y, const Image& picture) {
+    const int stride = cairo_format_stride_for_width(CAIRO_FORMAT_RGB24, picture.width);
+    const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> source(
+        cairo_image_surface_create(CAIRO_FORMAT_RGB24, picture.width, picture.height), cairo_surface_destroy);
+    unsigned char* rows = cairo_image_surface_get_data(source.get());
+    if (!rows) throw Error("a picture of " + std::to_string(picture.width) + " pixels across cannot be made");
+    for (int row = 0; row < picture.height; ++row)
+      std::copy_n(picture.pixels.data() + static_cast<std::size_t>(row) * picture.width, picture.width,
+                  reinterpret_cast<std::uint32_t*>(rows + static_cast<std::size_t>(row) * stride));
+    cairo_surface_mark_dirty(source.get());
+    cairo_set_source_surface(cairo_.get(), source.get(), x, y);
+    cairo_paint(cairo_.get());
+  }
+
+  void frame(double x, double y, double width, double height, Tone colour, double line) {
+    tone(colour);
+    cairo_set_line_width(cairo_.get(), line);
+    cairo_rectangle(cairo_.get(), x, y, width, height);
+    cairo_stroke(cairo_.get());
+  }
+
+  void write(const std::filesystem::path& png) const {
+    AtomicFile file(png);
+    const cairo_status_t status = cairo_surface_write_to_png(surface_.get(), file.path().c_str());
+    if (status != CAIRO_STATUS_SUCCESS)
+      throw Error("cannot write the picture " + png.string() + ": " + cairo_status_to_string(status));
+    file.commit();
+  }
+
+ private:
+  void font(double size, bool bold) {
+    cairo_select_font_face(cairo_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
+                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cairo_.get(), size);
+  }
+  void tone(Tone t) { cairo_set_source_rgb(cairo_.get(), t.red, t.green, t.blue); }
+  double width_of(const std::string& words) const {
+    cairo_text_extents_t extents;
+    cairo_text_extents(cairo_.get(), words.c_str(), &extents);
+    return extents.x_advance;
+  }
+  /// One UTF-8 letter, which may be several bytes.
+  static void drop_last_letter(std::string& words) {
+    while (!words.empty() && (static_cast<unsigned char>(words.back()) & 0xc0) == 0x80) words.pop_back();
+    if (!words.empty()) words.pop_back();
+  }
+
+  std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface_;
+  std::unique_ptr<cairo_t, void (*)(cairo_t*)> cairo_;
+};
+
+/// Where everything on the sheet goes, in pixels, and the two views that all pictures share.
+struct Layout {
+  int columns, blocks, width, height;
+  double header, text_height, block_height;
+  View whole, close;
+  double close_x, close_y, close_side;  ///< the close-up's outline inside the whole view
+};
+
+/// The box's extent along a direction, from its eight corners.
+std::pair<double, double> extent(const Bounds& box, const Eigen::Vector3d& direction) {
+  double lower = std::numeric_limits<double>::infinity(), upper = -lower;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner(i & 1 ? box.upper.x() : box.lower.x(), i & 2 ? box.upper.y() : box.lower.y(),
+                                 i & 4 ? box.upper.z() : box.lower.z());
+    lower = std::min(lower, corner.dot(direction));
+    upper = std::max(upper, corner.dot(direction));
+  }
+  return {lower, upper};
+}
+
+void set_views(Layout& layout, const Sheet& sheet, const Camera& camera) {
+  const double longest = std::max(sheet.frame.size().maxCoeff(), 1e-30);
+  const auto [left, right] = extent(sheet.frame, camera.right);
+  const auto [bottom, top] = extent(sheet.frame, camera.up);
+  const int pixels = sheet.cell_pixels;
+  // A flat object gets a flat picture; a tall one is fitted into a square.
+  const double aspect = std::clamp((top - bottom) / std::max(right - left, 1e-30), 0.6, 1.0);
+  View& whole = layout.whole;
+  whole.width = pixels;
+  whole.height = static_cast<int>(std::lround(pixels * aspect));
+  whole.world_width = 1.05 * std::max(right - left, (top - bottom) / aspect);
+  whole.centre = 0.5 * (sheet.frame.lower + sheet.frame.upper);
+  whole.occlusion_radius = 0.12 * longest;
+
+  View& close = layout.close;
+  close.width = close.height = pixels;
+  close.world_width = sheet.close_up.size * longest;
+  const Eigen::Vector3d fraction(sheet.close_up.centre[0], sheet.close_up.centre[1],
+                                 sheet.close_up.centre[2]);
+  close.centre = sheet.frame.lower + sheet.frame.size().cwiseProduct(fraction);
+  close.occlusion_radius = 0.06 * longest;
+  close.edges = true;
+
+  const double pixel = whole.world_width / pixels;
+  const Eigen::Vector3d offset = close.centre - whole.centre;
+  layout.close_side = close.world_width / pixel;
+  layout.close_x = 0.5 * whole.width + offset.dot(camera.right) / pixel - 0.5 * layout.close_side;
+  layout.close_y = 0.5 * whole.height - offset.dot(camera.up) / pixel - 0.5 * layout.close_side;
+}
+
+Layout plan(const Sheet& sheet, const Camera& camera) {
+  Layout layout{};
+  set_views(layout, sheet, camera);
+  const int count = std::max<int>(1, static_cast<int>(sheet.pictures.size()));
+  // As few rows as the widest sheet needs, and then evenly filled: seven pictures are 4 + 3, six are 3 + 3.
+  layout.blocks = (count + sheet.columns - 1) / sheet.columns;
+  layout.columns = (count + layout.blocks - 1) / layout.blocks;
+  std::size_t lines = 0;
+  for (const Picture& picture : sheet.pictures) lines = std::max(lines, picture.captions.size());
+  layout.header = kMargin + kTitleSize + (sheet.subtitle.empty() ? 0 : kSubtitleSize + 10) + 18;
+  layout.text_height = kLabelSize + 8 + static_cast<double>(lines) * (kCaptionSize + 5) + 4;
+  layout.block_height = layout.text_height + layout.whole.height + kGap / 2 + layout.close.height + 2 * kGap;
+  layout.width =
+      static_cast<int>(2 * kMargin + layout.columns * sheet.cell_pixels + (layout.columns - 1) * kGap);
+  layout.height = static_cast<int>(layout.header + layout.blocks * layout.block_height + kMargin - kGap);
+  return layout;
+}
+
+void draw_picture(Canvas& canvas, const Picture& picture, const Layout& layout, const Camera& camera,
+                  double x, double y, RunContext& context) {
+  const int pixels = layout.whole.width;
+  canvas.text(x, y + kLabelSize, picture.label, kLabelSize, kInk, pixels, true);
+  double line = y + kLabelSize + 8 + kCaptionSize;
+  for (const std::string& caption : picture.captions) {
+    canvas.text(x, line, caption, kCaptionSize, kQuiet, pixels);
+    line += kCaptionSize + 5;
+  }
+  const PolygonMesh mesh = picture.load();
+  const RayScene scene(mesh);
+  const double top = y + layout.text_height, middle = top + layout.whole.height + kGap / 2;
+  canvas.image(x, top, scene.render(camera, layout.whole, context));
+  canvas.image(x, middle, scene.render(camera, layout.close, context));
+  if (mesh.empty())
+    canvas.text(x + 0.5 * pixels - 24, top + 0.5 * layout.whole.height, "empty", 18, kMark, pixels, true);
+  canvas.frame(x + layout.close_x, top + layout.close_y, layout.close_side, layout.close_side, kMark, 1.5);
+  canvas.frame(x + 0.75, middle + 0.75, pixels - 1.5, layout.close.height - 1.5, kMark, 1.5);
+}
+
+void break_captions(std::vector<Picture>& pictures, double room) {
+  Canvas canvas(1, 1);
+  for (Picture& picture : pictures) {
+    std::vector<std::string> broken;
+    for (const std::string& caption : picture.captions)
+      for (std::string& line : canvas.lines(caption, kCaptionSize, room)) broken.push_back(std::move(line));
+    picture.captions = std::move(broken);
+  }
+}
+
+}  // namespace
+
+void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context) {
+  const Stage stage(context, "picture");
+  break_captions(sheet.pictures, sheet.cell_pixels);
+  const Camera camera = make_camera(sheet.viewpoint.azimuth, sheet.viewpoint.elevation);
+  const Layout layout = plan(sheet, camera);
+  Canvas canvas(layout.width, layout.height);
+  const double room = layout.width - 2 * kMargin;
+  canvas.text(kMargin, kMargin + kTitleSize, sheet.title, kTitleSize, kInk, room, true);
+  canvas.text(kMargin, kMargin + kTitleSize + kSubtitleSize + 10, sheet.subtitle, kSubtitleSize, kQuiet,
+              room);
+  for (std::size_t i = 0; i < sheet.pictures.size(); ++i) {
+    const double column = static_cast<double>(i % layout.columns),
+                 block = static_cast<double>(i / layout.columns);
+    draw_picture(canvas, sheet.pictures[i], layout, camera, kMargin + column * (sheet.cell_pixels + kGap),
+                 layout.header + block * layout.block_height, context);
+    context.progress("picture", static_cast<double>(i + 1) / static_cast<double>(sheet.pictures.size()));
+  }
+  canvas.write(png);
+}
+
+}  // namespace hermesh

@@ -1,0 +1,144 @@
+// A bounding-volume hierarchy over triangles: closest points and box overlaps.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "validation/geometry/triangle_soup.h"
+
+namespace hermesh::validation {
+
+/// The point of a triangle that is closest to `point`. A triangle whose height is below 1e-8 of its longest
+/// edge counts as its three edges: its normal is all rounding error, and the answer then is off by no more
+/// than that height.
+Eigen::Vector3d closest_point(const Corners& triangle, const Eigen::Vector3d& point);
+
+struct ClosestHit {
+  double squared = std::numeric_limits<double>::infinity();  ///< squared distance
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  std::uint32_t slot = 0;  ///< of the triangle, in the order of the tree
+};
+
+/// A complete binary tree in heap order: the children of node i are 2i+1 and 2i+2, the leaves are the last
+/// level, and leaf k holds the slots first_slot(k) to first_slot(k+1). Built in parallel by median splits,
+/// the same for any number of threads.
+class TriangleTree {
+ public:
+  /// @throws Error if there is no triangle.
+  explicit TriangleTree(const TriangleSoup& soup);
+
+  ClosestHit closest(const Eigen::Vector3d& point) const { return closest(point, slot_hit(point, 0)); }
+  /// With a first guess, such as the slot of the answer to a query nearby, which makes it faster.
+  ClosestHit closest(const Eigen::Vector3d& point, std::uint32_t guess) const {
+    return closest(point, slot_hit(point, guess));
+  }
+
+  std::size_t size() const { return order_.size(); }
+  std::size_t leaves() const { return std::size_t(1) << depth_; }
+  std::size_t first_slot(std::size_t leaf) const { return (size() * leaf) >> depth_; }
+  const Box& leaf_box(std::size_t leaf) const { return boxes_[leaves() - 1 + leaf]; }
+  const Box& bounds() const { return boxes_[0]; }
+  std::uint32_t triangle(std::size_t slot) const { return order_[slot]; }  ///< its number in the soup
+  const Corners& corners(std::size_t slot) const { return corners_[slot]; }
+
+  /// Calls visit(slot) for each triangle whose box is within `reach` of a box, until it says no. Whether it
+  /// never did.
+  template <class Visit>
+  bool for_each_near(const Box& box, double reach, const Visit& visit) const {
+    const double squared = reach * reach;
+    std::size_t stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::size_t node = stack[--top];
+      if (boxes_[node].squared_distance(box) > squared) continue;
+      if (node < leaves() - 1) {
+        stack[top++] = 2 * node + 2;
+        stack[top++] = 2 * node + 1;
+        continue;
+      }
+      const std::size_t leaf = node - (leaves() - 1);
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
+        if (box_of(corners_[slot]).squared_distance(box) <= squared && !visit(std::uint32_t(slot)))
+          return false;
+    }
+    return true;
+  }
+
+  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more.
+  template <class Visit>
+  void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
+    const Slabs slabs(from, to);
+    std::size_t stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::size_t node = stack[--top];
+      if (!slabs.meet(boxes_[node])) continue;
+      if (node < leaves() - 1) {
+        stack[top++] = 2 * node + 2;
+        stack[top++] = 2 * node + 1;
+        continue;
+      }
+      const std::size_t leaf = node - (leaves() - 1);
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot) visit(std::uint32_t(slot));
+    }
+  }
+
+  /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.
+  template <class Visit>
+  void for_each_overlapping_leaf(std::size_t leaf, const Visit& visit) const {
+    const Box& box = leaf_box(leaf);
+    struct Entry {
+      std::size_t node;
+      std::size_t past;  ///< one past the last leaf below
+      std::size_t count;
+    } stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = {0, leaves(), leaves()};
+    while (top > 0) {
+      const Entry e = stack[--top];
+      if (e.past <= leaf || !boxes_[e.node].overlaps(box)) continue;
+      if (e.count == 1) {
+        visit(e.past - 1);
+        continue;
+      }
+      stack[top++] = {2 * e.node + 2, e.past, e.count / 2};
+      stack[top++] = {2 * e.node + 1, e.past - e.count / 2, e.count / 2};
+    }
+  }
+
+ private:
+  static constexpr int kMaxDepth = 40;
+
+  // A segment against boxes: the interval of its parameter between each pair of planes, a little widened, so that
+  // rounding loses no box.
+  struct Slabs {
+    Eigen::Vector3d from, inverse;
+    Slabs(const Eigen::Vector3d& start, const Eigen::Vector3d& end)
+        : from(start), inverse((end - start).cwiseInverse()) {}
+    bool meet(const Box& box) const {
+      constexpr double kSlack = 1e-9;
+      double first = -kSlack, last = 1.0 + kSlack;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double a = (box.lower[axis] - from[axis]) * inverse[axis];
+        const double b = (box.upper[axis] - from[axis]) * inverse[axis];
+        // Of a segment in a plane of the box, 0 times infinity is no number and bounds nothing.
+        if (std::min(a, b) - kSlack > first) first = std::min(a, b) - kSlack;
+        if (std::max(a, b) + kSlack < last) last = std::max(a, b) + kSlack;
+      }
+      return first <= last;
+    }
+  };
+
+  ClosestHit slot_hit(const Eigen::Vector3d& point, std::uint32_t slot) const;
+  ClosestHit closest(const Eigen::Vector3d& point, ClosestHit best) const;
+
+  int depth_ = 0;
+  std::vector<Box> boxes_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Corners> corners_;
+};
+
+}  // namespace hermesh::validation
