@@ -73,29 +73,6 @@ class Components {
     }
   }
 
-  /// Joins what hangs together across faces only: no cut edge parts it, so that the pieces would have no seam
-  /// there but a gap.
-  void join_without_seam(ComponentReport& report) {
-    std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
-    for (const auto& [samples, cells] : solid_.joined_faces)
-      if (const auto pair = roots(component(samples[0]), component(samples[1])); pair.first != pair.second)
-        pairs.insert(pair);
-    if (pairs.empty()) return;
-    const std::set<std::pair<std::uint32_t, std::uint32_t>> cut = pairs_with_cut_edges(pairs);
-    for (const auto& pair : pairs) {
-      if (cut.contains(pair)) continue;
-      auto [small, large] = roots(pair.first, pair.second);
-      if (small == large) continue;
-      if (total_[large] < total_[small]) std::swap(small, large);
-      report.merged.push_back({code_of(small), total_[small], code_of(large)});
-      const std::uint32_t label = label_[large];
-      const std::uint64_t sum = total_[small] + total_[large];
-      const std::uint32_t joined = sets_.join(small, large);
-      total_[joined] = sum;
-      label_[joined] = label;
-    }
-  }
-
   /// Labels 1 … n in the order of code and first sample; the lowest component of a set has the first sample.
   void write_labels() {
     std::vector<std::uint32_t> roots;
@@ -142,37 +119,6 @@ class Components {
       if (std::ranges::none_of(
               cells, [&](const LabelledSolid::Place& cell) { return has_cut(corner_labels(solid_, cell)); }))
         result.push_back(samples);
-    return result;
-  }
-
-  /// The sets of two components, the lower one first.
-  std::pair<std::uint32_t, std::uint32_t> roots(std::uint32_t a, std::uint32_t b) {
-    return std::minmax({sets_.find(a), sets_.find(b)});
-  }
-
-  /// Those of the pairs between which a lattice edge leads.
-  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_with_cut_edges(
-      const std::set<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
-    std::set<std::uint32_t> concerned;
-    for (const auto& [a, b] : pairs) concerned.insert(a), concerned.insert(b);
-    std::set<std::pair<std::uint32_t, std::uint32_t>> result;
-    for (std::size_t b = 0, c = 0; b < solid_.blocks.size(); ++b) {
-      bool any = false;
-      for (const std::size_t end = b + 1 < first_.size() ? first_[b + 1] : label_.size(); c < end; ++c)
-        any = any || concerned.contains(sets_.find(static_cast<std::uint32_t>(c)));
-      if (!any) continue;
-      for (int i = 0; i < 512; ++i) {
-        if (local_of(b, i) == kNoComponent) continue;
-        const std::uint32_t own = component({static_cast<std::int32_t>(b), i});
-        for (int axis = 0; axis < 3; ++axis) {
-          int at[3] = {i >> 6, (i >> 3) & 7, i & 7};
-          ++at[axis];
-          const LabelledSolid::Place there = solid_.locate(static_cast<std::int32_t>(b), at[0], at[1], at[2]);
-          if (solid_.label(there) == 0) continue;
-          if (const auto pair = roots(own, component(there)); pairs.contains(pair)) result.insert(pair);
-        }
-      }
-    }
     return result;
   }
 
@@ -315,7 +261,6 @@ ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& 
   components.sum_sizes();
   report.split_off = components.count() - components.label_count();
   if (options.least_samples > 0) components.merge_small(options.least_samples, report);
-  if (options.split) components.join_without_seam(report);
   components.write_labels();
   return report;
 }

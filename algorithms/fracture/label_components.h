@@ -13,8 +13,7 @@ struct ComponentOptions {
   /// Samples of one piece that do not hang together become several pieces; else a piece may have several
   /// closed surfaces. Two samples hang together by a *contact*: a lattice edge, or an ambiguous face across
   /// which the whole's surface joins them (LabelledSolid::joined_faces) and which no joint shares, for what
-  /// is thin and aslant in the lattice has many of these and few edges. Two pieces that have contacts of the second
-  /// kind only are joined: a cut that parts no edge leaves no seam, but a gap.
+  /// is thin and aslant in the lattice has many of these and few edges.
   bool split = true;
   /// In voxels, that is samples: whatever is smaller joins the neighbour that it has most contacts
   /// with (the lowest of equals), the smallest first. 0 keeps everything.
