@@ -46,7 +46,7 @@ Times times(const Soup& soup) {
 
 TEST(SoupSpeed, NoSmallSoupTakesTwentyTimesAsLongAsOpenVDB) {
   initialize_openvdb();
-  for (std::uint64_t seed = 1000, done = 0; done < 6; ++seed) {
+  for (std::uint64_t seed = 1000, done = 0; done < 2; ++seed) {
     const Soup soup = test::soup(seed);
     if (soup.mesh.triangles.size() > 1000) continue;  // seconds each
     const Times t = times(soup);
