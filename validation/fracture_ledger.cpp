@@ -184,17 +184,13 @@ class Ledger {
         std::none_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface < 0; });
     const bool some_cut =
         std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface > 0; });
-    ledger_.gaps_can_be_judged = (all_tagged && some_cut) || (all_tagged && is_complete()) || are_far_apart();
+    ledger_.gaps_can_be_judged = (all_tagged && (some_cut || is_complete())) || are_far_apart();
   }
 
   /// A gap is missing in the sum of the volumes.
   bool is_complete() const {
-    if (!expected_.whole) return false;
-    double area = 0.0;
-    for (const Triangle& t : rest_)
-      area += 0.5 * (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]).norm();
-    return std::abs(ledger_.pieces_volume - *expected_.whole) <=
-           1e-9 * std::abs(*expected_.whole) + expected_.moved * area;
+    return expected_.whole &&
+           std::abs(ledger_.pieces_volume - *expected_.whole) <= 1e-9 * std::abs(*expected_.whole);
   }
 
   /// A gap that a fracture leaves is narrower than the cells along it, and their edges are as long as they
@@ -381,8 +377,9 @@ std::vector<std::string> FractureLedger::sentences() const {
                      std::to_string(100.0 * *expected_difference) + " %.");
   say(wrong_records, "pieces do not hold the volume that was recorded of them");
   if (is_consistent())
-    result.push_back((result.empty() ? "The books balance: " : "But for that the books balance: ") + std::to_string(pieces) + " pieces, " +
-                     std::to_string(seam_triangles) + " seam triangles, each reversed in one other piece.");
+    result.push_back((result.empty() ? "The books balance: " : "But for that the books balance: ") +
+                     std::to_string(pieces) + " pieces, " + std::to_string(seam_triangles) +
+                     " seam triangles, each reversed in one other piece.");
   return result;
 }
 

@@ -15,7 +15,6 @@ namespace hermesh::validation {
 /// What the volumes are compared with, as far as it is known.
 struct ExpectedVolumes {
   std::optional<double> whole;  ///< of the uncut object's mesh
-  double moved = 0.0;           ///< world units: how far surfaces were allowed to move since, to have fewer polygons
   std::vector<double> pieces;   ///< of each piece, as it was recorded; empty if nothing was
 };
 

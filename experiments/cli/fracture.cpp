@@ -154,13 +154,9 @@ int run_fracture_command(const Arguments& given, const CLI::App& command, Sessio
   if (summary.pieces == 0) throw Error("no piece has a surface, nothing was written");
   summarise(summary, session);
   note_idle_cutters(summary, session);
-  bool balances = true;
-  if (arguments.judge) {
-    const double moved =
-        arguments.method.name == "labelled" ? arguments.method.tolerance * object.level_set.voxel_size() : 0.0;
-    balances = report_ledger(folder.judge(session.context, uncut_volume(object, session.context), moved),
-                             session.context);
-  }
+  const bool balances =
+      !arguments.judge ||
+      report_ledger(folder.judge(session.context, uncut_volume(object, session.context)), session.context);
   folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
   work_is_finished();
   return balances ? kDone : kNotMet;

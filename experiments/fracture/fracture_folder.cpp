@@ -124,11 +124,11 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
 }
 
 validation::FractureLedger FractureFolder::judge(RunContext& context,
-                                                 std::optional<double> uncut_volume, double moved) const {
+                                                 std::optional<double> uncut_volume) const {
   std::vector<MeshFile> files;
   for (std::uint32_t piece = 1; piece <= sketches_.size(); ++piece)
     files.push_back(read_mesh_file(folder_.path() / file_name(piece), context, {.attributes = true}));
-  validation::ExpectedVolumes expected{uncut_volume, moved, {}};
+  validation::ExpectedVolumes expected{uncut_volume, {}};
   for (const Json& piece : pieces_) expected.pieces.push_back(piece.at("volume").get<double>());
   return validation::judge_fracture(files, context, expected);
 }

@@ -27,9 +27,8 @@ class FractureFolder {
   void commit(nlohmann::ordered_json head, const FractureSummary& summary, bool picture, RunContext& context);
 
   /// The pieces' files read back, judged, also against the volumes recorded of them and that of the uncut
-  /// object's mesh if it is given, since when surfaces may have `moved` (world units). @throws Error; Cancelled
-  validation::FractureLedger judge(RunContext& context, std::optional<double> uncut_volume = {},
-                                   double moved = 0.0) const;
+  /// object's mesh if it is given. @throws Error; Cancelled
+  validation::FractureLedger judge(RunContext& context, std::optional<double> uncut_volume = {}) const;
 
   static std::string file_name(std::uint32_t piece);
 

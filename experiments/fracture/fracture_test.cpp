@@ -9,20 +9,20 @@
 #include <ostream>
 
 #include "algorithms/core/error.h"
-#include "algorithms/io/mesh_file.h"
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
-#include "algorithms/thesis/thesis_fracture.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/thesis/thesis_fracture.h"
 #include "experiments/cases/cases.h"
+#include "experiments/cases/recipes.h"
 #include "experiments/fracture/fracture_cutters.h"
-#include "experiments/fracture/fracture_tags.h"
 #include "experiments/fracture/fracture_run.h"
+#include "experiments/fracture/fracture_tags.h"
 #include "experiments/fracture/fracture_trials.h"
 #include "experiments/harness/harness.h"
-#include "experiments/cases/recipes.h"
 #include "validation/fracture_ledger.h"
 
 namespace hermesh {
@@ -104,7 +104,7 @@ validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces, std::o
   std::vector<MeshFile> files;
   for (const PolygonMesh& piece : pieces) files.push_back(to_mesh_file(piece));
   for (std::size_t i = 0; i < pieces.size(); ++i) files[i].attributes = pieces[i].attributes;
-  return validation::judge_fracture(files, context, {whole, 0.0, {}});
+  return validation::judge_fracture(files, context, {whole, {}});
 }
 
 std::string text(const validation::FractureLedger& ledger) {
@@ -268,8 +268,7 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
 
 /// The books of a fracture of polygons, made as the program makes it by default.
 validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
-                                     std::uint64_t seed) {
-  RunContext context;
+                                     std::uint64_t seed, RunContext& context) {
   const std::vector<Voxelizer> voxelizers = all_voxelizers();
   const Voxelizer& voxelizer = find_variant(voxelizers, "hermesh");
   const LevelSet level_set = voxelizer.voxelize({.mesh = mesh,
@@ -296,25 +295,39 @@ TEST(FractureOfPolygons, BalancesWhereNormalsJoinTwoPiecesAcrossAFace) {
     const PolygonMesh mesh =
         load_case((experiments_folder() / "test_inputs" / c.file).string(), context).mesh;
     for (std::uint64_t seed = 0; seed < 5; ++seed) {
-      const validation::FractureLedger ledger = ledger_of(mesh, c.longest, c.cutters, seed);
+      const validation::FractureLedger ledger = ledger_of(mesh, c.longest, c.cutters, seed, context);
       EXPECT_TRUE(ledger.is_consistent()) << c.file << " " << seed << ": " << text(ledger);
     }
   }
 }
 
-void expect_balance(std::uint64_t first, std::uint64_t count) {
+/// How many have a gap in place of a seam: parts thinner than a voxel, which come apart where no lattice edge
+/// is cut. That is a known fault; the judge fails it, and the fracture must have said so.
+int expect_balance(std::uint64_t first, std::uint64_t count) {
+  int gaps = 0;
   for (std::uint64_t number = first; number < first + count; ++number) {
-    // Its pieces part across ambiguous faces only: there is a gap, as the fracture notes, and no cut that the judge could see.
-    if (number == 1023 || number == 1131) continue;
     const FractureTrial trial = fracture_trial(number);
-    const validation::FractureLedger ledger = ledger_of(trial.mesh, trial.longest, trial.cutters, number);
+    RunContext context;
+    validation::FractureLedger ledger = ledger_of(trial.mesh, trial.longest, trial.cutters, number, context);
+    if (!ledger.gaps_can_be_judged) {
+      ++gaps;
+      EXPECT_TRUE(std::ranges::any_of(context.notes, [](const std::string& note) {
+        return note.find("too thin for a seam") != std::string::npos;
+      })) << number;
+      ledger.gaps_can_be_judged = true;  // all the rest must hold
+    }
     EXPECT_TRUE(ledger.is_consistent()) << trial.kind << " " << number << ": " << text(ledger);
   }
+  return gaps;
 }
 
-TEST(FractureOfPolygons, BalancesOnRandomSolids) { expect_balance(0, 16); }
+TEST(FractureOfPolygons, BalancesOnRandomSolids) { EXPECT_EQ(expect_balance(0, 16), 0); }
 
-TEST(Slow, FracturesOfRandomSolidsBalance) { expect_balance(1000, 200); }
+TEST(FractureOfPolygons, AGapInPlaceOfASeamFailsTheJudgeAndIsNoted) { EXPECT_EQ(expect_balance(63, 1), 1); }
+
+TEST(Slow, FracturesOfRandomSolidsBalance) {
+  std::printf("gaps in place of seams: %d\n", expect_balance(1000, 200));
+}
 
 TEST(FractureOfABox, CutByTwoPlanesIsExact) {
   // A box with its faces between samples, and two planes: creases and corners are found exactly by the QEFs.
