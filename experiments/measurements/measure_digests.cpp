@@ -6,15 +6,16 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/hermite/solids.h"
+#include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/variants.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/digest.h"
 #include "experiments/fracture/fracture_cutters.h"
 #include "experiments/fracture/fracture_run.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/digest.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measurements/measurements.h"
 
 namespace hermesh {
 namespace {
@@ -70,17 +71,11 @@ std::vector<Way> ways(const Options& parameters) {
 /// A number that is not the option's fallback and leads to other code or another result.
 std::string other_number(const OptionSpec& spec) {
   const double usual = std::stod(spec.fallback);
-  const double candidates[] = {3.0 * usual, 0.5, 0.5 * usual, spec.minimum};
+  const double candidates[] = {3.0 * usual, spec.maximum > 1e6 ? 7.0 : 0.5, 0.5 * usual, spec.minimum};
   for (const double candidate : candidates)
     if (candidate != usual && candidate >= spec.minimum && candidate <= spec.maximum)
       return readable(candidate);
   return spec.fallback;
-}
-
-/// The setting of another option that a spec's condition "name=value|value" asks for.
-std::pair<std::string, std::string> setting_of(const std::string& condition) {
-  auto [option, values] = parse_option(condition);
-  return {option, values.substr(0, values.find('|'))};
 }
 
 /// The defaults, and each option by itself at its other choices, or at another number; with what it needs
@@ -93,23 +88,15 @@ std::vector<Given> variations(const Variant& variant) {
     if (values.empty()) values.push_back(other_number(spec));
     for (const std::string& value : values) {
       if (value == spec.fallback) continue;
-      Given given;
-      if (!spec.only_with.empty()) given.insert(setting_of(spec.only_with.front()));
-      given[spec.name] = value;
+      Given given = {{spec.name, value}};
+      for (const std::string& condition : spec.only_with) {
+        const auto [option, choices] = parse_option(condition);
+        given[option] = choices.substr(0, choices.find('|'));
+      }
       result.push_back(given);
     }
   }
   return result;
-}
-
-/// Whether a set of options is one that the variant takes; what one option does to another it says itself.
-template <class Variant>
-std::optional<Options> checked(const Variant& variant, const Given& given) {
-  try {
-    return Options(variant.name, variant.options, given);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
 }
 
 std::string text(const Given& given) {
@@ -130,13 +117,16 @@ class Digests {
     std::istringstream resolutions(input_.parameters.text("resolutions"));
     for (double resolution; resolutions >> resolution;)
       for (const std::string& name : names) {
-        if (names.size() > 1 && input_.filter.find(',') != std::string::npos &&
-            ("digests/digests/" + name + ",").find(input_.filter.substr(0, input_.filter.find(',') + 1)) ==
-                std::string::npos)
-          continue;
         input_.context.progress(name + " at " + readable(resolution), 0.0);
         name_ = name, resolution_ = resolution;
-        if (const auto failure = attempt([&] { digest_case(); })) emit("all", "failed: " + *failure, {});
+        mesh_.reset();
+        level_set_.reset();
+        level_sets();
+        volumes();
+        meshes();
+        hermite();
+        solids();
+        pieces();
       }
     return {};
   }
@@ -145,68 +135,59 @@ class Digests {
   static std::vector<std::string> files() {
     std::vector<std::string> names;
     for (const CaseInfo& info : list_cases())
-      if (info.kind == "file" && info.name != "thai-statue") names.push_back(info.name);
+      if (info.kind == "file" && info.name != "thai-statue")  // a stand-in of nine million triangles
+        names.push_back(info.name);
     return names;
   }
 
-  void digest_case() {
-    RunContext child = child_context(input_.context, false);
-    mesh_ = input_.tables.load(name_, child).mesh;
-    voxel_size_ = bounds(mesh_).size().maxCoeff() / resolution_;
-    if (!(voxel_size_ > 0.0)) return emit("all", "without extent", {});
-    level_sets();
-    level_set_ = voxelized(mesh_, "hermesh", {}, 3.0, child);
-    volumes();
-    if (level_set_.active_voxels() == 0) return;
-    meshes();
-    hermite();
-    solids();
-    pieces();
+  /// Ours, and OpenVDB's where references are wanted.
+  template <class Variant>
+  std::vector<Variant> wanted(std::span<const Variant> ours, const std::vector<Variant>& all) const {
+    std::vector<Variant> result(ours.begin(), ours.end());
+    if (references()) result.push_back(find_variant(all, "openvdb"));
+    return result;
   }
-
-  LevelSet voxelized(const PolygonMesh& mesh, const std::string& name, const Options& options, double band,
-                     RunContext& context) const {
-    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, name);
-    return voxelizer.voxelize(
-        {.mesh = mesh,
-         .voxel_size = voxel_size_,
-         .exterior_band = band,
-         .interior_band = band,
-         .context = context,
-         .options = options.canonical().empty() ? Options(voxelizer.name, voxelizer.options, {}) : options});
-  }
-
   bool references() const { return input_.parameters.is("references", "yes"); }
-  template <class Table>
-  bool is_wanted(const Table& variant) const {
-    if (variant.summary.find("[reference]") == std::string::npos && !is_reference(variant.name)) return true;
-    return references() && variant.name == "openvdb";
+
+  // Made when a row asks for them, so that a filter saves all the rest.
+  const PolygonMesh& mesh() {
+    RunContext child = child_context(input_.context, false);
+    if (!mesh_) mesh_ = input_.tables.load(name_, child).mesh;
+    return *mesh_;
   }
-  static bool is_reference(const std::string& name) {
-    for (const char* each : {"openvdb", "cgal-surface-mesher", "marching-cubes-decimated", "exact"})
-      if (name == each) return true;
-    return false;
+  double voxel_size() { return bounds(mesh()).size().maxCoeff() / resolution_; }
+  const LevelSet& level_set() {
+    RunContext child = child_context(input_.context, false);
+    if (!level_set_) level_set_ = voxelized(mesh(), "hermesh", {}, 3.0, child);
+    return *level_set_;
+  }
+
+  LevelSet voxelized(const PolygonMesh& mesh, const std::string& name, const Given& options, double band,
+                     RunContext& context) {
+    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, name);
+    return voxelizer.voxelize({.mesh = mesh,
+                               .voxel_size = voxel_size(),
+                               .exterior_band = band,
+                               .interior_band = band,
+                               .context = context,
+                               .options = Options(name, voxelizer.options, options)});
   }
 
   void level_sets() {
-    for (const Voxelizer& voxelizer : input_.tables.voxelizers) {
-      if (!is_wanted(voxelizer)) continue;
-      std::vector<Given> all = variations(voxelizer);
-      if (voxelizer.name == "thesis") all.push_back({{"shuffle_seed", "7"}});
-      for (const Given& given : all)
-        if (const auto options = checked(voxelizer, given))
-          row("level set: " + voxelizer.name + text(given), [&, options](RunContext& child) {
-            return digest(voxelized(mesh_, voxelizer.name, *options, 3.0, child));
-          });
+    for (const Voxelizer& voxelizer : wanted(our_voxelizers(), input_.tables.voxelizers)) {
+      for (const Given& given : variations(voxelizer))
+        row("level set: " + voxelizer.name + text(given),
+            [&](RunContext& child) { return digest(voxelized(mesh(), voxelizer.name, given, 3.0, child)); });
       row("level set: " + voxelizer.name + ", bands of 6",
-          [&](RunContext& child) { return digest(voxelized(mesh_, voxelizer.name, {}, 6.0, child)); });
+          [&](RunContext& child) { return digest(voxelized(mesh(), voxelizer.name, {}, 6.0, child)); });
     }
   }
 
   void volumes() {
     row("volumes", [&](RunContext& child) {
-      VolumeRequest request = parse_volume_request("sdf,triangle-id,closest-point,fog,hermite,attributes");
-      const VolumeOutputs made = make_volume_outputs(mesh_, {.voxel_size = voxel_size_}, request, child);
+      const VolumeRequest request =
+          parse_volume_request("sdf,triangle-id,closest-point,fog,hermite,attributes");
+      const VolumeOutputs made = make_volume_outputs(mesh(), {.voxel_size = voxel_size()}, request, child);
       std::string all;
       for (const openvdb::GridBase::Ptr& grid : made.grids) all += digest(*grid) + " ";
       return digest_of_text(all + digest(*made.hermite));
@@ -214,53 +195,54 @@ class Digests {
   }
 
   void meshes() {
-    for (const Extractor& extractor : input_.tables.extractors) {
-      if (!is_wanted(extractor)) continue;
+    for (const Extractor& extractor : wanted(our_extractors(), input_.tables.extractors)) {
       std::vector<Given> all = variations(extractor);
       if (extractor.name == "manifold-dual-contouring") {
         all.push_back({{"tolerance", "0"}});
-        for (const char* more : {"flatness=0.05", "largest_cube=4", "placement=average", "tolerance=1"})
+        for (const char* more : {"flatness=0.05", "placement=average", "tolerance=1"})
           all.push_back({{"merging", "regions"}, parse_option(more)});
       }
       if (extractor.name == "adaptive-dual-contouring")
         all.push_back({{"representation", "thesis"}, {"threshold", "1"}});
       for (const Given& given : all)
-        if (const auto options = checked(extractor, given))
-          row("mesh: " + extractor.name + text(given), [&, options](RunContext& child) {
-            return digest(extractor.extract(
-                {.level_set = level_set_, .source = &mesh_, .options = *options, .context = child}));
-          });
+        row("mesh: " + extractor.name + text(given), [&](RunContext& child) {
+          return digest(extractor.extract({.level_set = level_set(),
+                                           .source = &mesh(),
+                                           .options = Options(extractor.name, extractor.options, given),
+                                           .context = child}));
+        });
     }
   }
 
   void hermite() {
     row("hermite: from polygons",
-        [&](RunContext& child) { return digest(sample_polygons(level_set_, 0.0, mesh_, child)); });
+        [&](RunContext& child) { return digest(sample_polygons(level_set(), 0.0, mesh(), child)); });
     row("hermite: from the level set",
-        [&](RunContext& child) { return digest(sample_level_set(level_set_, 0.25 * voxel_size_, child)); });
+        [&](RunContext& child) { return digest(sample_level_set(level_set(), 0.25 * voxel_size(), child)); });
   }
 
   /// The model and itself, moved by a third of its size.
   void solids() {
-    PolygonMesh other = mesh_;
-    const Eigen::Vector3f shift = (0.3 * bounds(mesh_).size()).cast<float>();
-    for (Eigen::Vector3f& point : other.points) point += shift;
     for (const auto& [name, boolean] : {std::pair("union", Boolean::unite),
                                         {"intersection", Boolean::intersect},
                                         {"difference", Boolean::subtract}})
       row("solid: " + std::string(name), [&, boolean](RunContext& child) {
-        const SharedLattice lattice = shared_lattice(mesh_, other, voxel_size_);
-        const auto make = [&](const PolygonMesh& mesh) { return voxelized(mesh, "hermesh", {}, 3.0, child); };
-        const CombinedSolid made = combine(boolean, sample_solid(mesh_, lattice, make, child),
-                                           sample_solid(other, lattice, make, child), child);
+        PolygonMesh other = mesh();
+        const Eigen::Vector3f shift = (0.3 * bounds(other).size()).cast<float>();
+        for (Eigen::Vector3f& point : other.points) point += shift;
+        const SharedLattice lattice = shared_lattice(mesh(), other, voxel_size());
+        const auto sampled = [&](const PolygonMesh& solid) {
+          const auto voxelize_it = [&](const PolygonMesh& framed) {
+            return voxelized(framed, "hermesh", {}, 3.0, child);
+          };
+          return sample_solid(solid, lattice, voxelize_it, child);
+        };
+        const CombinedSolid made = combine(boolean, sampled(mesh()), sampled(other), child);
         return digest_of_text(digest(made.level_set) + digest(made.hermite));
       });
   }
 
   void pieces() {
-    RunContext child = child_context(input_.context, false);
-    const FractureObject object{sample_polygons(level_set_, 0.0, mesh_, child), level_set_, &mesh_};
-    if (object.hermite.leaves.empty()) return;
     struct Break {
       const char *cutters, *method;
       double tolerance;
@@ -274,15 +256,17 @@ class Digests {
     for (const Break& each : all)
       row("pieces: " + std::string(each.method) + " " + each.cutters +
               " tolerance=" + readable(each.tolerance),
-          [&](RunContext& context) {
+          [&](RunContext& child) {
+            const FractureObject object{sample_polygons(level_set(), 0.0, mesh(), child), level_set(),
+                                        &mesh()};
             CutterChoices choices;
             choices.seed = input_.seed;
             const MadeCutters made =
-                make_cutters(parse_cutters(each.cutters), object.hermite, choices, context);
+                make_cutters(parse_cutters(each.cutters), object.hermite, choices, child);
             std::vector<PolygonMesh> meshes;
             run_fracture(
                 object, made, {.name = each.method, .tolerance = each.tolerance, .options = {}},
-                [&](PieceOutput&& piece) { meshes.push_back(std::move(piece.mesh)); }, context);
+                [&](PieceOutput&& piece) { meshes.push_back(std::move(piece.mesh)); }, child);
             return digest(meshes);
           });
   }
@@ -304,21 +288,16 @@ class Digests {
       else if (made != first)
         broken.push_back("with " + way.name + " the digest is " + made);
     }
-    emit(what, first, broken);
-  }
-
-  void emit(const std::string& what, const std::string& digest,
-            const std::vector<std::string>& broken) const {
-    const Json values = {{"resolution", int(resolution_)}, {"digest", digest}, {"ways", ways_.size()}};
-    input_.emit({{"digests", name_ + ", " + what, values, broken}});
+    const Json values = {{"resolution", int(resolution_)}, {"digest", first}, {"ways", ways_.size()}};
+    input_.emit({{"digests", label, values, broken}});
   }
 
   const MeasurementInput& input_;
   const std::vector<Way> ways_;
   std::string name_;
-  double resolution_ = 0.0, voxel_size_ = 0.0;
-  PolygonMesh mesh_;
-  LevelSet level_set_;
+  double resolution_ = 0.0;
+  std::optional<PolygonMesh> mesh_;
+  std::optional<LevelSet> level_set_;  ///< by the default voxelizer
 };
 
 }  // namespace
