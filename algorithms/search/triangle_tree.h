@@ -52,6 +52,34 @@ class TriangleTree {
   NearestTriangle nearest(const Eigen::Vector3d& p,
                           double upper_bound_squared = std::numeric_limits<double>::infinity()) const;
 
+  /// Calls f(triangle) for all whose leaf's box meets the box from `low` to `high` (index space), others of that leaf among
+  /// them.
+  template <class F>
+  void for_each_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, F&& f) const {
+    if (packs_.empty()) return;
+    struct Pack {
+      std::size_t number;
+      std::uint32_t level;
+    };
+    std::vector<Pack> packs{{packs_.size() - 1, static_cast<std::uint32_t>(first_.size() - 1)}};
+    while (!packs.empty()) {
+      const auto [number, level] = packs.back();
+      packs.pop_back();
+      const BoxPack& pack = packs_[number];
+      for (std::size_t k = 0; k < kFan; ++k) {
+        bool meets = pack.lower[0][k] <= pack.upper[0][k];  // else it is past the end
+        for (int a = 0; a < 3; ++a)
+          meets &= pack.lower[a][k] * scale_ <= high[a] && pack.upper[a][k] * scale_ >= low[a];
+        if (!meets) continue;
+        const BoxRef box{static_cast<std::uint32_t>(number * kFan + k), level};
+        if (level > 0)
+          packs.push_back({child_pack(box), level - 1});
+        else
+          for (const std::uint32_t t : leaf(box.box)) f(t);
+      }
+    }
+  }
+
   double scale() const { return scale_; }
   std::size_t triangle_count() const { return triangles_.size(); }
   std::size_t byte_size() const {

@@ -14,7 +14,8 @@
 #include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/inside/oriented_winding.h"
 #include "algorithms/voxelization/distance/segment.h"
-#include "algorithms/voxelization/inside/surface_probe.h"
+#include "algorithms/voxelization/inside/box_bits.h"
+#include "algorithms/voxelization/inside/sheet_prober.h"
 #include "algorithms/voxelization/inside/triangle_faces.h"
 #include "algorithms/search/triangle_tree.h"
 
@@ -25,186 +26,9 @@ using Eigen::Vector3d;
 
 /// How far off an edge's samples its triangles are looked for, in voxels: farther than the places of their sides are.
 constexpr double kNearby = 1e-5;
-/// How far off a sheet the ways to voxels start, in voxels: beyond rounding and beyond doubled faces, but in a narrow
-/// face nearer than its border.
-constexpr double kOff = 1e-3, kLeastOff = 1e-5;
-/// Of a face that is no larger, in voxels, one place tells as much as several.
-constexpr double kSmall = 0.5;
 /// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
 /// microseconds each.
 constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
-
-using Voxel = std::array<std::int32_t, 3>;
-
-/// Bits of a layer's voxels from a row and a place in it to others, all included.
-std::uint64_t layer_bits(int first_y, int last_y, int first_z, int last_z) {
-  const std::uint64_t row = (std::uint64_t(2) << last_z) - (std::uint64_t(1) << first_z);
-  std::uint64_t bits = 0;
-  for (int y = first_y; y <= last_y; ++y) bits |= row << (8 * y);
-  return bits;
-}
-
-/// Which voxels are suspicious.
-struct Suspects {
-  std::vector<VoxelBits> voxels;      ///< by block
-  std::vector<std::uint32_t> blocks;  ///< those with some
-};
-
-/// Whether pieces are near such voxels; each thread has its own, since it keeps the block that it looked up
-/// last.
-class Suspicion {
- public:
-  Suspicion(const Suspects& suspects, const Band& band, const BlockTable& blocks)
-      : suspects_(suspects), band_(band), finder_(blocks) {}
-
-  /// Whether a suspicious voxel is in or next to the box of these corners.
-  bool touches(std::span<const Vector3d> corners) {
-    Voxel from, to;
-    BlockAt low, high;
-    double blocks = 1;
-    Vector3d least = corners[0], most = corners[0];
-    for (const Vector3d& corner : corners) {
-      least = least.cwiseMin(corner);
-      most = most.cwiseMax(corner);
-    }
-    for (std::size_t a = 0; a < 3; ++a) {
-      from[a] = std::int32_t(std::floor(least[int(a)])), low[a] = from[a] >> 3;
-      to[a] = std::int32_t(std::floor(most[int(a)])), high[a] = to[a] >> 3;
-      blocks *= high[a] - low[a] + 1;
-    }
-    // A large triangle has more blocks in its box than there are with suspicious voxels.
-    if (blocks > static_cast<double>(suspects_.blocks.size()))
-      return std::ranges::any_of(suspects_.blocks,
-                                 [&](std::uint32_t b) { return has(b, band_.blocks[b], from, to); });
-    for (std::int32_t x = low[0]; x <= high[0]; ++x)
-      for (std::int32_t y = low[1]; y <= high[1]; ++y)
-        for (std::int32_t z = low[2]; z <= high[2]; ++z) {
-          const std::uint32_t block = finder_.find({x, y, z});
-          if (block != BlockTable::kNone && has(block, {x, y, z}, from, to)) return true;
-        }
-    return false;
-  }
-
- private:
-  /// Whether one of the block's is in the box.
-  bool has(std::uint32_t block, const BlockAt& at, const Voxel& from, const Voxel& to) const {
-    int first[3], last[3];  // in the block
-    for (std::size_t a = 0; a < 3; ++a) {
-      first[a] = std::max(from[a] - 8 * at[a], 0);
-      last[a] = std::min(to[a] - 8 * at[a], 7);
-      if (first[a] > last[a]) return false;
-    }
-    const std::uint64_t layer = layer_bits(first[1], last[1], first[2], last[2]);
-    for (int x = first[0]; x <= last[0]; ++x)
-      if (suspects_.voxels[block][std::size_t(x)] & layer) return true;
-    return false;
-  }
-
-  const Suspects& suspects_;
-  const Band& band_;
-  BlockFinder finder_;
-};
-
-/// A face of a triangle, and what is known about it.
-struct Sheet {
-  std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
-  std::uint32_t face = 0;
-  Side side = Side::unknown;
-  std::array<Side, 2> sides{Side::unknown, Side::unknown};  ///< of that alone: along the normal, against it
-
-  void conclude() {
-    if (sides[0] == Side::outer || sides[1] == Side::outer)
-      side = Side::outer;
-    else if (sides[0] == Side::inner && sides[1] == Side::inner)
-      side = Side::inner;
-  }
-};
-
-/// Places off the middle of a face on both of its sides.
-std::array<Vector3d, 2> places_beside(const TriangleFace& face, const Vector3d& place, const Vector3d& normal) {
-  const double off = std::clamp(0.05 * face.room_at(face.middle()), kLeastOff, kOff);
-  return {place + off * normal, place - off * normal};
-}
-
-/// What a thread asks about faces.
-class Prober {
- public:
-  Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const std::vector<VoxelBits>& inside, const Suspects& suspects)
-      : probe_(soup, bins, inside), suspicion_(suspects, band, bins.blocks()) {}
-
-  /// All places of a whole face have the same around them, so that one that sees something tells. It is outer where one
-  /// of its sides is; of a face that is not whole, all places have to agree that it is inner.
-  void look(const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
-    if (!suspicion_.touches(face.corners)) {
-      sheet.side = Side::outer;
-      return;
-    }
-    const Vector3d middle = face.middle();
-    bool agree = look_from(middle, face, normal, sheet);
-    const bool one_tells = face.whole ? face.size() <= kSmall : !agree;
-    if (!one_tells)
-      for (const Vector3d& corner : face.corners) {
-        if (sheet.side == Side::outer || (!face.whole && !agree)) break;
-        agree &= look_from(0.8 * corner + 0.2 * middle, face, normal, sheet);
-      }
-    if (!face.whole && !agree && sheet.side == Side::inner) sheet.side = Side::unknown;
-  }
-
-  /// Looks farther where nothing was seen, from the face's middle.
-  void follow_spaces(const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
-    const std::array<Vector3d, 2> places = places_beside(face, face.middle(), normal);
-    for (std::size_t i = 0; i < 2; ++i)
-      if (sheet.sides[i] == Side::unknown) sheet.sides[i] = probe_.followed_from(places[i], normal);
-    sheet.conclude();
-  }
-
- private:
-  /// Whether it is inner at that place for certain.
-  bool look_from(const Vector3d& place, const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
-    bool inner = true;
-    const std::array<Vector3d, 2> places = places_beside(face, place, normal);
-    for (std::size_t i = 0; i < 2; ++i) {
-      const Side seen = probe_.seen_from(places[i]);
-      if (seen != Side::unknown) sheet.sides[i] = seen;
-      inner &= seen == Side::inner;
-      if (seen == Side::outer) break;
-    }
-    sheet.conclude();
-    return inner;
-  }
-
-  SurfaceProbe probe_;
-  Suspicion suspicion_;
-};
-
-/// Calls f(triangle) for those of the tree whose box is within a margin of a triangle's.
-template <class F>
-void for_each_beside(const TriangleTree& tree, const Facet& facet, double margin, F&& f) {
-  if (tree.packs().empty()) return;
-  const Vector3d low = facet.low().array() - margin, high = facet.high().array() + margin;
-  std::vector<TriangleTree::BoxRef> packs;  // by the number of one of its boxes
-  const auto push = [&](std::size_t pack, std::uint32_t level) {
-    packs.push_back({std::uint32_t(pack), level});
-  };
-  push(tree.packs().size() - 1, std::uint32_t(tree.level_count() - 1));
-  while (!packs.empty()) {
-    const auto [number, level] = packs.back();
-    packs.pop_back();
-    const TriangleTree::BoxPack& pack = tree.packs()[number];
-    for (std::size_t k = 0; k < TriangleTree::kFan; ++k) {
-      bool meets = true;
-      for (int a = 0; a < 3; ++a)
-        meets &= pack.lower[a][k] * tree.scale() <= high[a] && pack.upper[a][k] * tree.scale() >= low[a];
-      if (!meets) continue;
-      const TriangleTree::BoxRef box{std::uint32_t(number * TriangleTree::kFan + k), level};
-      if (level > 0)
-        push(tree.child_pack(box), level - 1);
-      else
-        for (const std::uint32_t t : tree.leaf(box.box)) f(t);
-    }
-  }
-}
 
 class Finder {
  public:
@@ -299,25 +123,19 @@ class Finder {
   /// Marks the voxels at most two away on every axis.
   void suspect_around(const Voxel& voxel) {
     constexpr std::int32_t kAway = 2;
+    Voxel from, to;
     BlockAt low, high;
     for (std::size_t a = 0; a < 3; ++a) {
-      low[a] = (voxel[a] - kAway) >> 3;
-      high[a] = (voxel[a] + kAway) >> 3;
+      from[a] = voxel[a] - kAway, low[a] = from[a] >> 3;
+      to[a] = voxel[a] + kAway, high[a] = to[a] >> 3;
     }
-    const auto within = [&](std::size_t axis, std::int32_t block) {
-      return std::pair(std::max(voxel[axis] - kAway - 8 * block, 0),
-                       std::min(voxel[axis] + kAway - 8 * block, 7));
-    };
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
         for (std::int32_t z = low[2]; z <= high[2]; ++z) {
           const std::uint32_t block = bins_.blocks().find({x, y, z});
           if (block == BlockTable::kNone) continue;
-          const auto [x0, x1] = within(0, x);
-          const auto [y0, y1] = within(1, y);
-          const auto [z0, z1] = within(2, z);
-          const std::uint64_t layer = layer_bits(y0, y1, z0, z1);
-          for (int i = x0; i <= x1; ++i) suspects_.voxels[block][std::size_t(i)] |= layer;
+          const VoxelBits bits = box_bits({x, y, z}, from, to);
+          for (std::size_t i = 0; i < 8; ++i) suspects_.voxels[block][i] |= bits[i];
         }
   }
 
@@ -475,10 +293,11 @@ class Finder {
       if (!(own_area > 0)) return;
       constexpr double kMargin = 0.01;  // beyond what is near enough to part the space next to it
       TriangleCutter cutter(facet);
-      for_each_beside(tree, facet, kMargin, [&](std::uint32_t other) {
+      const Vector3d low = facet.low().array() - kMargin, high = facet.high().array() + kMargin;
+      tree.for_each_near(low, high, [&](std::uint32_t other) {
         if (other != i) cutter.add(Facet(soup_.corners(triangles_[other])));
       });
-      for_each_beside(cap_tree, facet, kMargin, [&](std::uint32_t cap) { cutter.add(Facet(caps_[cap])); });
+      cap_tree.for_each_near(low, high, [&](std::uint32_t cap) { cutter.add(Facet(caps_[cap])); });
       if (!cutter.has_cuts()) return;
       Suspicion& suspicion = suspicions.local();
       // One half to all alike, the other by area.

@@ -8,6 +8,7 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/sample_side.h"
+#include "algorithms/voxelization/inside/box_bits.h"
 #include "algorithms/voxelization/inside/cell_obstacles.h"
 #include "algorithms/voxelization/inside/wall_walk.h"
 
@@ -15,8 +16,6 @@ namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-using Voxel = std::array<std::int32_t, 3>;
-
 /// More voxels than this are no pocket.
 constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
@@ -38,18 +37,8 @@ struct Pocket {
 
 /// The voxels of a block that are at most `far` from a voxel on each axis, as bits.
 VoxelBits cube_bits(const BlockAt& block, const Voxel& middle, std::int32_t far) {
-  std::int32_t first[3], last[3];
-  for (std::size_t a = 0; a < 3; ++a) {
-    first[a] = std::max(middle[a] - far - 8 * block[a], 0);
-    last[a] = std::min(middle[a] + far - 8 * block[a], 7);
-    if (first[a] > last[a]) return {};
-  }
-  std::uint64_t layer = 0;
-  const std::uint64_t row = (std::uint64_t(2) << last[2]) - (std::uint64_t(1) << first[2]);
-  for (std::int32_t y = first[1]; y <= last[1]; ++y) layer |= row << (8 * y);
-  VoxelBits bits{};
-  for (std::int32_t x = first[0]; x <= last[0]; ++x) bits[std::size_t(x)] = layer;
-  return bits;
+  return box_bits(block, {middle[0] - far, middle[1] - far, middle[2] - far},
+                  {middle[0] + far, middle[1] + far, middle[2] + far});
 }
 
 class PocketOpener {

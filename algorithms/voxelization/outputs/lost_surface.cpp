@@ -211,32 +211,14 @@ class Search {
   /// How far it is from the place along a unit vector to the next triangle, in voxels, at most kReach.
   static double gap(const TriangleTree& tree, const Vector3d& place, const Vector3d& along) {
     const Vector3d from = place + kOff * along, to = place + kReach * along;
-    const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
+    constexpr double kMargin = 1e-6;  // beyond what the boxes of slabs in a plane of samples are rounded by
     double nearest = 1.0;
-    std::vector<TriangleTree::BoxRef> boxes;
-    const auto push = [&](std::size_t pack, std::uint32_t level) {
-      const TriangleTree::BoxPack& p = tree.packs()[pack];
-      for (std::size_t k = 0; k < TriangleTree::kFan; ++k) {
-        bool apart = p.lower[0][k] > p.upper[0][k];
-        for (int a = 0; a < 3; ++a)
-          apart = apart || p.lower[a][k] * tree.scale() > high[a] + 1e-6 ||
-                  p.upper[a][k] * tree.scale() < low[a] - 1e-6;
-        if (!apart) boxes.push_back({static_cast<std::uint32_t>(pack * TriangleTree::kFan + k), level});
-      }
-    };
-    push(tree.packs().size() - 1, static_cast<std::uint32_t>(tree.level_count() - 1));
-    while (!boxes.empty()) {
-      const TriangleTree::BoxRef ref = boxes.back();
-      boxes.pop_back();
-      if (ref.level > 0) {
-        push(tree.child_pack(ref), ref.level - 1);
-        continue;
-      }
-      for (const std::uint32_t t : tree.leaf(ref.box)) {
-        const double part = meeting(from, to, Facet(tree.corner(t, 0), tree.corner(t, 1), tree.corner(t, 2)));
-        if (part >= 0.0) nearest = std::min(nearest, part);
-      }
-    }
+    tree.for_each_near(from.cwiseMin(to).array() - kMargin, from.cwiseMax(to).array() + kMargin,
+                       [&](std::uint32_t t) {
+                         const double part =
+                             meeting(from, to, Facet(tree.corner(t, 0), tree.corner(t, 1), tree.corner(t, 2)));
+                         if (part >= 0.0) nearest = std::min(nearest, part);
+                       });
     return kOff + nearest * (kReach - kOff);
   }
 
