@@ -313,12 +313,12 @@ class Finder {
   }
 
   /// The whole triangle where nothing crosses it.
-  TriangleFace face(const Sheet& sheet) const {
+  TriangleFace face(const TriangleSheet& sheet) const {
     if (!faces_[sheet.triangle].empty()) return faces_[sheet.triangle][sheet.face];
     const Facet facet(soup_.corners(triangles_[sheet.triangle]));
     return {{facet.corner[0], facet.corner[1], facet.corner[2]}, true};
   }
-  Vector3d unit_normal(const Sheet& sheet) const {
+  Vector3d unit_normal(const TriangleSheet& sheet) const {
     return Facet(soup_.corners(triangles_[sheet.triangle])).normal().normalized();
   }
 
@@ -347,12 +347,12 @@ class Finder {
   void find_sides() {
     std::vector<std::uint32_t> all(sheets_.size());
     std::iota(all.begin(), all.end(), 0u);
-    for_each_sheet(all, 0.6, 0.8, [&](Sheet& sheet, Prober& prober) {
+    for_each_sheet(all, 0.6, 0.8, [&](TriangleSheet& sheet, Prober& prober) {
       prober.look(face(sheet), unit_normal(sheet), sheet);
     });
     std::size_t crowded = 0;
     double largest = 0;
-    for (const Sheet& sheet : sheets_) {
+    for (const TriangleSheet& sheet : sheets_) {
       if (faces_[sheet.triangle].empty() || faces_[sheet.triangle][sheet.face].whole) continue;
       if (sheet.side == Side::outer) continue;
       ++crowded;
@@ -381,7 +381,7 @@ class Finder {
     double inner_area = 0, doubtful_area = 0;
     std::uint32_t last_doubtful = BlockTable::kNone, last_inner = BlockTable::kNone;
     for (std::uint32_t i = 0; i < sheets_.size(); ++i) {
-      const Sheet& sheet = sheets_[i];
+      const TriangleSheet& sheet = sheets_[i];
       if (sheet.side == Side::outer) continue;
       const bool inner = sheet.side == Side::inner;
       (inner ? inner_area : doubtful_area) += face(sheet).area();
@@ -399,7 +399,7 @@ class Finder {
     const OrientedWinding winding(soup_);
     if (!winding.usable()) return;
     if (doubtful.size() <= kFew)
-      for_each_sheet(doubtful, 0.8, 0.9, [&](Sheet& sheet, Prober& prober) {
+      for_each_sheet(doubtful, 0.8, 0.9, [&](TriangleSheet& sheet, Prober& prober) {
         prober.follow_spaces(face(sheet), unit_normal(sheet), sheet);
       });
     wind(doubtful, winding.number());
@@ -417,7 +417,7 @@ class Finder {
     in_parts(first.size() - 1, 0.9, 1.0, [&](std::size_t k) {
       std::vector<Vector3d> places;
       for (std::size_t i = first[k]; i < first[k + 1]; ++i) {
-        const Sheet& sheet = sheets_[order[i].second];
+        const TriangleSheet& sheet = sheets_[order[i].second];
         const TriangleFace of = face(sheet);
         for (const Vector3d& place : places_beside(of, of.middle(), unit_normal(sheet))) places.push_back(place);
       }
@@ -470,7 +470,7 @@ class Finder {
   Suspects suspects_;
   std::vector<std::uint32_t> triangles_;         ///< those that touch suspicious voxels, by number
   std::vector<std::vector<TriangleFace>> faces_;  ///< of each; none where nothing crosses it
-  std::vector<Sheet> sheets_;                    ///< triangle by triangle
+  std::vector<TriangleSheet> sheets_;            ///< triangle by triangle
 };
 
 }  // namespace

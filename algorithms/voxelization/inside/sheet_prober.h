@@ -77,7 +77,7 @@ inline constexpr double kMostOff = 1e-3, kLeastOff = 1e-5;
 inline constexpr double kSmallFace = 0.5;
 
 /// A face of a triangle, and what is known about it.
-struct Sheet {
+struct TriangleSheet {
   std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
   std::uint32_t face = 0;
   Side side = Side::unknown;
@@ -107,7 +107,7 @@ class Prober {
 
   /// All places of a whole face have the same around them, so that one that sees something tells. It is outer
   /// where one of its sides is; of a face that is not whole, all places have to agree that it is inner.
-  void look(const TriangleFace& face, const Eigen::Vector3d& normal, Sheet& sheet) {
+  void look(const TriangleFace& face, const Eigen::Vector3d& normal, TriangleSheet& sheet) {
     if (!suspicion_.touches(face.corners)) {
       sheet.side = Side::outer;
       return;
@@ -124,7 +124,7 @@ class Prober {
   }
 
   /// Looks farther where nothing was seen, from the face's middle.
-  void follow_spaces(const TriangleFace& face, const Eigen::Vector3d& normal, Sheet& sheet) {
+  void follow_spaces(const TriangleFace& face, const Eigen::Vector3d& normal, TriangleSheet& sheet) {
     const std::array<Eigen::Vector3d, 2> places = places_beside(face, face.middle(), normal);
     for (std::size_t i = 0; i < 2; ++i)
       if (sheet.sides[i] == Side::unknown) sheet.sides[i] = probe_.followed_from(places[i], normal);
@@ -134,7 +134,7 @@ class Prober {
  private:
   /// Whether it is inner at that place for certain.
   bool look_from(const Eigen::Vector3d& place, const TriangleFace& face, const Eigen::Vector3d& normal,
-                 Sheet& sheet) {
+                 TriangleSheet& sheet) {
     bool inner = true;
     const std::array<Eigen::Vector3d, 2> places = places_beside(face, place, normal);
     for (std::size_t i = 0; i < 2; ++i) {
