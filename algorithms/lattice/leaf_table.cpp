@@ -14,7 +14,6 @@
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
 
 namespace hermesh {
@@ -33,9 +32,11 @@ constexpr std::array<float, 512> kNoSamples = make_no_samples();
 /// To wait for one leaf after the other, and for the samples that it points to, would take longer than all the rest.
 constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
 
-/// Of what extractors hold for two blocks whose 64 common edges the surface crosses: leaves, their copies, a crossing edge
-/// each, and a polygon.
-constexpr double kBytesOfTilePair = 15e3;
+/// How many pairs of blocks may change their sign where neither holds samples. A few bytes in a file, as a damaged one
+/// has them, can stand for a surface of any size; extractors hold some 15 kB for the 64 edges of a pair (leaves, their
+/// copies, a crossing and a polygon each), so that this is a gibibyte, on any machine. Level sets have none, and a
+/// cube that is one tile reaches it at a width of 864 voxels.
+constexpr double kMostTilePairs = 70e3;
 
 /// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which there is a tile
 /// whose value `wanted` takes: the first block within, the first beyond, and the width in samples. Squares are as large as
@@ -110,8 +111,12 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
   parallel_blocks(tiles.size(), context, [&](std::size_t i) {
     bordering(i, [&](const Coord&, const Coord&, int, int width) { pairs[i] += double(width / 8) * (width / 8); });
   });
-  check_fits_memory(kBytesOfTilePair * std::accumulate(pairs.begin(), pairs.end(), 0.0),
-                    "the volume has tiles of one sign beside tiles of the other, a surface that");
+  const double crossed = std::accumulate(pairs.begin(), pairs.end(), 0.0);
+  if (crossed > kMostTilePairs)
+    throw Error("the volume changes its sign between tiles, without samples of a narrow band, over " +
+                std::to_string(64 * static_cast<std::int64_t>(crossed)) + " faces of voxels, more than the " +
+                std::to_string(64 * static_cast<std::int64_t>(kMostTilePairs)) +
+                " that are looked at: give it a narrow band, or resample it at a larger voxel size");
   std::vector<std::vector<Coord>> found(tiles.size());
   parallel_blocks(tiles.size(), context, [&](std::size_t i) {
     bordering(i, [&](const Coord& own, const Coord& there, int axis, int width) {

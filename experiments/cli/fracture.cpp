@@ -43,7 +43,8 @@ FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh
                        "' has voxels already: leave out --resolution and --voxel-size");
     if (arguments.hermite == "exact") throw UsageError("--hermite exact needs polygons, not a volume");
     object.level_set = read_level_set(arguments.paths.in, "", session.context);
-    object.hermite = sample_level_set(object.level_set, 0.0, session.context);
+    object.hermite = about_file(arguments.paths.in,
+                                [&] { return sample_level_set(object.level_set, 0.0, session.context); });
     return object;
   }
   if (!sized) throw UsageError("say how large voxels are: --resolution N or --voxel-size S");
