@@ -2,7 +2,7 @@
 # Whether every name has one definition: what the linker takes for granted and no compiler sees.
 #   experiments/check_one_definition.sh names    classes of one name in two files: seconds, builds nothing
 #   experiments/check_one_definition.sh odr      the program with link-time optimisation and -Wodr: half an hour
-#   experiments/check_one_definition.sh plain    the program without optimisation, and what it then makes of regions
+#   experiments/check_one_definition.sh plain    the program without optimisation, and what certified-octree then makes
 #   experiments/check_one_definition.sh          all of them
 # Says what is wrong and exits with 1; builds in build/odr and build/plain.
 set -euo pipefail
@@ -51,7 +51,7 @@ check_plain() {
   local out
   out=$(mktemp -d)
   trap 'rm -r "$out"' EXIT
-  # An octahedron of radius 1, which merged regions must leave closed.
+  # An octahedron of radius 1, which must stay closed.
   cat > "$out/octahedron.off" << 'OFF'
 OFF
 6 8 0
@@ -71,9 +71,9 @@ OFF
 3 0 3 5
 OFF
   timeout 600 build/plain/hermesh remesh "$out/octahedron.off" "$out/octahedron.ply" --resolution 24 \
-    --extractor manifold-dual-contouring -o merging=regions -o tolerance=0.5
+    --extractor certified-octree -o tolerance=0.5
   timeout 600 build/plain/hermesh validate "$out/octahedron.ply" --reference "$out/octahedron.off" --require watertight
-  echo "plain: merging=regions runs without optimisation"
+  echo "plain: certified-octree runs without optimisation"
 }
 
 case "${1:-all}" in

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "algorithms/extraction/manifold_dual_contouring.h"
+#include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/piece_attributes.h"
 #include "algorithms/thesis/thesis_fracture.h"

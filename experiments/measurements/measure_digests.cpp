@@ -199,8 +199,10 @@ class Digests {
       std::vector<Given> all = variations(extractor);
       if (extractor.name == "manifold-dual-contouring") {
         all.push_back({{"tolerance", "0"}});
-        for (const char* more : {"flatness=0.05", "placement=average", "tolerance=1"})
-          all.push_back({{"merging", "regions"}, parse_option(more)});
+      }
+      if (extractor.name == "certified-octree") {
+        all.push_back({{"tolerance", "1"}});
+        all.push_back({{"flatness", "0.05"}});
       }
       if (extractor.name == "adaptive-dual-contouring")
         all.push_back({{"representation", "thesis"}, {"threshold", "1"}});

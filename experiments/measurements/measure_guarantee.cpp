@@ -33,7 +33,7 @@
 namespace hermesh {
 namespace {
 
-constexpr const char* kGuaranteed = "manifold-dual-contouring";
+constexpr const char *kGuaranteed = "manifold-dual-contouring", *kOctree = "certified-octree";
 
 /// What the bound may be exceeded by, in voxels: the slack of the extractor's own proof, and the gap of the
 /// judge's.
@@ -216,6 +216,9 @@ struct Overview {
   }
 };
 
+bool is_octree(const MeasurementInput& input) { return input.parameters.is("extractor", kOctree); }
+const char* judged_name(const MeasurementInput& input) { return is_octree(input) ? kOctree : kGuaranteed; }
+
 /// The meshes of one subject after another.
 class SubjectMeasurement {
  public:
@@ -276,8 +279,8 @@ class SubjectMeasurement {
 
  private:
   void measure_all(Subject subject) {
-    // Rows of the two ways to merge stand side by side.
-    if (input_.parameters.is("merging", "regions")) subject.label += ", regions";
+    // Rows of the two extractors stand side by side.
+    if (is_octree(input_)) subject.label += ", octree";
     if (input_.parameters.is("placement", "average")) subject.label += ", means";
     if (!input_.parameters.is("largest_cube", "8"))
       subject.label += ", cubes of " + input_.parameters.text("largest_cube");
@@ -290,12 +293,11 @@ class SubjectMeasurement {
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
-      Contender ours = {kGuaranteed,
+      Contender ours = {judged_name(input_),
                         {{"tolerance", readable_exactly(tolerance)},
-                         {"merging", input_.parameters.text("merging")},
                          {"placement", input_.parameters.text("placement")},
                          {"representation", input_.parameters.text("representation")}}};
-      if (input_.parameters.is("merging", "regions"))
+      if (is_octree(input_))
         ours.options["largest_cube"] = input_.parameters.text("largest_cube");
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
@@ -307,6 +309,7 @@ class SubjectMeasurement {
     source_.reset();
     reference_ = {};  // of hundreds of subjects it would be gigabytes
   }
+
 
   static std::string readable_exactly(double number) {
     std::ostringstream text;
@@ -511,7 +514,7 @@ class Guarantee {
 
   void emit(std::size_t i) { input_.emit(std::exchange(results_[i].rows, {})); }
 
-  static void summarise(const Sums& sums, bool judged, std::vector<MeasuredRow>& rows) {
+  void summarise(const Sums& sums, bool judged, std::vector<MeasuredRow>& rows) {
     std::int64_t violations = 0, meshes = 0;
     for (const auto& [key, sum] : sums) {
       const auto& [kind, extractor, tolerance] = key;
@@ -526,7 +529,7 @@ class Guarantee {
       if (tolerance >= 0) violations += sum.violations;
       rows.push_back(std::move(row));
     }
-    rows.push_back({"summary", std::string("all of ") + kGuaranteed, {{"meshes", meshes}}});
+    rows.push_back({"summary", std::string("all of ") + judged_name(input_), {{"meshes", meshes}}});
     set_violations(rows.back().values, violations, judged);
   }
 
@@ -544,7 +547,7 @@ Measurement guarantee_measurement() {
   cases.insert(cases.begin(), {"few", "all"});
   return {
       .name = "guarantee",
-      .summary = "what manifold dual contouring promises, on models and on noise",
+      .summary = "what the certified extractors promise, on models and on noise",
       .parameters =
           {{"cases", "few", "three small ones, all models, or one case", cases},
            {"resolutions",
@@ -556,7 +559,7 @@ Measurement guarantee_measurement() {
             "0.1 1",
             "of the adaptive meshes, in voxels",
             {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8", "2.5 4 8 14"}},
-           {"merging", "collapses", "option of the extractor", {"collapses", "regions"}},
+           {"extractor", kGuaranteed, "whose promises are judged", {kGuaranteed, kOctree}},
            {"placement", "optimal", "option of the extractor", {"optimal", "average"}},
            {"largest_cube", "8", "option of the extractor", {"8", "4", "2"}},
            {"representation", "sparse-float", "option of the extractor", {"sparse-float", "sparse"}},

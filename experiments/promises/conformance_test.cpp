@@ -30,14 +30,7 @@ namespace {
 
 std::vector<Extractor> table() {
   const auto ours = our_extractors();
-  std::vector<Extractor> all(ours.begin(), ours.end());
-  // A choice that leads to other code altogether is tested like a variant of its own.
-  Extractor by_regions = find_variant(std::span<const Extractor>(ours), "manifold-dual-contouring");
-  by_regions.name += "-by-regions";
-  for (OptionSpec& option : by_regions.options)
-    if (option.name == "merging") option.fallback = "regions";
-  all.push_back(by_regions);
-  return all;
+  return {ours.begin(), ours.end()};
 }
 
 PolygonMesh extract(const Extractor& extractor, const LevelSet& volume, double isovalue = 0.0,

@@ -1,4 +1,4 @@
-// The quick way to a coarser mesh: cubes of cells become one point each (`merging=regions`).
+// The quick way to a coarser mesh: cubes of cells become one point each (`certified-octree`).
 #pragma once
 
 #include <Eigen/Core>

@@ -8,7 +8,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/lattice/simd/simd_level.h"
-#include "algorithms/extraction/manifold_dual_contouring.h"
+#include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
+#include "algorithms/extraction/certified_octree/certified_octree.h"
 #include "algorithms/extraction/certified_octree/region_proof.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 #include "algorithms/hermite/samplers.h"
@@ -28,12 +29,8 @@ FloatHermite sphere(double radius) {
 
 PolygonMesh contour(const FloatHermite& hermite, double tolerance, double flatness = 0) {
   RunContext context;
-  return manifold_dual_contouring(view_of(hermite, context),
-                                  {.tolerance = tolerance,
-                                   .merging = ManifoldDualContouringOptions::Merging::regions,
-                                   .flatness = flatness,
-                                   .uniform = {}},
-                                  nullptr, context);
+  return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .flatness = flatness, .uniform = {}},
+                          nullptr, context);
 }
 
 /// Distances of a mesh's corners and middles of edges and triangles from a sphere about the origin, at most.
@@ -75,10 +72,8 @@ TEST(RegionMesh, CubesAreAtMostAsLargeAsAsked) {
   RunContext context;
   std::vector<std::size_t> points;
   for (const int largest : {2, 4, 8}) {
-    ManifoldDualContouringOptions options{
-        .tolerance = 1.74 * largest, .largest_cube = largest, .uniform = {}};
-    options.merging = ManifoldDualContouringOptions::Merging::regions;
-    const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+    const CertifiedOctreeOptions options{.tolerance = 1.74 * largest, .largest_cube = largest, .uniform = {}};
+    const PolygonMesh mesh = certified_octree(view_of(hermite, context), options, nullptr, context);
     EXPECT_LT(farthest_from_sphere(mesh, 20.0), options.tolerance);
     points.push_back(mesh.points.size());
   }
@@ -164,10 +159,9 @@ TEST(RegionMesh, SameFromPackedDataAsFromWhatTheyUnpackTo) {
   const PackedHermite packed = pack(waves(), NormalCodeId::octahedral, context);
   const FloatHermite unpacked = unpack(packed, context);
   for (const double tolerance : {0.0, 0.3, 4.0, 16.0}) {
-    const ManifoldDualContouringOptions options{
-        .tolerance = tolerance, .merging = ManifoldDualContouringOptions::Merging::regions, .uniform = {}};
+    const CertifiedOctreeOptions options{.tolerance = tolerance, .uniform = {}};
     const PolygonMesh direct = with_normal_code(packed.normal_code, [&](auto code) {
-      return manifold_dual_contouring(view_of(packed, code, context), options, nullptr, context);
+      return certified_octree(view_of(packed, code, context), options, nullptr, context);
     });
     EXPECT_FALSE(direct.points.empty());
     EXPECT_TRUE(direct == contour(unpacked, tolerance)) << tolerance;

@@ -216,10 +216,15 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
   return Contourer(grid, options).run(context);
 }
 
-DualContouringOptions read_dual_contouring_options(const Options& given) {
+DualContouringOptions read_placement_options(const Options& given) {
   DualContouringOptions options;
   if (given.is("placement", "average")) options.placement = DualContouringOptions::Placement::average;
   options.truncation = given.number("truncation");
+  return options;
+}
+
+DualContouringOptions read_dual_contouring_options(const Options& given) {
+  DualContouringOptions options = read_placement_options(given);
   options.reach = given.number("reach");
   return options;
 }

@@ -32,8 +32,10 @@ class Qef;  // qef.h
 /// Optimal placement of the cell with its first corner there; in voxels.
 Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options);
 
-/// From options checked against dual_contouring_options().
+/// Reads options that were checked against dual_contouring_options().
 DualContouringOptions read_dual_contouring_options(const Options& options);
+/// Reads all of them but `reach`, for an extractor whose table has none.
+DualContouringOptions read_placement_options(const Options& options);
 
 /// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source
 /// polygons.

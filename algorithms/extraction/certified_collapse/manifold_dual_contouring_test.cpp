@@ -1,4 +1,4 @@
-#include "algorithms/extraction/manifold_dual_contouring.h"
+#include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -12,6 +12,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/adaptivity_field.h"
+#include "algorithms/extraction/certified_octree/certified_octree.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/search/triangle_tree.h"
 
@@ -246,6 +247,14 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
   }
 }
 
+/// By the octree or by collapses.
+PolygonMesh certified(bool octree, const FloatHermite& hermite, double tolerance, const AdaptivityField* field) {
+  RunContext context;
+  if (octree)
+    return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
+  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
+}
+
 /// A flat face becomes two triangles, and the middles of both may be far from a mask that shows some of it.
 TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
   initialize_openvdb();
@@ -264,18 +273,15 @@ TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
   field.outside = AdaptivityField::Outside::nothing;
   field.mask = make_level_set(
       openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(kMask, openvdb::Vec3f(20.4f, 10, 10), 0.5f));
-  using Merging = ManifoldDualContouringOptions::Merging;
-  for (const Merging merging : {Merging::collapses, Merging::regions})
+  for (const bool octree : {false, true})
     for (const double tolerance : {0.5, 4.0}) {
-      ManifoldDualContouringOptions options{.tolerance = tolerance, .uniform = {}};
-      options.merging = merging;
-      const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), options, &field, context);
+      const PolygonMesh mesh = certified(octree, hermite, tolerance, &field);
       double area = 0;
       for (const Triangle& t : triangulated(mesh))
         area += 0.5 * (mesh.world(t[1]) - mesh.world(t[0])).cross(mesh.world(t[2]) - mesh.world(t[0])).norm();
       // The disc, but for a cell along its rim.
-      EXPECT_GT(area, std::numbers::pi * (kMask - 1) * (kMask - 1)) << int(merging) << ' ' << tolerance;
-      EXPECT_LT(area, std::numbers::pi * (kMask + 1) * (kMask + 1)) << int(merging) << ' ' << tolerance;
+      EXPECT_GT(area, std::numbers::pi * (kMask - 1) * (kMask - 1)) << octree << ' ' << tolerance;
+      EXPECT_LT(area, std::numbers::pi * (kMask + 1) * (kMask + 1)) << octree << ' ' << tolerance;
       EXPECT_LT(mesh.triangle_count(), 220u);  // of some 400
     }
 }
@@ -298,17 +304,11 @@ TEST(ManifoldDualContouring, MaskOfTheSurfacesOwnCellsLeavesOutNothing) {
   AdaptivityField field;
   field.outside = AdaptivityField::Outside::nothing;
   field.mask = make_level_set(cells);
-  using Merging = ManifoldDualContouringOptions::Merging;
-  for (const Merging merging : {Merging::collapses, Merging::regions})
-    for (const double tolerance : {0.0, 0.5, 4.0}) {
-      RunContext context;
-      ManifoldDualContouringOptions options{.tolerance = tolerance, .uniform = {}};
-      options.merging = merging;
-      const auto triangles = [&](const AdaptivityField* with) {
-        return manifold_dual_contouring(view_of(hermite, context), options, with, context).triangle_count();
-      };
-      EXPECT_EQ(triangles(&field), triangles(nullptr)) << int(merging) << ' ' << tolerance;
-    }
+  for (const bool octree : {false, true})
+    for (const double tolerance : {0.0, 0.5, 4.0})
+      EXPECT_EQ(certified(octree, hermite, tolerance, &field).triangle_count(),
+                certified(octree, hermite, tolerance, nullptr).triangle_count())
+          << octree << ' ' << tolerance;
 }
 
 /// Of a sphere in voxels of 1 × 1 × 2: half a voxel is one unit of the world along z, and less elsewhere.

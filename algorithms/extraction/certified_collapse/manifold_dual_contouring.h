@@ -1,5 +1,6 @@
 // Adaptive contouring with guarantees: closed, oriented, manifold, free of self-intersection, and within a stated distance
-// of the uniform mesh, whatever the input.
+// of the uniform mesh, whatever the input. Of the two ways to it this is the one with the fewest polygons: any points of
+// the uniform mesh may be merged.
 #pragma once
 
 #include "algorithms/core/polygon_mesh.h"
@@ -13,19 +14,8 @@ struct ManifoldDualContouringOptions {
   /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer polygons.
   /// 0 gives the uniform mesh itself.
   double tolerance = 0.1;
-  enum class Merging {
-    collapses,  ///< any points of the uniform mesh: the fewest polygons (certified_decimation.h)
-    regions     ///< those of cubes of 2³, 4³ and 8³ cells: many times as fast (region_mesh.h). Points stay within their cells.
-  };
-  Merging merging = Merging::collapses;
-  double flatness = 0;  ///< of regions (RegionOptions), as is the next
-  int largest_cube = 8;
   DualContouringOptions uniform;  ///< placement of the uniform mesh's points
 };
-
-/// Tolerance outside of a mask that asks for simplification there, in voxels; topology and freedom from self-intersection
-/// hold there, too.
-inline constexpr double kSimplifiedTolerance = 8.0;
 
 /// Uniform mesh (uniform_mesh.h), then merges of its points, of which those stay that are proved to keep the
 /// topology, the freedom from self-intersection and the bound (certified_decimation.h). The same bytes for

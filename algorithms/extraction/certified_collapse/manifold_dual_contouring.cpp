@@ -1,0 +1,59 @@
+#include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/certified_collapse/certified_decimation.h"
+#include "algorithms/extraction/certified_mesh.h"
+
+namespace hermesh {
+namespace {
+
+CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
+                               RunContext& context) {
+  const FineMesh fine(std::move(uniform.points),
+                      all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})));
+  std::vector<float> asked(fine.points().size());
+  parallel_blocks(asked.size(), context,
+                  [&](std::size_t i) { asked[i] = field.tolerance(fine.points()[i], tolerance); });
+  CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context);
+  CertifiedPolygons result{std::move(coarse.points), std::move(coarse.triangles), {}, {}};
+  if (field.leaves_out_outside())
+    // What has moved was merged; what is in the mask has a tolerance.
+    show(result, [&](std::size_t t, int corner, std::uint32_t point) {
+      const std::uint32_t before = fine.triangles()[coarse.fine_triangle[t]][corner];
+      return asked[before] > 0 && result.points[point] != fine.points()[before];
+    });
+  return result;
+}
+
+}  // namespace
+
+PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
+                                     const AdaptivityField* field, RunContext& context) {
+  const FilePoints file(grid.placement());
+  const FieldAtPoints at_points(field, grid.placement());
+  UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
+  report(uniform.counts, context);
+  const bool merges = options.tolerance > 0 || at_points.simplifies();
+  return finished(uniform.points.empty() || !merges
+                      ? as_they_are(std::move(uniform))
+                      : by_collapses(std::move(uniform), at_points, options.tolerance, file, context),
+                  at_points, file, context);
+}
+
+PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
+  ManifoldDualContouringOptions options{.uniform = read_dual_contouring_options(input.options)};
+  return contour_certified(input, "manifold-dual-contouring",
+                           options.uniform.placement == DualContouringOptions::Placement::optimal,
+                           [&](const HermiteView& grid, double tolerance) {
+                             options.tolerance = tolerance;
+                             return manifold_dual_contouring(grid, options, input.field, input.context);
+                           });
+}
+
+std::vector<OptionSpec> manifold_dual_contouring_options() {
+  std::vector<OptionSpec> options = tolerance_options();
+  for (OptionSpec& option : dual_contouring_options()) options.push_back(std::move(option));
+  return options;
+}
+
+}  // namespace hermesh

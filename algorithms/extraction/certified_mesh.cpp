@@ -1,0 +1,154 @@
+#include "algorithms/extraction/certified_mesh.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/hermite_input.h"
+
+namespace hermesh {
+namespace {
+
+PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunContext& context) {
+  PolygonMesh result;
+  result.origin = file.placement().origin;
+  result.points.resize(polygons.points.size());
+  parallel_blocks(polygons.points.size(), context,
+                  [&](std::size_t i) { result.points[i] = file.in_file(polygons.points[i]); });
+  result.quads = std::move(polygons.quads);
+  result.triangles = std::move(polygons.triangles);
+  // A mirror turns the order of corners round.
+  if (file.placement().mirrors()) {
+    for (Quad& quad : result.quads) std::swap(quad[1], quad[3]);
+    for (Triangle& triangle : result.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  return result;
+}
+
+/// Only the triangles that the field does not leave out, and their points. A triangle of the uniform mesh is outside if its
+/// middle is; one that was merged may have its middle anywhere.
+CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<std::uint32_t> number(all.points.size(), kNone);
+  CertifiedPolygons result;
+  std::size_t triangle = 0;
+  for (Triangle t : all_triangles(std::move(all.triangles), all.quads)) {
+    const bool shown = !all.shown.empty() && all.shown[triangle];
+    ++triangle;
+    if (!shown && field.leaves_out((all.points[t[0]] + all.points[t[1]] + all.points[t[2]]) / 3.0)) continue;
+    for (std::uint32_t& p : t) {
+      if (number[p] == kNone) {
+        number[p] = static_cast<std::uint32_t>(result.points.size());
+        result.points.push_back(all.points[p]);
+      }
+      p = number[p];
+    }
+    result.triangles.push_back(t);
+  }
+  return result;
+}
+
+/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes.
+double longest_step(const IndexToWorld& placement) { return placement.linear.operatorNorm(); }
+
+}  // namespace
+
+struct FieldAtPoints::Cell {
+  std::array<std::int32_t, 3> lower;
+  BlockMask mask{};
+  std::size_t sample;
+};
+
+FieldAtPoints::Cell FieldAtPoints::cell_at(const Eigen::Vector3d& p) const {
+  Cell cell;
+  int at[3];
+  for (int a = 0; a < 3; ++a) {
+    const int index = static_cast<int>(std::floor(p[a])) + base_[a];
+    cell.lower[a] = index & ~7;
+    at[a] = index & 7;
+  }
+  cell.sample = static_cast<std::size_t>(sample_index(at[0], at[1], at[2]));
+  cell.mask[cell.sample >> 6] = std::uint64_t{1} << (cell.sample & 63);
+  return cell;
+}
+
+bool FieldAtPoints::in_mask(const Cell& cell) const { return any(evaluator_.inside(cell.lower, cell.mask)); }
+
+bool FieldAtPoints::leaves_out(const Eigen::Vector3d& p) const {
+  return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
+}
+
+float FieldAtPoints::tolerance(const Eigen::Vector3d& p, double tolerance) const {
+  const Cell cell = cell_at(p);
+  if (evaluator_.simplifies_outside() && !in_mask(cell))
+    return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
+  // What is left out in the end must not have become part of what is not.
+  if (evaluator_.leaves_out_outside() && !in_mask(cell)) return 0;
+  if (!evaluator_.has_scale()) return static_cast<float>(tolerance);
+  std::array<float, 512> scales;
+  evaluator_.scales(cell.lower, cell.mask, scales);
+  return static_cast<float>(tolerance * scales[cell.sample]);
+}
+
+std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads) {
+  triangles.reserve(triangles.size() + 2 * quads.size());
+  for (const Quad& q : quads) {
+    triangles.push_back({q[0], q[1], q[2]});
+    triangles.push_back({q[0], q[2], q[3]});
+  }
+  return triangles;
+}
+
+void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown) {
+  for (const Triangle& t : all_triangles(polygons.triangles, polygons.quads)) {
+    const std::size_t number = polygons.shown.size();
+    polygons.shown.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) || is_shown(number, 2, t[2]));
+  }
+}
+
+void report(const UniformCounts& counts, RunContext& context) {
+  context.figure("cells", double(counts.cells));
+  context.figure("several_sheets", double(counts.several_sheets));
+  context.figure("held_cells", double(counts.held));
+  context.figure("fanned_edges", double(counts.fanned_edges));
+  context.figure("escaped", double(counts.escaped));
+}
+
+CertifiedPolygons as_they_are(UniformMesh uniform) {
+  return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads), {}};
+}
+
+PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, const FilePoints& file, RunContext& context) {
+  if (field.leaves_out_outside()) polygons = within(field, std::move(polygons));
+  return in_world(std::move(polygons), file, context);
+}
+
+std::vector<OptionSpec> tolerance_options() {
+  return {{.name = "tolerance",
+           .fallback = "0.1",
+           .help = "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
+                   "gives fewer polygons, 0 the uniform mesh itself",
+           .maximum = 1e6,
+           .only_with = {"tolerance_world=0"}},
+          {.name = "tolerance_world",
+           .fallback = "0",
+           .help = "the same in world units, instead of tolerance where it is greater than 0",
+           .maximum = 1e30}};
+}
+
+PolygonMesh contour_certified(const ExtractionInput& input, std::string_view name, bool needs_normals,
+                              const std::function<PolygonMesh(const HermiteView&, double)>& contour) {
+  const double asked = input.options.number("tolerance"), world = input.options.number("tolerance_world");
+  const auto contoured = [&](const HermiteView& grid) {
+    return contour(grid, world > 0 ? world / longest_step(grid.placement()) : asked);
+  };
+  const std::string variant(name);
+  if (const std::optional<PackedHermite> packed = packed_hermite_input(input, variant))
+    return with_normal_code(packed->normal_code,
+                            [&](auto code) { return contoured(view_of(*packed, code, input.context)); });
+  const FloatHermite hermite = hermite_input(input, variant, needs_normals);
+  return contoured(view_of(hermite, input.context));
+}
+
+}  // namespace hermesh
