@@ -400,6 +400,28 @@ TEST(Voxelize, AutomaticSignsCloseAHole) {
     }
 }
 
+/// Its samples have coordinates of both signs, which a cut towards 0 instead of down once mixed up.
+TEST(Voxelize, TheSurfaceAcrossAHoleDoesNotDependOnWhereTheHoleIs) {
+  // The border is a saddle's, so that the surface across is bent.
+  PolygonMesh here = sphere({0, 0, 0}, 9.0, 48);
+  std::erase_if(here.triangles, [&](const Triangle& t) {
+    const Vector3f& p = here.points[t[0]];
+    return p.z() > -2 + 0.05f * (p.x() * p.x() - p.y() * p.y());
+  });
+  PolygonMesh there = here;
+  for (Vector3f& p : there.points) p += Vector3f(64, 64, 64);
+  RunContext context;
+  const Voxelization a = voxelize(here, {}, context), b = voxelize(there, {}, context);
+  int in_cap = 0;
+  for (int x = -6; x <= 6; ++x)
+    for (int y = -6; y <= 6; ++y)
+      for (int z = -8; z <= 6; ++z) {
+        EXPECT_NEAR(at(a, x, y, z), at(b, x + 64, y + 64, z + 64), 1e-3) << x << ' ' << y << ' ' << z;
+        in_cap += std::abs(at(a, x, y, z)) < 1;
+      }
+  EXPECT_GT(in_cap, 200);
+}
+
 TEST(Voxelize, AVoxelAtTheBottomOfACreviceIsOutside) {
   // Two boxes 0.4 voxels apart along the diagonal plane: no grid edge leads into the gap, which voxels lie
   // in.

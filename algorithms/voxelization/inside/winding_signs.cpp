@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -287,7 +288,8 @@ class WindingSigns {
             last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
         Eigen::Vector3d crossing = voxel_at(block, place);
         CapEdge edge{{}, axis};
-        for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(crossing[a]);
+        // Windings are taken a few millionths of a voxel beside the samples (SampleSide), on either side of whole numbers.
+        for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(std::lround(crossing[a]));
         crossing[axis] += std::clamp((0.5 - double(from)) / (double(to) - double(from)), 0.0, 1.0);
         edges.push_back(edge);
         for_each_cell(edge, [&](const std::array<std::int32_t, 3>& cell) {
