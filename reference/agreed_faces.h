@@ -6,9 +6,10 @@
 
 namespace hermesh {
 
-/// The mesh's triangles, those turned over that run along an edge of two faces in the same direction as their
-/// neighbour, so that a patch keeps the winding of the larger part of its area. Points and the order of the
-/// triangles stay. Points with the same coordinates are one.
+/// The mesh as triangles whose faces agree: where two triangles run along their common edge in the same
+/// direction, one of them is turned over, so that a patch keeps the winding of the larger part of its area.
+/// Points with the same coordinates count as one. The list of points and the order of the triangles stay as
+/// they are.
 PolygonMesh with_agreeing_faces(const PolygonMesh& mesh);
 
 }  // namespace hermesh

@@ -69,7 +69,7 @@ class Field {
         inside_is_above_(frame.inside_is_above),
         context_(context) {}
 
-  /// −1 inside, 1 elsewhere: there are two sides and no third one of points exactly on the surface.
+  /// The side of a point, −1 inside and 1 elsewhere: there is no third side of points exactly on the surface.
   double side(const Point& p) {
     if (++calls_ % 1024 == 0) context_.check();
     float value = 0.0f;
@@ -159,7 +159,8 @@ void refine(Mesher& mesher, const Triangulation& triangulation, const Extraction
   }
 }
 
-/// True if the cell on this side of the facet is inside. An infinite cell is what the other one is not.
+/// Whether the cell on this side of the facet is inside. An infinite cell has no side of its own and counts
+/// as the opposite of the cell beyond the facet.
 bool cell_inside(const Triangulation& triangulation, const Triangulation::Facet& facet, Field& field) {
   if (!triangulation.is_infinite(facet.first)) return field.side(triangulation.dual(facet.first)) < 0.0;
   return !(field.side(triangulation.dual(triangulation.mirror_facet(facet).first)) < 0.0);

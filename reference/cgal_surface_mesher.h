@@ -13,8 +13,9 @@ namespace hermesh {
 ///
 /// The facets separate the inner from the outer cells of a Delaunay triangulation whose vertices are the
 /// output's own single-precision points. So whenever the refinement ends, the mesh is closed, manifold
-/// (refinement goes on until it is), oriented and free of intersections. It need not end on a surface that is
-/// not smooth: then there is an Error. A component whose seeds do not catch it is missed, as the method does.
+/// (refinement goes on until it is), oriented and free of intersections. The refinement need not end on a
+/// surface that is not smooth; an Error is thrown then. A component that no seed catches is missed: so it is
+/// with this method.
 /// @throws Cancelled; Error when the refinement does not end within max_points or CGAL gives up
 PolygonMesh cgal_surface_mesher(const ExtractionInput& input);
 

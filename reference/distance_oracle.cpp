@@ -38,11 +38,11 @@ Vector3d nearest_on_segment(const Vector3d& p, const Vector3d& a, const Vector3d
 
 struct Foot {
   Vector3d point;
-  double squared;  ///< distance
+  double squared;  ///< squared distance to the point that was asked about
 };
 
-/// The plane's distance where the foot of the perpendicular lies in the triangle, else that of the nearest
-/// edge.
+/// The point of a triangle nearest to p: the foot of the perpendicular if it lies in the triangle, else the
+/// nearest point of an edge.
 Foot foot_on_triangle(const Vector3d& p, const Corners& triangle) {
   const auto& [a, b, c] = triangle;
   const Vector3d normal = (b - a).cross(c - a);
@@ -61,12 +61,13 @@ Foot foot_on_triangle(const Vector3d& p, const Corners& triangle) {
   return best;
 }
 
-/// Visits every triangle whose box could hold something nearer than what was found so far.
+/// A traversal that finds the nearest triangle: it enters every box that could hold something nearer than
+/// what was found so far.
 struct Nearest {
   const DistanceOracle* oracle;
   const std::vector<Kernel::Triangle_3>* cgal;
   Vector3d point;
-  double squared;             ///< to begin with, an upper bound
+  double squared;             ///< least squared distance so far; at first an upper bound
   double good_enough = -1.0;  ///< the search may end at this squared distance
   Vector3d foot = point;
 
@@ -89,7 +90,7 @@ struct Nearest {
   }
 };
 
-/// Gathers all triangles within a radius; it never narrows the search.
+/// A traversal that gathers all triangles within a radius; it never narrows the search.
 struct Within : Nearest {
   std::vector<std::uint32_t> found;
   void intersection(const Point&, const Primitive& primitive) {

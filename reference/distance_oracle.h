@@ -23,7 +23,8 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 /// edges belong to their neighbours, too.
 std::vector<Corners> triangles_in_voxels(const PolygonMesh& mesh, double voxel_size);
 
-/// All positions and distances are in voxels.
+/// Answers questions about the distance to a set of triangles, without approximation but slowly. All
+/// positions and distances are in voxels.
 class DistanceOracle {
  public:
   /// @throws Error if there are no triangles.
@@ -34,13 +35,15 @@ class DistanceOracle {
 
   const std::vector<Corners>& triangles() const;
 
-  /// Distance to the nearest triangle, or the bound where that is smaller. A close bound makes it fast.
+  /// Distance to the nearest triangle, or the upper bound if that is smaller. A close bound makes the search
+  /// fast.
   double distance(const Eigen::Vector3d& point,
                   double upper_bound = std::numeric_limits<double>::infinity()) const;
+  /// Whether a triangle comes within a radius of a point.
   bool any_within(const Eigen::Vector3d& point, double radius) const;
-  /// The point of the surface that is nearest.
+  /// The point of the triangles that is nearest to the given one.
   Eigen::Vector3d nearest_point(const Eigen::Vector3d& point) const;
-  /// Numbers of all triangles within a radius.
+  /// Numbers of all triangles within a radius of a point.
   std::vector<std::uint32_t> triangles_within(const Eigen::Vector3d& point, double radius) const;
 
   /// How a set of rays from a point voted on whether it crosses the surface an odd number of times. A ray in
@@ -52,14 +55,17 @@ class DistanceOracle {
     bool inside() const { return 2 * odd > cast; }
     bool unanimous() const { return odd == 0 || odd == cast; }
   };
+  /// Casts rays from a point until they agree enough.
   Vote parity(const Eigen::Vector3d& point) const;
-  /// Crossings of the ray from a point along direction number 0 to 8 of those that vote, each counted +1
-  /// where the ray leaves the side to which the triangle's normal does not point, −1 where it enters it.
+  /// The signed number of triangles that the ray from a point along one of the nine directions (0 to 8)
+  /// crosses: +1 for each that it leaves by the front, the side that the triangle's normal points to, and −1
+  /// for each that it enters by the front.
   int signed_crossings(const Eigen::Vector3d& point, int direction) const;
+  /// Direction 0 to 8 of the rays.
   static Eigen::Vector3d direction(int number);
 
-  /// Origins of the 8³ blocks, at multiples of 8, whose centre is within the band (in voxels) and half a
-  /// block's diagonal of the surface: all blocks that the band meets, and a few more.
+  /// Origins, at multiples of 8, of the blocks of 8³ samples whose centre is no farther from the surface than
+  /// the band (voxels) plus half a block's diagonal: all blocks that the band meets, and a few more.
   std::vector<std::array<int, 3>> blocks_within(double band, const RunContext& context) const;
 
  private:
@@ -74,17 +80,18 @@ inline Eigen::Vector3d block_position(const std::array<int, 3>& origin, int i) {
   return {double(origin[0] + (i >> 6)), double(origin[1] + (i >> 3 & 7)), double(origin[2] + (i & 7))};
 }
 
-/// Distances of all samples, each exact or no less than `reach` (voxels).
+/// Distances of all samples of a block (voxels), each of them exact or no less than `reach`.
 std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
                                                  const std::array<int, 3>& origin, double reach);
 
-/// The place whose side sample i has: a few millionths of a voxel up from it on every axis, most on x and least on z, so
-/// that a sample on a polygon belongs to the solid on that side of it.
+/// The place that is asked for the side of sample i: a few millionths of a voxel above the sample on every
+/// axis, most on x and least on z, so that a sample on a polygon belongs to the solid on the upper side of
+/// it.
 Eigen::Vector3d block_side_place(const std::array<int, 3>& origin, int i);
 
-/// Samples that lie inside: is_inside is asked about block_side_place(). The sign can change only across the surface, so
-/// it is asked for one sample of every set that provably lies on one side: two neighbours whose distances add up to more
-/// than the voxel between them.
+/// The samples of a block that lie inside. `is_inside` is called with block_side_place() of one sample of
+/// every set that provably lies on one side: the sign can change only across the surface, so two neighbours
+/// are on one side if their distances add up to more than the voxel between them.
 std::bitset<kBlockVoxels> block_inside(const std::array<int, 3>& origin,
                                        const std::array<double, kBlockVoxels>& distances,
                                        const std::function<bool(const Eigen::Vector3d&)>& is_inside);

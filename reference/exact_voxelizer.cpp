@@ -24,9 +24,10 @@ struct Band {
   double widest() const { return std::max(exterior, interior); }
 };
 
-/// A voxel inside that lies on the surface is this deep, in voxels, so that its value has a sign.
+/// Depth, in voxels, that a voxel inside gets if it lies on the surface, so that its value has a sign.
 constexpr double kLeastDepth = 0x1p-24;
-/// Pieces by which the solid's boundary is told from the sheets within it, in voxels.
+/// Longest and shortest edges, in voxels, of the pieces by which the solid's boundary is told from the sheets
+/// within it.
 constexpr double kLargest = 0.7, kFinest = 0.02;
 
 /// The surface that distances are taken to, and who says what is inside.
@@ -35,7 +36,7 @@ struct Solid {
   std::function<bool(const Eigen::Vector3d&)> inside;
 };
 
-/// Null when no voxel of the leaf is in the band.
+/// The leaf at `origin`; null if no voxel of it is in the band.
 std::unique_ptr<Leaf> make_leaf(const Solid& solid, const BlockOrigin& origin, const Band& band,
                                 double voxel_size) {
   // A leaf was chosen because its centre is within the band and half a diagonal; its voxels are half a
@@ -96,7 +97,7 @@ std::vector<Corners> in_pieces(const std::vector<Corners>& triangles) {
   return pieces;
 }
 
-/// What of the surface bounds the solid. @throws Error where nothing does.
+/// The part of the surface that bounds the solid. @throws Error if no part does.
 std::vector<Corners> wound_boundary(const DistanceOracle& surface, const WindingOracle& winding,
                                     const RunContext& context) {
   std::vector<Corners> boundary =

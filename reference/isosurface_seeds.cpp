@@ -12,7 +12,7 @@ using openvdb::Coord;
 struct Crossing {
   Coord voxel;  ///< lower end of the edge
   int axis;
-  double offset;  ///< along the axis, 0 to 1
+  double offset;  ///< place on the edge, 0 to 1
   std::size_t component = 0;
 
   openvdb::Vec3d point() const {
@@ -85,7 +85,7 @@ Coord block_of(const Coord& voxel, int spacing) {
   return {floor_divide(voxel.x()), floor_divide(voxel.y()), floor_divide(voxel.z())};
 }
 
-/// Seeds of one component, whose crossings are sorted by block.
+/// The seeds of one component, whose crossings are sorted by block.
 void choose(const Crossing* first, const Crossing* last, int spacing, std::vector<openvdb::Vec3d>& seeds) {
   constexpr std::size_t kFewest = 12;  // as many as the corners of an icosahedron catch a small closed sheet
   const std::size_t before = seeds.size();

@@ -20,7 +20,8 @@ constexpr std::size_t kPlaces = 10;
 
 Coord to_coord(const VoxelIndex& v) { return {v[0], v[1], v[2]}; }
 Vector3d position(const VoxelIndex& v) { return {double(v[0]), double(v[1]), double(v[2])}; }
-/// A block's distances are exact up to here: farther than any of its voxels can be if it was chosen.
+/// The reach (voxels) up to which a block's distances are exact: no voxel of a chosen block can be farther
+/// away.
 double block_reach(double band) { return band + 2.0 * 3.5 * std::sqrt(3.0) + 1.0; }
 
 struct DrawnVoxel {
@@ -28,8 +29,8 @@ struct DrawnVoxel {
   double distance;
 };
 
-/// Voxels about points that are spread evenly over the area, until enough of them lie within the band. In the
-/// order of their indices; the same ones for the same seed.
+/// Draws voxels about points that are spread evenly over the area, until enough of them lie within the band.
+/// Equal seeds draw equal voxels; they are returned in the order of their indices.
 class Draw {
  public:
   Draw(const DistanceOracle& surface, const VoxelSelection& selection)
@@ -60,7 +61,8 @@ class Draw {
   }
 
  private:
-  /// The standard library's distributions differ from one library to the next; this does not.
+  /// A random number in [0, 1). It is the same with every standard library, which the library's own
+  /// distributions are not.
   double uniform() { return double(random_() >> 11) * 0x1p-53; }
 
   void add_new(std::vector<DrawnVoxel>& drawn) {
@@ -89,7 +91,7 @@ class Draw {
   std::unordered_set<std::uint64_t> seen_;
 };
 
-/// What a part of the voxels came to. Parts are added in their order, so that sums do not depend on the
+/// The figures of a part of the voxels. Parts are added in their order, so that sums do not depend on the
 /// threads.
 struct Tally {
   std::int64_t compared = 0, coarse = 0, stray = 0;
@@ -224,7 +226,8 @@ DistanceReport DistanceTruth::judge(const LevelSet& level_set, const Vector3d& o
   return report;
 }
 
-/// Leaves the findings in the order: on the boundary first, then the worst first.
+/// Tells the findings apart by where their nearest point lies, and sorts them: those on the boundary first,
+/// and among these the worst first.
 void DistanceTruth::classify(std::vector<VoxelFinding>& off, std::vector<VoxelFinding>& missing,
                              DistanceReport& report, const RunContext& context) const {
   constexpr std::size_t kMost = 20'000;

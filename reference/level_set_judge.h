@@ -16,11 +16,11 @@ namespace hermesh {
 
 using VoxelIndex = std::array<int, 3>;
 
-/// Which voxels are looked at.
+/// The voxels that a judge looks at.
 struct VoxelSelection {
   double band = 3.0;         ///< voxels from the surface, on both sides
-  std::int64_t samples = 0;  ///< 0: all; else this many within the band, drawn evenly over the surface
-  std::uint64_t seed = 1;    ///< of the draw
+  std::int64_t samples = 0;  ///< 0: all voxels; else so many within the band, drawn evenly over the surface
+  std::uint64_t seed = 1;    ///< seed of the draw
 };
 
 /// A voxel whose value is not the true one, or that should or should not be active.
@@ -35,30 +35,31 @@ struct VoxelFinding {
 struct DistanceReport {
   static constexpr double kFine = 1e-4, kCoarse = 0.05;  ///< voxels
   std::int64_t compared = 0;                             ///< active voxels
-  double max = 0.0, rms = 0.0;                           ///< errors of magnitude over them, in voxels
-  std::int64_t fine = 0, coarse = 0;                     ///< voxels that are off by more than that
-  /// Of those off by more than kFine: how many have their nearest point on the solid's boundary, and how many
-  /// on a sheet inside the solid, of which a level set of the solid is free to know nothing; with the largest
-  /// error of each. Of more than 20,000 an even part is asked, the worst among them; `classified` says how
-  /// many.
+  double max = 0.0, rms = 0.0;                           ///< errors of magnitude over `compared`, in voxels
+  std::int64_t fine = 0, coarse = 0;                     ///< voxels that are off by more than kFine, kCoarse
+  /// The voxels off by more than kFine, told apart: those whose nearest point lies on the solid's boundary,
+  /// and those whose nearest point lies on a sheet inside the solid, of which a level set of the solid is
+  /// free to know nothing; with the largest error of either kind. If there are more than 20,000, an even part
+  /// of them, with the worst, is told apart; `classified` says how many.
   std::int64_t classified = 0, on_boundary = 0, on_inner_sheet = 0;
   double on_boundary_max = 0.0, on_inner_sheet_max = 0.0;
-  /// Active although kFine or more beyond the band's width; inactive although kFine or more within it, those
-  /// whose nearest point lies on an inner sheet apart.
+  /// `stray` counts voxels that are active although kFine or more beyond the band's width; `missing` and
+  /// `missing_inner_sheet` those that are inactive although kFine or more within it, the latter where the
+  /// nearest point lies on a sheet inside the solid.
   std::int64_t stray = 0, missing = 0, missing_inner_sheet = 0;
-  std::vector<VoxelFinding> places;  ///< the first ten: worst errors, then the active set's
+  std::vector<VoxelFinding> places;  ///< the first ten: the worst errors, then wrong states
 };
 
 /// True distances around a surface.
 class DistanceTruth {
  public:
-  /// Keeps references to the oracles. `solid` decides what the boundary is. @throws Cancelled.
+  /// Keeps references to both oracles; `solid` decides what the solid's boundary is. @throws Cancelled.
   DistanceTruth(const DistanceOracle& surface, const WindingOracle& solid, const VoxelSelection& selection,
                 const RunContext& context);
 
-  /// Samples of the level set are expected at world = mesh's origin + voxel_size · index. The widths are
-  /// those of the side that the level set itself takes a voxel to be on; a wrong sign is no matter of
-  /// distance.
+  /// Compares magnitudes. Samples of the level set are expected at world = mesh's origin + voxel_size ·
+  /// index. A voxel is held against the width of the band on the side that the level set itself takes it to
+  /// be on; a wrong sign is no matter of distance.
   /// @throws Error if the samples are elsewhere; Cancelled.
   DistanceReport judge(const LevelSet& level_set, const Eigen::Vector3d& origin, double exterior_band,
                        double interior_band, const RunContext& context) const;
@@ -77,20 +78,20 @@ class DistanceTruth {
 
   const DistanceOracle& surface_;
   const WindingOracle& solid_;
-  std::vector<Block> blocks_;    ///< of all voxels, else empty
-  std::vector<Sample> samples_;  ///< else these
+  std::vector<Block> blocks_;    ///< distances of all voxels, if all are looked at
+  std::vector<Sample> samples_;  ///< else the voxels that were drawn
 };
 
-/// Who says on which side a voxel is.
+/// The oracle that says on which side a voxel is.
 enum class SignOracle {
   kParity,           ///< rays vote: right for closed surfaces with any winding
-  kUnanimousParity,  ///< the same, but voxels whose rays disagree are left out
+  kUnanimousParity,  ///< rays vote, and voxels whose rays disagree are left out
   kWinding,          ///< the winding number is above one half
 };
 
 struct SignReport {
-  std::int64_t inside = 0, outside = 0;  ///< voxels that truly are, all farther than kNear from the surface
-  std::int64_t wrong_inside = 0, wrong_outside = 0;  ///< of each, those with the other sign
+  std::int64_t inside = 0, outside = 0;  ///< voxels truly on that side and farther than kNear from the surface
+  std::int64_t wrong_inside = 0, wrong_outside = 0;  ///< those of them that have the other sign
   std::int64_t undecided = 0;                        ///< voxels whose rays disagree
   std::vector<VoxelFinding> places;  ///< the first ten wrong ones; the truth is negative inside
   std::int64_t wrong() const { return wrong_inside + wrong_outside; }

@@ -145,7 +145,7 @@ class Judge : public testing::Test {
                    std::int64_t samples = 0) const {
     return SignTruth(surface_, solid_, oracle, {3.0, samples, 1}, context_).judge(level_set);
   }
-  /// An active voxel whose value (voxels) is near the one given.
+  /// An active voxel whose value (in voxels) is near the given one.
   Coord voxel_with(double value) const {
     const openvdb::FloatGrid::ConstPtr grid = exact().grid().grid;
     for (auto v = grid->cbeginValueOn(); v; ++v)

@@ -22,7 +22,8 @@ struct Traits : OpenMesh::DefaultTraitsDouble {
 using TriMesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 using Decimater = OpenMesh::Decimater::DecimaterT<TriMesh>;
 
-/// Reports progress and ends the work early; throwing through OpenMesh is not its way.
+/// Reports progress and, once cancelled, asks OpenMesh to stop: OpenMesh is not made for exceptions thrown
+/// through it.
 class Watcher : public OpenMesh::Decimater::Observer {
  public:
   Watcher(const RunContext& context, double steps) : Observer(4096), context_(context), steps_(steps) {}
@@ -34,7 +35,8 @@ class Watcher : public OpenMesh::Decimater::Observer {
   double steps_;
 };
 
-/// OpenMesh complains on the terminal about a triangle that it refuses; here that becomes an Error.
+/// Silences OpenMesh, which complains on the terminal about a triangle that it refuses; here the refusal
+/// becomes an Error.
 class QuietOpenMesh {
  public:
   QuietOpenMesh() { omerr().disable(); }

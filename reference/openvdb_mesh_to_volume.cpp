@@ -28,7 +28,7 @@ class Polygons {
   double voxel_size_;
 };
 
-/// OpenVDB's interrupter, asked from any thread.
+/// What OpenVDB asks, from any thread, whether to stop.
 struct Interrupter {
   const RunContext& context;
   void start(const char* = nullptr) {}
@@ -36,8 +36,8 @@ struct Interrupter {
   bool wasInterrupted(int = -1) const { return context.cancelled(); }
 };
 
-/// An open mesh leaves a few negative voxels where it passes exactly through samples, so the question is not
-/// "any".
+/// Whether more than 1 % of the active voxels are negative. A few negative ones are no inside: an open mesh
+/// leaves some where it passes exactly through samples.
 bool has_inside(const openvdb::FloatGrid& grid) {
   std::size_t active = 0, negative = 0;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)

@@ -6,10 +6,10 @@
 
 namespace hermesh {
 
-/// Grid "sdf" of class level set, with default flags: OpenVDB renormalises the distances, so they are
-/// approximate everywhere. Signs do not depend on the winding; cavities are filled; an open mesh comes out
-/// without an inside, and a note says so. Values outside of the band are exterior_band and −interior_band
-/// voxels in world units.
+/// Voxelizes by meshToVolume with default flags: the grid "sdf" of class level set. OpenVDB renormalises the
+/// distances, so they are approximate everywhere. Signs do not depend on the winding; cavities are filled; an
+/// open mesh comes out without an inside, and a note says so. Values outside of the band are exterior_band
+/// and −interior_band voxels in world units.
 /// @throws Error for what check_voxelization_fits() refuses; Cancelled
 LevelSet openvdb_mesh_to_volume(const VoxelizationInput& input);
 

@@ -16,7 +16,7 @@ namespace {
 
 using test::Soup;
 
-/// Of this process, in all threads: what other processes do does not count.
+/// Processor time that f() takes in all threads of this process; what other processes do does not count.
 template <class F>
 double processor_seconds(F&& f) {
   const auto now = [] {
@@ -31,7 +31,7 @@ double processor_seconds(F&& f) {
 
 struct Times {
   double ours, openvdb;
-  /// What ours took more than a second, by what OpenVDB took.
+  /// The time of ours beyond its first second, divided by the time of OpenVDB.
   double ratio() const { return (ours - 1.0) / openvdb; }
 };
 
@@ -55,7 +55,7 @@ TEST(SoupSpeed, NoSmallSoupTakesTwentyTimesAsLongAsOpenVDB) {
   }
 }
 
-/// As a curve: number of triangles, seconds of each.
+/// Prints a curve, too: the number of triangles of each soup, and the seconds of either voxelizer.
 TEST(Slow, TwoHundredSoupsTakeNoMoreThanTwentyTimesWhatOpenVDBTakes) {
   initialize_openvdb();
   double worst = -1e9;

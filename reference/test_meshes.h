@@ -13,17 +13,20 @@ namespace hermesh::test {
 PolygonMesh sphere(double radius, int levels, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero());
 /// Cube of six quads with edge 2·half, turned by 20°, 30° and 40° about x, y and z.
 PolygonMesh turned_cube(double half);
+/// The rotation of turned_cube().
 Eigen::Matrix3d turn();
 /// Torus about the z axis of 2·rings·sides triangles.
 PolygonMesh torus(double major, double minor, int rings, int sides);
-/// Both in one mesh; the second one's points are moved into the first one's frame.
+/// Two meshes as one; the second one's points are given relative to the first one's origin.
 PolygonMesh joined(const PolygonMesh& first, const PolygonMesh& second);
+/// The mesh with all polygons turned over.
 PolygonMesh reversed(PolygonMesh mesh);
 
 double signed_volume(const PolygonMesh& mesh);
-/// Every directed edge exactly once, and its opposite exactly once: closed, edge-manifold and oriented.
+/// Whether every directed edge is there exactly once, and its opposite exactly once: then the mesh is closed,
+/// edge-manifold and oriented.
 bool closed_and_oriented(const PolygonMesh& mesh);
-/// Points that polygons use, less edges, plus triangles.
+/// The number of points that polygons use, less that of edges, plus that of triangles.
 long euler_characteristic(const PolygonMesh& mesh);
 
 PolygonMesh extract(const std::string& extractor, const LevelSet& level_set,

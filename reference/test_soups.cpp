@@ -50,7 +50,7 @@ class Maker {
   }
 
  private:
-  /// 0 to 1, without the library's distributions, which differ between platforms.
+  /// A random number in [0, 1), made without the library's distributions, which differ between platforms.
   double uniform() { return double(random_() >> 11) * 0x1p-53; }
   double between(double low, double high) { return low + (high - low) * uniform(); }
   Vector3d in_cube() {
@@ -109,7 +109,7 @@ class Maker {
       append(soup_.mesh, box, placed(at));
     }
   }
-  /// Of a tube wider than the ring that it follows.
+  /// Adds tori that cross themselves: the tube is wider than the ring that it follows.
   void make_tori(double count) {
     const int tori = 1 + int(random_() % 4), sides = std::max(4, int(std::sqrt(count / (4.0 * tori))));
     for (int i = 0; i < tori; ++i) {
@@ -129,7 +129,7 @@ class Maker {
       add_triangle(foot[2], foot[1], foot[0]);
     }
   }
-  /// Plates, half of them tilted a little so that they cross the next ones.
+  /// Adds plates, stacked closely, half of them tilted a little so that they cross the next ones.
   void make_sheets(double count, double resolution) {
     const double gap = 2.0 / resolution * between(0.05, 1.5);
     const int plates = std::max(2, std::min(int(count / 12), int(2.0 / gap)));

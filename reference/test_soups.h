@@ -9,14 +9,14 @@
 namespace hermesh::test {
 
 struct Soup {
-  std::string name;  ///< its kind, number of triangles and resolution
+  std::string name;  ///< kind of soup, number of triangles and resolution
   PolygonMesh mesh;
   double voxel_size = 1.0;  ///< world units
 };
 
-/// One of 100 to 10,000 triangles and 12 to 400 voxels along its longest side, the same for every seed on every
-/// platform: triangles at random, balls that overlap, turned boxes, tori that cross themselves, spikes out of a middle,
-/// or sheets stacked closer than a voxel.
+/// A soup of 100 to 10,000 triangles and 12 to 400 voxels along its longest side, which the seed alone
+/// decides, on every platform: triangles at random, balls that overlap, turned boxes, tori that cross
+/// themselves, spikes out of a middle, or sheets stacked closer than a voxel.
 Soup soup(std::uint64_t seed);
 
 }  // namespace hermesh::test

@@ -7,7 +7,9 @@
 
 namespace hermesh {
 
+/// The table of extractors of other people.
 std::span<const Extractor> reference_extractors();
+/// The table of voxelizers of other people, and of the slow certain ones.
 std::span<const Voxelizer> reference_voxelizers();
 
 }  // namespace hermesh

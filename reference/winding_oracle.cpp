@@ -19,7 +19,8 @@ double solid_angle(const Corners& triangle, const Vector3d& point) {
   return 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
 }
 
-/// 1 where the ray leaves by the triangle's front, −1 where it enters by it, 0 where it misses.
+/// The crossing of a ray and a triangle: 1 if the ray leaves by the triangle's front, −1 if it enters by the
+/// front, 0 if it misses.
 int crossing(const Corners& triangle, const Vector3d& point, const Vector3d& direction) {
   const Vector3d a = triangle[0] - point, b = triangle[1] - point, c = triangle[2] - point;
   const double u = direction.dot(a.cross(b)), v = direction.dot(b.cross(c)), w = direction.dot(c.cross(a));
@@ -35,11 +36,11 @@ bool before(const Vector3d& a, const Vector3d& b) {
 
 struct DirectedEdge {
   Vector3d low, high;
-  int direction;  ///< 1 from low to high
+  int direction;  ///< 1: from low to high; −1: the other way; sums of these in a boundary
 };
 
-/// The chain's boundary: edges with the number of their uses from low to high less that of those from high to
-/// low.
+/// The boundary of the chain of triangles: edges with the number of their uses from low to high less the
+/// number of uses from high to low, where that is not 0.
 std::vector<DirectedEdge> boundary_of(const std::vector<Corners>& triangles) {
   std::vector<DirectedEdge> edges;
   edges.reserve(3 * triangles.size());
@@ -66,8 +67,8 @@ std::vector<DirectedEdge> boundary_of(const std::vector<Corners>& triangles) {
   return boundary;
 }
 
-/// Whether the volume of the cone from a point to the triangles is negative from every point of the box: it
-/// is linear in the point, so that the corners tell.
+/// Whether the volume of the cone from an apex to the triangles is negative for every apex in the box. The
+/// volume is linear in the apex, so the box's corners tell.
 bool is_inside_out(const std::vector<Corners>& triangles, const Vector3d& lower, const Vector3d& upper) {
   bool negative = true;
   for (int i = 0; i < 8; ++i) {
@@ -102,7 +103,8 @@ WindingOracle::WindingOracle(const DistanceOracle& surface) : surface_(surface) 
   orientation_ = is_inside_out(surface.triangles(), lower, upper) ? -1.0 : 1.0;
 }
 
-/// Two rays that agree are enough; else the most frequent answer of nine.
+/// The winding number of the soup less its cone. Two rays that agree are enough; else the most frequent
+/// answer of nine counts.
 int WindingOracle::closed_winding(const Vector3d& point) const {
   std::map<int, int> votes;
   for (int number = 0; number < 9; ++number) {

@@ -27,20 +27,19 @@ struct SharpFeatures {
 /// candidate is excluded
 ///  - if it has a neighbour on both sides, and neither is more than three times as far away as the other; or
 ///  - if it ends such a row: one neighbour is excluded by the first rule and turns by at least nine tenths of
-///  what the
-///    candidate turns by.
+///    what the candidate turns by.
 /// A cube's edges turn by too much, the two edges of a lone chamfer have a neighbour on one side only; both
 /// are kept. A walk ends without a neighbour at the border of the surface, and when it is as long as the
 /// surface's diagonal or has crossed as many triangles as there are.
 ///
-/// Corners: points at which three or more kept edges meet, or two whose directions differ by more than
-/// `dihedral_degrees` from going straight on and no excluded edge: where one ends, the turn belongs to the
-/// blend.
+/// A corner is a point at which three or more kept edges meet; or one at which two kept edges meet whose
+/// directions differ by more than `dihedral_degrees` from going straight on, and no excluded edge, for where
+/// an excluded edge ends the turn belongs to the blend.
 SharpFeatures find_sharp_features(const TriangleSoup& reference, double dihedral_degrees);
 
-/// Distances from the features to the mesh. Each edge is sampled at the middles of equal pieces, at least
-/// four and none longer than 1/4000 of the reference's diagonal; mean and rms are over the length of the
-/// edges. The maximum takes in the ends of the edges.
+/// Distances from the sharp features of the reference to the mesh, in world units. Each edge is sampled at
+/// the middles of equal pieces, at least four and none longer than 1/4000 of the reference's diagonal; mean
+/// and rms are over the length of the edges. The maximum takes in the ends of the edges.
 FeatureDistances feature_distances(const TriangleSoup& reference, const TriangleTree& mesh,
                                    double dihedral_degrees, RunContext& context);
 

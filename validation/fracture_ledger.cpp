@@ -18,12 +18,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The uncut mesh differs from the pieces by what their cells along the cuts move, which stays below.
+/// The share of the expected volume by which the pieces' sum may be off before a piece counts as lost. The
+/// uncut mesh and the pieces differ by what the cells along the cuts move their points, which stays below
+/// this share.
 constexpr double kLostPiece = 0.02;
-/// Of a piece's volume, besides what single precision of its coordinates makes of it.
+/// The share of a piece's volume by which its record may differ from it, besides what the single precision of
+/// its coordinates makes of it.
 constexpr double kRecordError = 1e-6;
 
-/// Polygon attribute `surface`, or null.
+/// The mesh's polygon attribute `surface`, or null.
 const std::vector<std::int32_t>* surface_of(const MeshFile& mesh) {
   for (const MeshAttribute& a : mesh.attributes)
     if (a.name == "surface" && a.domain == AttributeDomain::polygon && a.components == 1)
@@ -39,12 +42,13 @@ double volume_of(const std::vector<Vector3d>& points, const std::vector<Triangle
   return six / 6.0;
 }
 
+/// A triangle of a piece, to be sorted so that triangles over the same points come together.
 struct Entry {
-  Triangle sorted;  ///< points of the whole, ascending
+  Triangle sorted;  ///< its points among those of all pieces, ascending
   std::uint32_t piece;
-  std::uint32_t triangle;  ///< in the whole
+  std::uint32_t triangle;  ///< its number among those of all pieces
   bool odd;                ///< whether sorting turned it round
-  std::int8_t surface;     ///< −1: not told
+  std::int8_t surface;     ///< its tag; −1 if there is none
 };
 
 class Ledger {
@@ -99,7 +103,7 @@ class Ledger {
     }
   }
 
-  /// Points are the same if all three coordinates are equal.
+  /// Numbers the points of all pieces, as one if all three coordinates are equal.
   void weld() {
     const Stage stage(context_, "weld pieces");
     struct Corner {
@@ -177,7 +181,8 @@ class Ledger {
     }
   }
 
-  /// What is neither matched nor said to be cut passes for original, so that gaps show by tags alone.
+  /// Sets `gaps_can_be_judged`. Triangles that are neither matched nor tagged as cut pass for original, so
+  /// gaps show by the tags alone.
   void judge_tags() {
     if (pieces_.size() < 2 || ledger_.seam_triangles == ledger_.triangles) return;
     const bool all_tagged =
@@ -187,14 +192,15 @@ class Ledger {
     ledger_.gaps_can_be_judged = (all_tagged && (some_cut || is_complete())) || are_far_apart();
   }
 
-  /// A gap is missing in the sum of the volumes.
+  /// Whether the pieces' volumes add up to the whole's: the volume of a gap would be missing.
   bool is_complete() const {
     return expected_.whole &&
            std::abs(ledger_.pieces_volume - *expected_.whole) <= 1e-9 * std::abs(*expected_.whole);
   }
 
-  /// A gap that a fracture leaves is narrower than the cells along it, and their edges are as long as they
-  /// are: pieces whose boxes are farther apart than the longest edge were never one.
+  /// Whether no two pieces can ever have been one. A gap that a fracture leaves is narrower than the cells
+  /// along it, and edges are as long as cells: so pieces whose boxes are farther apart than the longest edge
+  /// were never one.
   bool are_far_apart() const {
     double longest = 0.0;
     for (const Triangle& t : triangles_)
@@ -231,7 +237,7 @@ class Ledger {
     }
   }
 
-  /// How far a volume moves if each coordinate is rounded to single precision.
+  /// A bound of how far a piece's volume moves if each coordinate is rounded to single precision.
   static double rounding(const MeshFile& piece) {
     double area = 0.0, greatest = 0.0;
     for (const Triangle& t : TriangleSoup(piece).triangles)
@@ -268,7 +274,8 @@ class Ledger {
     }
   }
 
-  /// Solid angle of a piece's triangles over 4π: 1 inside, 0 outside (van Oosterom & Strackee 1983).
+  /// The solid angle of a piece's triangles, seen from a point, over 4π: 1 inside, 0 outside (van Oosterom &
+  /// Strackee 1983).
   double winding(std::size_t piece, const Vector3d& x) const {
     double sum = 0.0;
     for (const Triangle& t : TriangleSoup(pieces_[piece]).triangles) {
@@ -280,8 +287,8 @@ class Ledger {
     return sum / (2.0 * std::numbers::pi);
   }
 
-  /// One point of each component of each piece, tested against the pieces whose box holds it and that do not
-  /// have it.
+  /// Counts components that lie inside another piece: one point of each component of each piece is tested
+  /// against the pieces whose box holds it and that do not have it.
   void find_nested() {
     const Stage stage(context_, "nested pieces");
     std::vector<Box> boxes;
@@ -332,11 +339,11 @@ class Ledger {
   const ExpectedVolumes& expected_;
   RunContext& context_;
   FractureLedger ledger_;
-  std::vector<Vector3d> points_;            ///< of the whole
-  std::vector<std::uint32_t> first_point_;  ///< by piece, in number_
-  std::vector<std::uint32_t> number_;       ///< in points_, of each point of each piece
+  std::vector<Vector3d> points_;            ///< points of all pieces, no two equal
+  std::vector<std::uint32_t> first_point_;  ///< each piece's first place in number_
+  std::vector<std::uint32_t> number_;       ///< each piece's points, by their places in points_
   std::vector<Triangle> triangles_, once_, rest_;
-  std::vector<double> volumes_;  ///< by piece
+  std::vector<double> volumes_;  ///< volume of each piece
   std::vector<Entry> entries_;
 };
 

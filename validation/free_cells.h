@@ -8,19 +8,20 @@
 
 namespace hermesh::validation {
 
-/// Cubes of 1/128 of the longest side of a mesh's box, flooded from outside through the sides of those that
-/// no triangle's box of parts meets.
+/// A coarse grid of the space about a mesh: cubes of 1/128 of the longest side of the mesh's box, flooded
+/// from outside through those cubes that no triangle meets (tested by the boxes of the triangle's parts).
 class FreeCells {
  public:
-  /// None: every point in the box counts as not free.
+  /// A grid without cells, for which every point is neither free nor enclosed.
   FreeCells() = default;
   explicit FreeCells(const TriangleTree& tree);
 
+  /// Side of a cube, world units.
   double cell() const { return cell_; }
-  /// Whether the flood came to the point's cell. Points beyond the box are free.
+  /// Whether the flood came to the point's cube. Points beyond the box are free.
   bool free(const Eigen::Vector3d& point) const { return state_at(point) == kFree; }
-  /// Whether neither the flood nor a triangle came there, so that triangles part it from infinity but for
-  /// gaps that are narrower than a cell or two.
+  /// Whether neither the flood came to the point's cube nor a triangle meets it, so that triangles part the
+  /// point from infinity but for gaps that are narrower than a cube or two.
   bool enclosed(const Eigen::Vector3d& point) const { return state_at(point) == kUnseen; }
 
  private:

@@ -7,7 +7,8 @@
 
 namespace hermesh::validation {
 
-/// Brackets max over p on `from` of the distance from p to `to`, by branch and bound.
+/// Brackets the one-sided Hausdorff distance, the maximum over points p of `from` of the distance from p to
+/// `to`, by branch and bound.
 ///
 /// Lower bound: the distance of points of `from` that were looked at. Upper bound of a triangle: for any
 /// triangle R of `to`, the largest of its corners' distances to R, because the distance to a convex set is a

@@ -18,7 +18,7 @@ namespace hermesh::validation {
 /// numbered triangles first, then quads.
 struct Places {
   std::vector<Eigen::Vector3d> points;                ///< at most kMaxPlaces
-  std::vector<std::array<std::int64_t, 2>> polygons;  ///< second is −1 where there is only one
+  std::vector<std::array<std::int64_t, 2>> polygons;  ///< the second is −1 where there is only one
 };
 inline constexpr std::size_t kMaxPlaces = 10;
 
@@ -34,10 +34,10 @@ struct LibraryCounts {
 };
 
 struct SelfIntersections {
-  std::int64_t pairs = 0;           ///< of triangles, all kinds
-  std::int64_t disjoint = 0;        ///< the triangles share no point
-  std::int64_t vertex_sharing = 0;  ///< they share one corner and meet elsewhere, too
-  std::int64_t edge_sharing = 0;    ///< they share an edge and fold onto one another (coplanar overlap)
+  std::int64_t pairs = 0;           ///< pairs of triangles, all kinds
+  std::int64_t disjoint = 0;        ///< pairs that share no point
+  std::int64_t vertex_sharing = 0;  ///< pairs that share one corner and meet elsewhere, too
+  std::int64_t edge_sharing = 0;    ///< pairs that share an edge and fold onto one another (coplanar overlap)
   Places places;
 };
 
@@ -47,48 +47,48 @@ struct Distances {
   std::int64_t samples = 0;
 };
 
-/// Between the normals of two surfaces, in degrees, over samples of the first.
+/// Angles between the normals of two surfaces, in degrees, over samples of the first.
 struct NormalAngles {
   double mean = 0.0, rms = 0.0, max = 0.0;
   std::int64_t samples = 0;
 };
 
-/// Certified: lower ≤ true one-sided Hausdorff distance ≤ upper, world units.
+/// A certified bracket, lower ≤ true one-sided Hausdorff distance ≤ upper, in world units.
 struct HausdorffBound {
   double lower = 0.0, upper = 0.0;
 };
 
 struct FeatureDistances {
   std::int64_t edges = 0, corners = 0;     ///< sharp edges and corners found on the reference
-  std::int64_t edges_excluded = 0;         ///< over the dihedral angle, but part of a smooth blend
-  double edge_length = 0.0;                ///< world units, of the edges kept
+  std::int64_t edges_excluded = 0;         ///< edges over the dihedral angle that are part of a smooth blend
+  double edge_length = 0.0;                ///< length of the edges kept, world units
   Distances edge_to_mesh, corner_to_mesh;  ///< from the reference's features to the judged mesh
 };
 
-/// Of a share that was sampled, with the ends of its interval (solid_comparison.h).
+/// A volume or an area found by sampling, with the ends of its interval (solid_comparison.h).
 struct Estimate {
   double value = 0.0, lower = 0.0, upper = 0.0;
 };
 
-/// A mesh's solid beside that of a reference. World units.
+/// A mesh's solid compared with that of a reference, in world units.
 struct SolidComparison {
   enum class Verdict { same, differs, unknown };
   Verdict verdict = Verdict::unknown;
-  Estimate mesh_volume, reference_volume;  ///< of what is inside for certain
+  Estimate mesh_volume, reference_volume;  ///< volume of what is inside for certain
   Estimate difference;            ///< volume of the symmetric difference; the upper end includes `unknown_volume`
-  Estimate unknown_volume;        ///< where nobody can tell whether it is inside
-  Estimate unexplained;           ///< of `difference`, what lies beyond `explained` from either boundary
-  double mesh_area = 0.0, reference_area = 0.0;  ///< of the mesh as it stands, and of what bounds the reference
-  double possible_area = 0.0;  ///< of the reference's polygons that bound its solid by one rule and not by another
-  std::int64_t mesh_components = 0, reference_components = 0;  ///< of these surfaces
-  Estimate false_area, lost_area;  ///< of the mesh and of the reference: beyond `explained` from the other's
-  double explained = 0.0;          ///< the way that discretisation explains
+  Estimate unknown_volume;        ///< volume of what is neither inside nor outside for certain
+  Estimate unexplained;           ///< the part of `difference` beyond `explained` from either boundary
+  double mesh_area = 0.0, reference_area = 0.0;  ///< areas of the mesh, and of what bounds the reference
+  double possible_area = 0.0;  ///< area of the reference's polygons that bound it by one rule and not by another
+  std::int64_t mesh_components = 0, reference_components = 0;  ///< components of these two surfaces
+  Estimate false_area, lost_area;  ///< area of the mesh, of the reference, beyond `explained` from the other
+  double explained = 0.0;          ///< the distance that discretisation explains
   std::int64_t samples = 0;
-  std::optional<Eigen::Vector3d> false_place, lost_place, unexplained_place;  ///< the first samples
+  std::optional<Eigen::Vector3d> false_place, lost_place, unexplained_place;  ///< the first sample of each kind
   bool reference_closed = true, reference_oriented = true;
 };
 
-/// "same", "differs" or "unknown".
+/// The verdict as a word: "same", "differs" or "unknown".
 inline std::string verdict_word(const SolidComparison& solid) {
   using Verdict = SolidComparison::Verdict;
   return solid.verdict == Verdict::same ? "same" : solid.verdict == Verdict::differs ? "differs" : "unknown";
@@ -100,9 +100,9 @@ struct MeshReport {
   std::int64_t boundary_edges = 0, non_manifold_edges = 0, non_manifold_vertices = 0, inconsistent_edges = 0;
   std::int64_t degenerate_polygons = 0, duplicate_polygons = 0, isolated_points = 0;
   std::int64_t components = 0, euler_characteristic = 0;
-  std::optional<double> genus;  ///< only of a closed, manifold, oriented mesh; summed over components
+  std::optional<double> genus;  ///< sum over components; only of a closed, manifold, oriented mesh
   double volume = 0.0, area = 0.0;
-  double smallest_angle = 0.0;  ///< degrees, over all triangles
+  double smallest_angle = 0.0;  ///< degrees; the least of all triangles
   double worst_aspect = 0.0;  ///< longest edge over twice the inradius·√3: 1 for the equilateral triangle
   Places boundary_places, non_manifold_edge_places, non_manifold_vertex_places, inconsistent_places,
       degenerate_places, duplicate_places;
@@ -113,12 +113,13 @@ struct MeshReport {
   std::optional<NormalAngles> normals_to_reference;
   std::optional<HausdorffBound> certified_to_reference, certified_from_reference;
   std::optional<FeatureDistances> features;
-  std::optional<SolidComparison> solid;  ///< beside the reference's
+  std::optional<SolidComparison> solid;  ///< compared with the reference's
 
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
-  /// Closed, manifold, oriented, not self-intersecting. False when self-intersections were not asked for.
+  /// Whether the mesh is closed, manifold, oriented and free of self-intersections. False when these were not
+  /// asked for.
   bool watertight() const {
     return closed() && manifold() && oriented() && self_intersections && self_intersections->pairs == 0;
   }
@@ -133,8 +134,9 @@ struct MeshReport {
 struct JudgeOptions {
   bool self_intersections = true;
   bool libraries = true;                ///< let OpenMesh and CGAL count, too
-  const MeshFile* reference = nullptr;  ///< for the distances
-  /// As given for a mesh that was proved as it is cut, such as an extractor's own uniform one.
+  const MeshFile* reference = nullptr;  ///< the mesh that distances are measured to
+  /// How the reference's quads are cut: as_given for a mesh about which something was proved with its quads
+  /// as they are cut, such as an extractor's own uniform one.
   QuadRule reference_quads = QuadRule::better;
   std::int64_t samples = 200'000;       ///< on each surface, by area, besides every point of it
   bool certify = false;                 ///< certified Hausdorff bound, both ways
@@ -145,8 +147,8 @@ struct JudgeOptions {
   double dihedral_degrees = 30.0;
 };
 
-/// Judges a mesh as its file holds it. Same input, same report, at any thread count.
-/// Of a mesh without polygons there are no distances and no features in the report.
+/// Judges a mesh as its file holds it. The report depends on the input alone, at any thread count. It has no
+/// distances and no features if the mesh has no polygons.
 /// @throws Cancelled; Error when a reference holds no polygon, when a point is not finite, or when a polygon
 /// refers to a point that is not there.
 MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& context);

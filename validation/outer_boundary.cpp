@@ -13,7 +13,7 @@
 namespace hermesh::validation {
 namespace {
 
-/// What a part of a triangle is to the solid.
+/// How a part of a triangle lies to the solid.
 enum class Role : std::uint8_t { inner, bounding, bounding_reversed, possible, copy };
 
 constexpr double kCoarse = 1.0 / 32, kFine = 1.0 / 256, kStep = 1e-6;  // of the diagonal
@@ -24,7 +24,7 @@ double longest_edge(const Corners& t) {
 
 double twice_area(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]).norm(); }
 
-/// Parts of one triangle that is cut.
+/// The parts of one triangle that is cut, with their areas.
 struct Parts {
   std::vector<std::pair<Corners, Role>> list;
   double area = 0.0, possible_area = 0.0;
@@ -138,7 +138,7 @@ class Finder {
     return result;
   }
 
-  /// At a point of a part, by the weights of its corners.
+  /// The role of a triangle at a point of a part of it, which is given by the weights of the part's corners.
   Role role_at(const Corners& part, const Eigen::Vector3d& weights, std::size_t triangle) const {
     const Eigen::Vector3d at =
         (weights[0] * part[0] + weights[1] * part[1] + weights[2] * part[2]) / weights.sum();
@@ -200,10 +200,10 @@ class Finder {
   const RunContext& context_;
   double diagonal_, step_ = 0.0;
   std::vector<std::array<std::uint32_t, 2>> pairs_;
-  std::vector<std::uint8_t> meets_;  ///< something that is no neighbour
+  std::vector<std::uint8_t> meets_;  ///< for each triangle: whether it meets one that is no neighbour
   std::vector<std::uint32_t> speaker_of_, speakers_, cut_;
-  std::vector<Role> roles_;   ///< of the speakers
-  std::vector<Parts> parts_;  ///< of the triangles in cut_
+  std::vector<Role> roles_;   ///< roles of the triangles in speakers_
+  std::vector<Parts> parts_;  ///< parts of the triangles in cut_
 };
 
 }  // namespace

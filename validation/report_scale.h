@@ -8,8 +8,8 @@
 
 namespace hermesh::validation {
 
-/// The power of two by which coordinates are to be multiplied so that products of several lengths stay in the
-/// range of double precision: 1 as long as the largest coordinate lies between 2^-150 and 2^150. Null
+/// The power of two by which coordinates have to be multiplied so that products of several lengths stay in
+/// the range of double precision: 1 as long as the largest coordinate lies between 2^-150 and 2^150. Null
 /// pointers are passed over.
 double comfortable_scale(std::initializer_list<const MeshFile*> meshes);
 
@@ -18,7 +18,7 @@ double comfortable_scale(std::initializer_list<const MeshFile*> meshes);
 MeshFile scaled(const MeshFile& mesh, double scale, const std::string& name);
 
 /// Turns the figures of meshes that were multiplied by a power of two into those of the meshes as they were.
-/// What lies beyond double precision becomes infinite.
+/// Figures beyond the range of double precision become infinite.
 void unscale(MeshReport& report, double scale);
 
 }  // namespace hermesh::validation

@@ -27,38 +27,36 @@ MeshFile welded_triangles(const MeshFile& mesh, QuadRule rule = QuadRule::as_giv
 /// void that a flood from infinity fills. Read `by_any_rule`, a point is inside or outside only where these
 /// rules agree, with equal points of the polygons as one:
 ///  - closed and balanced, every edge as often one way as the other: inside if the winding number is over 0
-///  or
-///    odd; outside if it is 0 or even below, and the point is reachable;
+///    or odd; outside if it is 0 or even below, and the point is reachable;
 ///  - closed, an even number of sides at every edge: inside if a ray crosses an odd number of polygons;
-///  outside
-///    if an even one, and the point is reachable;
+///    outside if an even one, and the point is reachable;
 ///  - open, but neighbours face the same way over all edges with two sides but 1 %: inside if of 24 rays 3/4
-///  count
-///    over 0, or if they count 3/8 on average and a straight way leads to a cell that the flood does not come
-///    to (so it is beside an inner wall without a second side); outside if 3/4 do not count over 0, 3/4 cross
-///    an even number, and the point is reachable;
+///    count over 0, or if they count 3/8 on average and a straight way leads to a cell that the flood does not
+///    come to (so the point is beside an inner wall without a second side); outside if 3/4 do not count over
+///    0, 3/4 cross an even number, and the point is reachable;
 ///  - open, and neighbours do not: inside if 3/4 cross an odd number; outside if 3/4 an even one, and the
-///  point is
-///    reachable.
-/// All else is unknown. An oriented mesh whose volume is negative, from wherever in its box it is measured,
-/// is turned as a whole first. Reachable is what a straight way that crosses nothing joins to infinity
-/// through cells that no polygon meets (free_cells.h).
+///    point is reachable.
+/// Any other point is unknown. An oriented mesh whose volume is negative, from wherever in its box it is
+/// measured, is turned as a whole first. A point is *reachable* if a straight way that crosses nothing leads
+/// from it to a cell that the flood from infinity reaches (free_cells.h).
 class Solid {
  public:
   enum class Reading { by_orientation, by_any_rule };
 
-  /// Of welded_triangles(); keeps references to both. @throws Cancelled.
+  /// The solid of a soup of welded_triangles(), with the tree of that soup; keeps references to both.
+  /// @throws Cancelled.
   Solid(const TriangleSoup& welded, const TriangleTree& tree, Reading reading, const RunContext& context);
 
+  /// The side of a point, by the reading.
   Side side(const Eigen::Vector3d& point) const;
 
-  bool closed() const { return closed_; }      ///< every edge has an even number of sides
-  bool oriented() const { return oriented_; }  ///< neighbours face the same way over all edges but 1 %
+  bool closed() const { return closed_; }      ///< whether every edge has an even number of sides
+  bool oriented() const { return oriented_; }  ///< whether neighbours face the same way over all edges but 1 %
 
  private:
   struct Crossings {
-    int sum = 0;    ///< signed: how much more often the ray leaves through a front than it enters by one
-    int count = 0;  ///< of all
+    int sum = 0;    ///< crossings in which the ray leaves through a front less those in which it enters by one
+    int count = 0;  ///< number of all crossings
     bool sure = true;
   };
 

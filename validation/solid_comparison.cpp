@@ -31,7 +31,7 @@ double random_fraction(std::uint64_t counter) {
   return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-/// Wilson's interval of a share, times `whole`.
+/// The share of hits among the samples, with Wilson's interval, times `whole`.
 Estimate estimate(std::int64_t hits, std::int64_t samples, double whole) {
   if (samples == 0) return {};
   const double n = double(samples), p = double(hits) / n, z = kDeviations;
@@ -85,7 +85,7 @@ Sum sum_over(std::int64_t count, const Add& add, const RunContext& context) {
                                             join);
 }
 
-/// A surface with all that is asked of it.
+/// A mesh with its soup, tree and solid, which refer to one another.
 struct Body {
   MeshFile mesh;
   TriangleSoup soup;
@@ -97,7 +97,7 @@ struct Body {
   Body(const Body&) = delete;
 };
 
-/// Of triangles that need not be there.
+/// A surface whose distance is asked for; it may have no triangles.
 struct Surface {
   TriangleSoup soup;
   std::optional<TriangleTree> tree;
@@ -132,7 +132,7 @@ double area_of(const MeshFile& mesh) {
 
 }  // namespace
 
-/// What does not depend on the mesh.
+/// The reference's solid and boundary, which do not depend on the mesh that is compared.
 struct SolidReference::Parts {
   Body body;
   OuterBoundary boundary;
@@ -192,8 +192,8 @@ class SolidReference::Comparison {
     return std::max(least, std::min(kTimesDistance * std::sqrt(farthest.squared), kLongestShare * longest));
   }
 
-  /// Whether what lies on a surface, `explained` from the other boundary, has the same on both sides of it
-  /// there.
+  /// Whether the places `explained` off a triangle, on its two sides at a point of it, are both inside or
+  /// both outside of the other solid.
   bool alike_about(const Eigen::Vector3d& point, const Corners& on, const Solid& solid) const {
     const Eigen::Vector3d step = result_.explained * (on[1] - on[0]).cross(on[2] - on[0]).stableNormalized();
     const Side front = solid.side(point + step), back = solid.side(point - step);
@@ -257,8 +257,8 @@ class SolidReference::Comparison {
     result_.difference.upper = volume(at_most).upper;
   }
 
-  /// How many along each side, so that they are about cubes and about as many as samples: 1 where the box is
-  /// thin.
+  /// The number of strata along each side of the box, so that they are nearly cubes and about as many as
+  /// samples; 1 along a side where the box is thin.
   Eigen::Vector3d strata_along(const Eigen::Vector3d& size) const {
     Eigen::Vector3d strata = Eigen::Vector3d::Ones();
     std::array<bool, 3> thin{size.x() <= 0.0, size.y() <= 0.0, size.z() <= 0.0};
@@ -308,7 +308,7 @@ class SolidReference::Comparison {
   const Surface &bounding_, &possible_;
   const SolidOptions& options_;
   const RunContext& context_;
-  MeshFile pieces_;  ///< without their seams; empty for a mesh that is one
+  MeshFile pieces_;  ///< the mesh without its seams if it is all pieces of a fracture; else empty
   Surface ours_;
   SolidComparison result_;
 };

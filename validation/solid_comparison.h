@@ -10,10 +10,11 @@
 namespace hermesh::validation {
 
 struct SolidOptions {
-  std::int64_t samples = 100'000;  ///< in space, and again on each surface
-  /// World units; the voxels that the mesh was made from. 0: nobody knows.
+  std::int64_t samples = 100'000;  ///< samples in space, and as many on each surface
+  /// Size of the voxels that the mesh was made from, world units; 0 if it is not known.
   double voxel_size = 0.0;
-  /// Whether the mesh is all pieces of something broken: then its seams, where two pieces meet, are no walls.
+  /// Whether the mesh is all pieces of a fracture together: then its seams, where two pieces meet, are no
+  /// walls.
   bool pieces = false;
 };
 
@@ -27,15 +28,14 @@ struct SolidOptions {
 /// of the reference (a mesh cuts a right-angled corner √3 times as far as it then lies from the faces), but
 /// no more than 1/16 of the reference's longest side. The solids differ if beyond that way
 ///  - more than 0.1 % of the mesh's area lies from all that bounds the reference, with inside or with outside
-///  on
-///    both sides of it there: a wall that is none;
+///    on both sides of it there: a wall that is none;
 ///  - more than 1 % of what bounds the reference lies from the mesh, likewise: a part that was lost;
 ///  - more than 0.5 % of the reference's volume is inside one and outside the other, farther from either
-///  boundary,
+///    boundary,
 /// each as the lower end of its interval. What is unknown of the reference counts for neither. If that is
 /// more than half of it, or the reference bounds nothing, the verdict is `unknown`, unless they differ for
-/// certain.
-/// All of it throws Cancelled. Points must be finite, and corners there, as judge() sees to.
+/// certain. The constructor and compare() throw Cancelled. Points must be finite, and the points of all
+/// corners there, as judge() sees to.
 class SolidReference {
  public:
   SolidReference(const MeshFile& reference, RunContext& context);
@@ -48,10 +48,10 @@ class SolidReference {
  private:
   struct Parts;
   class Comparison;
-  std::unique_ptr<const Parts> parts_;  ///< none if no polygon has an area
+  std::unique_ptr<const Parts> parts_;  ///< null if no polygon has an area
 };
 
-/// The same for one mesh.
+/// SolidReference::compare() for a reference that only one mesh is compared with.
 SolidComparison compare_solids(const MeshFile& mesh, const MeshFile& reference, const SolidOptions& options,
                                RunContext& context);
 

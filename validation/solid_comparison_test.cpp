@@ -371,8 +371,8 @@ TEST(SolidComparison, IsDeterministic) {
   EXPECT_EQ(*c.unexplained_place, *d.unexplained_place);
 }
 
-/// A mesh that is as good as any: finer than the reference or coarser, with points off by a little, of a soup
-/// or of a smooth surface, turned.
+/// A mesh that no judge should object to: finer than the reference or coarser, with points off by a little,
+/// of a soup or of a smooth surface, turned.
 std::pair<MeshFile, MeshFile> good_pair(int number) {
   std::mt19937 random{std::uint32_t(number)};
   std::uniform_real_distribution<double> unit(0.0, 1.0);

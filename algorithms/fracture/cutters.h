@@ -22,6 +22,7 @@
 
 namespace hermesh {
 
+/// The part of space that a sample lies in; what a code's bits mean depends on the kind of cutters.
 using CutCode = std::uint64_t;
 
 /// Where the surface between two codes crosses a lattice edge, and which cutter it belongs to.
@@ -30,57 +31,63 @@ struct CutCrossing {
   std::int32_t cutter;
 };
 
+/// The interface that labelling and meshing ask. Calls of const members may come from several threads at
+/// once.
 class Cutters {
  public:
   using At = std::array<std::int32_t, 3>;  ///< index coordinates
 
   virtual ~Cutters() = default;
 
-  /// Codes of the 512 samples of a block, by its first sample.
+  /// Writes the codes of the 512 samples of the block whose first sample is `lower`, in the order of
+  /// sample_index().
   virtual void codes(const At& lower, std::span<CutCode, 512> codes) const = 0;
 
-  /// Of the edge from sample `at` along `axis`, whose ends have these codes. Nothing where the surface
-  /// between the two does not pass between them, as may be asked once a sample has been given to another
-  /// piece than its own.
+  /// The crossing of the edge from sample `at` along `axis` with the surface between two codes, `first` at
+  /// the edge's first sample and `second` at the other. Nothing if that surface does not cross the edge, as
+  /// may be the case once a sample has been given to another piece than its own.
   virtual std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first,
                                               CutCode second) const = 0;
 
-  /// For such an edge: the end that the surface is nearer to (offset 0 or 1), with the surface's normal.
-  /// Nothing if there is no telling.
+  /// For an edge that the surface between its two codes does not cross: the end of the edge that the surface
+  /// is nearer to (offset 0 or 1), with the surface's normal. Nothing if the cutters cannot tell.
   virtual std::optional<CutCrossing> nearest(const At&, int /*axis*/, CutCode, CutCode) const {
     return std::nullopt;
   }
 
-  /// Cutters have the numbers 0 to count() − 1.
+  /// How many cutters there are; their numbers are 0 to count() − 1.
   virtual std::size_t count() const = 0;
+  /// What one cutter is called, in an output.
   virtual std::string name(std::size_t cutter) const = 0;
 
-  /// Normal of the plane (or of the plane before it was displaced) that separates two codes, in world space,
-  /// of unit length, the same or opposite if they change places; nothing if it is no plane.
+  /// Unit normal, in world space, of the plane that separates two codes; of a displaced wall that of the
+  /// plane before the displacement. It is the same or the opposite if the codes change places. Nothing if no
+  /// single plane separates them.
   virtual std::optional<Eigen::Vector3d> plane_between(CutCode first, CutCode second) const = 0;
 
-  /// True where a code is a pattern of sides; else it is the number of the cutter that holds the sample, or
-  /// count() where none does.
+  /// True if a code is a pattern of sides of planes, a bit a plane. Else a code is the number of the cutter
+  /// that holds the sample, or count() where none does.
   virtual bool plane_sides() const { return false; }
-  /// A solid of its own without any sample inside.
+  /// Whether the cutter is a solid of its own that holds no sample anywhere.
   virtual bool is_empty(std::size_t) const { return false; }
-  /// For a cutter that is a solid of its own: which samples of a block are in it, whatever the other cutters
-  /// hold.
+  /// For a cutter that is a solid of its own: the samples of the block at `lower` within it, whatever the
+  /// other cutters hold. Nothing for other cutters.
   virtual std::optional<BlockMask> signs(std::size_t, const At& /*lower*/) const { return std::nullopt; }
-  /// Its Hermite data, where it has some.
+  /// The Hermite data of a cutter that is a solid of its own, owned by this object; null for other and for
+  /// empty cutters.
   virtual const FloatHermite* solid(std::size_t) const { return nullptr; }
-  /// What a piece of that code is called, in an output.
+  /// What a piece of a code is called, in an output.
   virtual std::string name_of(CutCode code) const = 0;
 };
 
-/// normal · x = distance in world units; the normal need not be of unit length.
+/// The plane normal · x = distance, in world units; the normal need not be of unit length.
 struct CuttingPlane {
   Eigen::Vector3d normal;
   double distance;
 };
 
-/// Pieces are the patterns of the sides of all planes. On an edge that several planes cross, the first of
-/// them counts.
+/// Cutters whose pieces are the patterns of the sides of all planes. On an edge that several planes cross,
+/// the first of them counts.
 /// @throws Error for more than 64 planes, or one whose normal has no length.
 std::unique_ptr<Cutters> plane_cutters(std::vector<CuttingPlane> planes, const IndexToWorld& placement);
 
@@ -93,34 +100,36 @@ struct Displacement {
   std::uint64_t seed = 0;
 };
 
-/// A displaced wall's crossing is found to this part of the edge's length.
+/// The error of the offset at which a displaced wall crosses an edge, as a part of the edge's length.
 inline constexpr double kCrossingError = 1e-6;
 
-/// Pieces are the Voronoi cells of the seeds (world units); of equal distances the lower number wins. A wall
-/// carries the number of the lower of its two seeds as its cutter.
+/// Cutters whose pieces are the Voronoi cells of the seeds (world units); of equal distances the lower number
+/// wins. A wall carries the number of the lower of its two seeds as its cutter.
+/// @throws Error if there are no seeds.
 std::unique_ptr<Cutters> voronoi_cutters(std::vector<Eigen::Vector3d> seeds, const Displacement& displacement,
                                          const IndexToWorld& placement);
 
-/// A solid that cuts, in place (world units).
+/// A solid that cuts, where it lies in the world (world units).
 struct CuttingMesh {
   std::string name;
   PolygonMesh mesh;
 };
 
-/// One after another (Aldén 2011, §7.1): piece k is what cutter k takes from what the ones before it left,
-/// and the last piece is what no cutter takes. Each is voxelized on the object's lattice; its crossings are
-/// the exact hits of its polygons. A mesh that is empty, or so small that no sample lies inside, takes
-/// nothing.
+/// Cutting solids one after another (Aldén 2011, §7.1): piece k is what cutter k takes from what the ones
+/// before it left, and the last piece is what no cutter takes. Each mesh is voxelized on the object's
+/// lattice; its crossings are the exact hits of its polygons. A mesh that is empty, or so small that no
+/// sample lies inside, takes nothing.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 std::unique_ptr<Cutters> mesh_cutters(const std::vector<CuttingMesh>& meshes, const IndexToWorld& placement,
                                       RunContext& context);
 
-/// The Hermite data of a mesh on the lattice of `placement`, whatever that is. Nothing for a mesh without an
-/// inside.
+/// The Hermite data of a mesh on the lattice of `placement`, which may be any regular affine map. Nothing for
+/// a mesh that holds no sample. @throws Error as check_voxelization_fits(); Cancelled.
 std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const IndexToWorld& placement,
                                                RunContext& context);
 
-/// Rotated about `centre` by a matrix, scaled, and moved so that `centre` comes to lie at `place`.
+/// A copy of the mesh, rotated about `centre` by a matrix, scaled, and moved so that `centre` comes to lie at
+/// `place` (world units).
 PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& rotation, double scale,
                    const Eigen::Vector3d& centre, const Eigen::Vector3d& place);
 

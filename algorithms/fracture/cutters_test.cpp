@@ -212,7 +212,8 @@ TEST(PieceAttributes, OriginalPolygonsTakeThoseOfTheSource) {
   EXPECT_NEAR(height[2], 3.0f, 1e-6);
 }
 
-/// A PLY has them at its points; the pieces have them at corners, where seams need others.
+/// A PLY file has texture coordinates at its points; the pieces have them at corners, where seams need
+/// others.
 TEST(PieceAttributes, TextureCoordinatesOfPointsGoIntoTheCorners) {
   PolygonMesh source = cuboid({0, 0, 0}, {4, 4, 4});
   std::vector<float> uv;

@@ -8,11 +8,14 @@
 namespace hermesh {
 namespace {
 
-/// Until a repair finds nothing to do: what it changes may leave new slivers and new pieces that fall apart,
-/// and giving slivers away or parting pieces may call for a repair. Should that not end soon, the last
-/// slivers stay pieces, and should that not do, the last pieces that fall apart stay one.
+/// Splits, merges and repairs in turn until a repair finds nothing to do: changed labels may leave new
+/// slivers and new pieces that fall apart, and giving slivers away or parting pieces may call for a repair.
+/// Should the turns not end soon, the last slivers stay pieces; should they still not end, the last pieces
+/// that fall apart stay one.
 void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions& options,
             LabelledFracture& result, RunContext& context) {
+  // The end is certain: from pass 2 * kPasses on pieces only get other numbers, which leaves simple cells
+  // simple (label_components.h), so that the next repair finds none.
   constexpr int kPasses = 5;
   const auto value = [&](std::uint32_t code) { return solid.code_values[code - 1]; };
   for (int pass = 0;; ++pass) {
@@ -23,6 +26,7 @@ void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions&
                                cutters.name_of(value(sliver.code)), cutters.name_of(value(sliver.into_code)),
                                sliver.samples});
     result.split_off += found.split_off;
+    // The repair comes last in a pass, so that the labels this function leaves are those of simple cells.
     const RepairReport repaired = repair_labels(solid, context);
     result.repair.cells += repaired.cells;
     result.repair.changed_samples += repaired.changed_samples;
@@ -31,6 +35,7 @@ void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions&
   }
 }
 
+/// Counts the samples of each of the numbers 0 to `numbers` − 1 in a field of labels or codes.
 std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const LabelField& field,
                                          std::size_t numbers) {
   std::vector<std::uint64_t> result(numbers);
@@ -44,6 +49,8 @@ std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const Label
   return result;
 }
 
+/// Whether the cutter holds a sample of the object, taken by another cutter or not; false for a cutter that
+/// is no solid of its own.
 bool meets(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
   for (const HermiteView::Block& block : solid.blocks) {
     const std::optional<BlockMask> mask = cutters.signs(cutter, block.lower);
@@ -54,11 +61,13 @@ bool meets(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutte
   return false;
 }
 
-/// Whether a lattice edge leads from the solid into the cutter.
+/// Whether a lattice edge leads from the solid into the cutter, or from the cutter into the solid.
 bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
   for (const HermiteView::Block& block : solid.blocks) {
     const auto own = cutters.signs(cutter, block.lower);
     if (!own) return false;
+    // An edge belongs to its first sample, which may be outside, but lies in one of the solid's blocks if the
+    // second is inside, for these include the ones below (LabelledSolid::blocks): each edge is seen once.
     for (int axis = 0; axis < 3; ++axis) {
       const auto step = [axis](int a) { return a == axis ? 1 : 0; };
       const std::int32_t next = block.neighbours[neighbour_slot(step(0), step(1), step(2))];
@@ -80,8 +89,8 @@ bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t
   return false;
 }
 
-/// Whether slivers are all that the cutter took. A plane's sliver is merged across it; a code of its own has
-/// no piece then.
+/// Whether slivers are all that the cutter took. A plane then has no edge left, and some sliver
+/// lay on its other side than the piece that it joined; any other cutter has no piece of its code left.
 bool was_merged(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
                 const CutterRecord& record, const std::vector<MergedPiece>& merged) {
   if (cutters.plane_sides())
@@ -93,6 +102,7 @@ bool was_merged(const LabelledSolid& solid, const Cutters& cutters, std::size_t 
   return std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) { return m.code == cutter; });
 }
 
+/// The state of a cutter to which was_merged() does not apply: the first that fits.
 CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
                              const CutterRecord& record) {
   using State = CutterRecord::State;
@@ -103,6 +113,7 @@ CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters,
   return lies_beside(solid, cutters, cutter) ? State::touches : State::misses;
 }
 
+/// The record of each cutter, for a grid made from the solid's final labels.
 std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledGrid& grid,
                                      const Cutters& cutters, const std::vector<MergedPiece>& merged) {
   std::vector<CutterRecord> records(cutters.count());
@@ -110,6 +121,8 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
     if (const std::int32_t cutter = grid.sides(e).cutter; cutter >= 0)
       ++records[static_cast<std::size_t>(cutter)].edges;
   const bool codes_are_cutters = !cutters.plane_sides();
+  // Codes stay as the cutters gave them, so what a cutter took is told apart from what repairs and merges
+  // left.
   const std::vector<std::uint64_t> taken = count_samples(solid, solid.codes, solid.code_values.size() + 1);
   if (codes_are_cutters)
     for (std::size_t i = 0; i < solid.code_values.size(); ++i)
@@ -167,6 +180,8 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
   if (solid.samples == 0)
     throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
   LabelledFracture result;
+  // While the solid is still of one piece no cell is a joint, so the sheets found here are those of the
+  // whole's surface; settle_components() needs them to tell what hangs together across faces.
   if (options.split || options.least_samples > 0) find_joined_faces(solid, object, cutters, context);
   label_by_codes(solid, cutters, context);
   // Every further round has more joints of one sheet, so they end; hardly ever is there a second one.
@@ -174,6 +189,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     for (const LabelledSolid::Place& cell : result.mesh.meeting_joints)
       solid.one_sheet.insert(LabelledSolid::key(cell));
     settle(solid, cutters, options, result, context);
+    // Crossings and sheets depend on the labels, so each round makes the grid, the records and the mesh anew.
     const LabelledGrid grid(solid, object, cutters, context);
     result.made_up_crossings = grid.made_up();
     result.grid_bytes = grid.memory_bytes();
@@ -183,6 +199,8 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     result.mesh = joint_mesh(grid, options.placement, context);
   } while (!result.mesh.meeting_joints.empty());
   note_gaps(solid, context);
+  // Decimation comes last, for its patches are those of the final labels. The counts above are of the
+  // lattice.
   decimate_joint_mesh(result.mesh, options.tolerance, context);
   result.met_joints = solid.one_sheet.size();
   result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());
@@ -190,6 +208,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
   result.small_kept = static_cast<std::uint64_t>(
       std::count_if(result.samples.begin() + 1, result.samples.end(),
                     [&](std::uint64_t samples) { return samples < options.least_samples; }));
+  // Label 0 is the outside: only its samples within the solid's blocks were counted, which mean nothing.
   result.samples[0] = 0;
   result.names.resize(1);
   result.codes.resize(1);

@@ -20,7 +20,7 @@
 
 namespace hermesh {
 
-/// What became of a cutter.
+/// What became of one cutter.
 struct CutterRecord {
   enum class State {
     cuts,      ///< some piece ends at it
@@ -34,21 +34,22 @@ struct CutterRecord {
   };
   std::string name;
   State state = State::misses;
-  std::uint64_t samples = 0;  ///< of the object, of the code with the cutter's number; 0 for planes
-  std::uint64_t edges = 0;    ///< lattice edges that it cuts
+  std::uint64_t samples = 0;  ///< the object's samples with the cutter's number as code; 0 for planes
+  std::uint64_t edges = 0;    ///< lattice edges that the cutter cuts
 };
+/// The state's name as it stands in the enumeration.
 const char* to_string(CutterRecord::State state);
-/// "cuts the object", "misses the object", …: for a sentence that begins with the cutter's name.
+/// The state as the rest of a sentence that begins with the cutter's name, such as "cuts the object".
 const char* in_words(CutterRecord::State state);
 
 struct FractureOptions {
   DualContouringOptions placement;
-  double tolerance = 0.0;            ///< voxels; above 0 points are merged within seams (joint_decimation.h)
-  bool split = true;                 ///< pieces that fall apart become several
-  std::uint64_t least_samples = 27;  ///< smaller ones join a neighbour; a cube of 3 voxels. 0 keeps all
+  double tolerance = 0.0;            ///< voxels; above 0 the mesh is made coarser (joint_decimation.h)
+  bool split = true;                 ///< pieces that hang together nowhere become several
+  std::uint64_t least_samples = 27;  ///< smaller pieces join a neighbour; 27 is a cube of 3³. 0 keeps all
 };
 
-/// A sliver that was given to a neighbour: codes as the cutters give them, and what they call them.
+/// A sliver that was given to a neighbour: the codes of both, and the cutters' names for them.
 struct MergedPiece {
   CutCode code = 0, into_code = 0;
   std::string name, into_name;
@@ -59,22 +60,27 @@ struct MergedPiece {
 struct LabelledFracture {
   JointMesh mesh;
   std::unique_ptr<PieceTriangles> pieces;
-  std::vector<std::string> names;      ///< by piece, [0] unused: what the cutters call it
-  std::vector<std::uint64_t> samples;  ///< by piece
-  std::vector<CutCode> codes;          ///< by piece: that of the cutters
+  std::vector<std::string> names;      ///< the cutters' name of each piece; [0] is unused
+  std::vector<std::uint64_t> samples;  ///< samples of each piece; [0] is 0
+  std::vector<CutCode> codes;          ///< the cutters' code of each piece; [0] is unused
   std::vector<CutterRecord> cutters;
   std::vector<MergedPiece> merged;
-  std::uint64_t split_off = 0;
+  std::uint64_t split_off = 0;   ///< pieces that are there because some fell apart
   std::uint64_t small_kept = 0;  ///< pieces that stayed below the least number of samples
   RepairReport repair;
-  /// Cells that are to have one sheet because polygons at or beside them met others.
+  /// Joints that had to have one sheet, for polygons at or beside them met others (LabelledSolid::one_sheet).
   std::uint64_t met_joints = 0;
+  /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's surface
+  /// passes (LabelledGrid).
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
-  std::size_t grid_bytes = 0;  ///< labels, codes and crossings
+  std::size_t grid_bytes = 0;  ///< memory of labels, codes and crossings
 
+  /// The pieces have the numbers 1 to piece_count().
   std::uint32_t piece_count() const { return pieces ? pieces->count() : 0; }
 };
 
+/// Breaks an object along the cutters into pieces that are closed manifolds and meet in shared triangles
+/// (labelled_mesh.h). The same bytes at any thread count.
 /// @throws Error for an object without a sample inside, or one that has no end; Cancelled.
 LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cutters,
                                    const FractureOptions& options, RunContext& context);

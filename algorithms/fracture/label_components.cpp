@@ -14,6 +14,11 @@ namespace {
 
 constexpr std::uint16_t kNoComponent = 0xffff;
 
+/// The sets of samples that hang together, as sets of components of blocks.
+///
+/// A component is what hangs together within one block. Components are numbered by block and, within it, by
+/// first sample; DisjointSets keeps the lowest number of a set as its root. So every root stands for the
+/// set's first sample, whatever the order of joins, and nothing here depends on the number of threads.
 class Components {
  public:
   Components(LabelledSolid& solid, RunContext& context) : solid_(solid), context_(context) {
@@ -23,6 +28,8 @@ class Components {
       if (solid_.label(a) == solid_.label(b)) sets_.join(component(a), component(b));
   }
 
+  /// Makes one set of all components of a label, whether they touch or not (ComponentOptions::split is
+  /// false).
   void join_equal_labels() {
     std::map<std::uint32_t, std::uint32_t> first;
     for (std::uint32_t c = 0; c < label_.size(); ++c) {
@@ -31,6 +38,7 @@ class Components {
     }
   }
 
+  /// Sums the samples of each set at its root; to be called when all joins but those of slivers are made.
   void sum_sizes() {
     total_.assign(label_.size(), 0);
     for (std::uint32_t c = 0; c < label_.size(); ++c) total_[sets_.find(c)] += size_[c];
@@ -42,6 +50,9 @@ class Components {
     return roots;
   }
 
+  /// Gives every set smaller than `least` to the neighbour with which it shares most contacts, the smallest
+  /// first. Contacts are counted once, before the first merge, and are summed up by the neighbours' roots
+  /// later.
   void merge_small(std::uint64_t least, ComponentReport& report) {
     std::map<std::uint32_t, Shared> shared = shared_contacts(least);
     std::set<std::pair<std::uint64_t, std::uint32_t>> small;  // by size
@@ -49,15 +60,18 @@ class Components {
     while (!small.empty()) {
       const auto [samples, root] = *small.begin();
       small.erase(small.begin());
+      // Neighbours may have become one set since contacts were counted, or have joined this one.
       const Shared sums = by_root(shared[root], root);
       if (sums.empty()) {
         ++report.small_kept;
         continue;
       }
+      // max_element returns the first of equals, and the map ascends: ties go to the lowest root.
       const std::uint32_t into = std::max_element(sums.begin(), sums.end(), [](const auto& a, const auto& b) {
                                    return a.second < b.second;
                                  })->first;
       report.merged.push_back({code_of(root), samples, code_of(into)});
+      // The set that receives keeps its label, though the lower of the two numbers becomes the root.
       const std::uint32_t label = label_[into];
       small.erase({total_[into], into});
       Shared others = shared.contains(into) ? std::move(shared[into]) : Shared{};
@@ -66,6 +80,8 @@ class Components {
       const std::uint32_t joined = sets_.join(root, into);
       total_[joined] = sum;
       label_[joined] = label;
+      // A set that is still too small goes back into the queue with the contacts of both; a large one needs
+      // no contacts, for it is only ever merged into.
       if (sum < least) {
         shared[joined] = std::move(others);
         small.emplace(sum, joined);
@@ -85,6 +101,7 @@ class Components {
       number[root] = static_cast<std::uint32_t>(codes.size());
       codes.push_back(code_of(root));
     }
+    // find() shortens paths, that is, writes; so roots are looked up here, before threads read `number`.
     for (std::uint32_t c = 0; c < label_.size(); ++c) number[c] = number[sets_.find(c)];
     parallel_blocks(solid_.blocks.size(), context_, [&](std::size_t b) {
       LabelField::Values values{};
@@ -102,7 +119,8 @@ class Components {
 
   std::uint32_t code_of(std::uint32_t component) const { return solid_.code_of[label_[component]]; }
 
-  /// Of a block without numbers of its own all samples are of the one component, or outside.
+  /// The component of a sample within its block; kNoComponent outside. In a block without an array in
+  /// `locals_` all samples are of the one component, or all are outside.
   std::uint16_t local_of(std::size_t b, int sample) const {
     if (locals_[b]) return (*locals_[b])[static_cast<std::size_t>(sample)];
     return solid_.labels(static_cast<std::int32_t>(b), 0) > 0 ? 0 : kNoComponent;
@@ -112,7 +130,8 @@ class Components {
            local_of(static_cast<std::size_t>(at.block), at.sample);
   }
 
-  /// Of those that the joint mesh joins, too, if the two samples are of one piece: not those of joints.
+  /// The inside corners of the joined faces that count as contacts: faces of joints do not, for
+  /// label_sheets.h cuts their inside corners off.
   std::vector<std::array<LabelledSolid::Place, 2>> samples_of_joined_faces() const {
     std::vector<std::array<LabelledSolid::Place, 2>> result;
     for (const auto& [samples, cells] : solid_.joined_faces)
@@ -122,17 +141,21 @@ class Components {
     return result;
   }
 
+  /// Labels and numbers of samples of a block's components, by their number within the block.
   struct InBlock {
     std::vector<std::uint32_t> labels;
     std::vector<std::uint32_t> sizes;
   };
 
+  /// Finds the components of a block by lattice edges within it. Writes `locals_` of this block alone, so
+  /// blocks may be numbered in parallel.
   InBlock number_block(std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (solid_.labels.is_uniform(block)) {
       const std::uint32_t label = solid_.labels(block, 0);
       return label > 0 ? InBlock{{label}, {512}} : InBlock{};
     }
+    // Outside samples are joined, too; they are left out where components get their numbers.
     DisjointSets sets(512);
     const auto label = [&](int i) { return solid_.labels(block, i); };
     for (int i = 0; i < 512; ++i) {
@@ -165,6 +188,8 @@ class Components {
     locals_.resize(n);
     std::vector<InBlock> found(n);
     parallel_blocks(n, context_, [&](std::size_t b) { found[b] = number_block(b); });
+    // Blocks are numbered in parallel, but lined up in their own order, which makes the numbers independent
+    // of the order of threads.
     first_.resize(n);
     for (std::size_t b = 0; b < n; ++b) {
       first_[b] = static_cast<std::uint32_t>(label_.size());
@@ -174,6 +199,7 @@ class Components {
     sets_ = DisjointSets(label_.size());
   }
 
+  /// Joins components across the faces between blocks, upwards along each axis, which meets each face once.
   void join_blocks() {
     for (std::size_t b = 0; b < solid_.blocks.size(); ++b) {
       if (b % 1024 == 0) context_.check();
@@ -182,6 +208,7 @@ class Components {
         const std::int32_t there =
             solid_.blocks[b].neighbours[neighbour_slot(axis == 0, axis == 1, axis == 2)];
         if (there < 0) continue;
+        // Between two blocks of one label each all 64 edges say the same: one will do.
         const bool plain = !locals_[b] && !locals_[static_cast<std::size_t>(there)];
         for (int i = 0; i < (plain ? 1 : 64); ++i) {
           const int u = i >> 3, v = i & 7;
@@ -199,7 +226,8 @@ class Components {
     }
   }
 
-  /// Of the sets smaller than `least`, with those that hang together with nobody.
+  /// The contacts of each set smaller than `least`, by its root; an empty map for a set that touches no
+  /// other. Large sets have no entry: they are most of the samples, and their contacts are never asked for.
   std::map<std::uint32_t, Shared> shared_contacts(std::uint64_t least) {
     std::map<std::uint32_t, Shared> result;
     std::vector<char> concerned(solid_.blocks.size());
@@ -207,6 +235,7 @@ class Components {
       for (const std::size_t end = b + 1 < first_.size() ? first_[b + 1] : label_.size(); c < end; ++c) {
         const std::uint32_t root = sets_.find(static_cast<std::uint32_t>(c));
         if (total_[root] >= least) continue;
+        // A set gets its entry even if it has no contact at all.
         result[root];
         concerned[b] = 1;
       }
@@ -216,6 +245,7 @@ class Components {
         if (local_of(b, i) == kNoComponent) continue;
         const std::uint32_t root = sets_.find(component({static_cast<std::int32_t>(b), i}));
         if (total_[root] >= least) continue;
+        // Seen from the small set alone, so an edge between two small sets counts once for either.
         for (int face = 0; face < 6; ++face) {
           int at[3] = {i >> 6, (i >> 3) & 7, i & 7};
           at[face >> 1] += face & 1 ? 1 : -1;
@@ -234,6 +264,7 @@ class Components {
     return result;
   }
 
+  /// Contacts summed by the roots that the neighbours have by now, without the set of `self`.
   Shared by_root(const Shared& shared, std::uint32_t self) {
     Shared sums;
     for (const auto& [component, contacts] : shared)
@@ -243,10 +274,10 @@ class Components {
 
   LabelledSolid& solid_;
   RunContext& context_;
-  std::vector<std::unique_ptr<Locals>> locals_;  ///< by block the component of each sample within it
-  std::vector<std::uint32_t> first_;             ///< by block its first component
-  std::vector<std::uint32_t> label_, size_;      ///< by component
-  std::vector<std::uint64_t> total_;             ///< by the component that stands for a set
+  std::vector<std::unique_ptr<Locals>> locals_;  ///< each block's components, by sample
+  std::vector<std::uint32_t> first_;             ///< number of each block's first component
+  std::vector<std::uint32_t> label_, size_;      ///< label and samples of each component; of a root, the label of its set
+  std::vector<std::uint64_t> total_;             ///< samples of a set, at its root
   DisjointSets sets_;
 };
 

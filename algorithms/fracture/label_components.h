@@ -10,34 +10,36 @@
 namespace hermesh {
 
 struct ComponentOptions {
-  /// Samples of one piece that do not hang together become several pieces; else a piece may have several
-  /// closed surfaces. Two samples hang together by a *contact*: a lattice edge, or an ambiguous face across
-  /// which the whole's surface joins them (LabelledSolid::joined_faces) and which no joint shares, for what
-  /// is thin and aslant in the lattice has many of these and few edges.
+  /// True if samples of one piece that do not hang together become several pieces; else a piece may have
+  /// several closed surfaces. Two samples hang together by a *contact*: a lattice edge, or an ambiguous face
+  /// across which the whole's surface joins them (LabelledSolid::joined_faces) and which no joint shares.
+  /// Parts that are thin and aslant in the lattice have many such faces and few edges.
   bool split = true;
-  /// In voxels, that is samples: whatever is smaller joins the neighbour that it has most contacts
-  /// with (the lowest of equals), the smallest first. 0 keeps everything.
+  /// The least number of samples of a piece. A smaller one joins the neighbour that it has most contacts with
+  /// (the lowest of equals), the smallest first. 0 keeps everything.
   std::uint64_t least_samples = 0;
 };
 
 /// A piece that was given to another one.
 struct MergedSliver {
-  std::uint32_t code;  ///< as in LabelledSolid::codes
+  std::uint32_t code;  ///< the code of the piece that is no more, as in LabelledSolid::codes
   std::uint64_t samples;
-  std::uint32_t into_code;
+  std::uint32_t into_code;  ///< the code of the piece that has its samples now
 };
 
 struct ComponentReport {
   std::vector<MergedSliver> merged;
-  std::uint64_t split_off = 0;   ///< pieces more than codes, before any was merged
-  std::uint64_t small_kept = 0;  ///< below the least volume, but without a neighbour
+  std::uint64_t split_off = 0;   ///< pieces that splitting made more, before any was merged
+  std::uint64_t small_kept = 0;  ///< pieces below the least number of samples that have no neighbour
 };
 
-/// Numbers the pieces anew, 1 to n without a gap, by their code and then by their first sample.
+/// Splits and merges pieces as the options say and numbers all of them anew, 1 to n without a gap, by their
+/// code and then by their first sample. The result does not depend on the number of threads.
 ///
-/// What is simple (label_repair.h) stays so where pieces only get other numbers. Splitting and merging may
-/// leave cells that are not: corners of one piece that hang together across an ambiguous face only may come
-/// to lie in two pieces. So the labels are to be repaired after it.
+/// Simple cells (label_repair.h) stay simple where pieces only get other numbers. Splitting and merging may
+/// leave cells that are not simple: corners of one piece that hang together across an ambiguous face only may
+/// come to lie in two pieces. So the labels have to be repaired afterwards.
+/// @throws Cancelled
 ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& options, RunContext& context);
 
 }  // namespace hermesh

@@ -14,7 +14,7 @@ namespace {
 
 using Place = LabelledSolid::Place;
 
-/// Corners of each corner's three edges.
+/// For each corner of a cell the other ends of its three edges.
 constexpr std::array<std::array<int, 3>, 8> kBeside = [] {
   std::array<std::array<int, 3>, 8> result{};
   for (int c = 0; c < 8; ++c)
@@ -22,13 +22,15 @@ constexpr std::array<std::array<int, 3>, 8> kBeside = [] {
   return result;
 }();
 
+/// The corners of a label, a bit a corner.
 int signs_of(const CornerLabels& labels, std::uint32_t label) {
   int signs = 0;
   for (int c = 0; c < 8; ++c) signs |= (labels[c] == label) << c;
   return signs;
 }
 
-/// Inside corners that hang together with `corner` by edges of the cell.
+/// The inside corners that hang together with `corner` by edges of the cell, whatever their labels; a bit a
+/// corner.
 int part_of(const CornerLabels& labels, int corner) {
   int part = 1 << corner;
   for (int before = 0; before != part;) {
@@ -47,6 +49,8 @@ struct Change {
   std::uint32_t label = 0;
 };
 
+/// The two phases of label_repair.h, "Why it ends". Everything runs in one thread but the search for the
+/// first cells, whose result is put in order of blocks: the order of changes decides the outcome.
 class Repair {
  public:
   Repair(LabelledSolid& solid, RunContext& context) : solid_(solid), context_(context) {}
@@ -54,9 +58,12 @@ class Repair {
   RepairReport run() {
     std::vector<Place> cells = find_cells();
     report_.cells = cells.size();
-    // What cannot be bettered waits, and is tried again when something beside it has changed.
+    // The first phase makes only changes that leave fewer cells that are not simple. A cell that none betters
+    // waits, and is tried again when something beside it has changed.
     std::vector<Place> waiting = run_rounds(cells, [&](const Place& cell) { return better(cell); });
+    // The second phase lowers labels; lower() always succeeds, so no cell is left.
     run_rounds(waiting, [&](const Place& cell) { return lower(cell); });
+    // A sample that was changed and later changed back does not count.
     for (const auto& [key, before] : before_)
       report_.changed_samples +=
           solid_.labels(static_cast<std::int32_t>(key >> 9), static_cast<int>(key & 511)) != before;
@@ -76,6 +83,8 @@ class Repair {
   }
   bool simple(const Place& cell) const { return is_simple(solid_, cell); }
 
+  /// All cells that are not simple, by block and cell. A block whose samples, with those one step beyond,
+  /// have one label holds no cut, hence no such cell.
   Cells find_cells() {
     std::vector<Cells> found(solid_.blocks.size());
     parallel_blocks(found.size(), context_, [&](std::size_t b) {
@@ -91,7 +100,8 @@ class Repair {
     return all;
   }
 
-  /// Visits cells, and those around what has changed, until nothing changes any more. Returns what is left.
+  /// Visits the given cells that are not simple, then those around the samples that `visit` changed, until no
+  /// sample changes any more. Returns the cells that are not simple at the end, in order.
   template <class Visit>
   Cells run_rounds(Cells cells, Visit&& visit) {
     Cells left;
@@ -99,10 +109,12 @@ class Repair {
       context_.check();
       changed_.clear();
       for (const Place& cell : cells)
+        // A cell may have become simple by a change made earlier in this round.
         if (!simple(cell) && !visit(cell)) left.push_back(cell);
       cells = around(changed_);
       std::erase_if(cells, [&](const Place& cell) { return simple(cell); });
     }
+    // Likewise a cell that was left may have been mended from a cell beside it.
     std::erase_if(left, [&](const Place& cell) { return simple(cell); });
     sort(left);
     return left;
@@ -117,14 +129,17 @@ class Repair {
                 cells.end());
   }
 
-  /// The cells that have one of these samples at a corner, an inside sample having all eight of them; and
-  /// those beside, which share faces with them.
+  /// All cells whose simplicity may depend on these samples: those that have one of them at a corner (all
+  /// eight of them are in blocks, for an inside sample), and those that share a face with such a cell. In
+  /// order.
   Cells around(const Cells& samples) const {
     Cells cells;
     for (const Place& s : samples)
       for (int x = -2; x <= 1; ++x)
         for (int y = -2; y <= 1; ++y)
           for (int z = -2; z <= 1; ++z) {
+            // Steps −1 and 0 lead to cells with the sample at a corner, −2 and 1 to those beyond their faces;
+            // two such steps at once lead across an edge, where is_simple() does not look.
             const auto is_beside = [](int d) { return d == -2 || d == 1; };
             if (is_beside(x) + is_beside(y) + is_beside(z) > 1) continue;
             if (const Place cell = moved(s, x, y, z); cell.block >= 0) cells.push_back(cell);
@@ -133,6 +148,7 @@ class Repair {
     return cells;
   }
 
+  /// How many of the cells are not simple.
   int count_bad(const Cells& cells) const {
     int bad = 0;
     for (const Place& cell : cells) bad += !simple(cell);
@@ -140,10 +156,10 @@ class Repair {
   }
 
   struct Effect {
-    int more;    ///< cells that are not simple
-    bool mends;  ///< the cell itself
+    int more;    ///< cells that are not simple after the change, less those before it
+    bool mends;  ///< whether the changed cell itself is simple after it
   };
-  /// Leaves the labels as they are.
+  /// Tries a change and takes it back: the labels are afterwards what they were.
   Effect effect(const Place& cell, const Change& change) {
     Cells samples;
     std::array<std::uint32_t, 8> old{};
@@ -161,6 +177,7 @@ class Repair {
     return result;
   }
 
+  /// Makes a change, and keeps the samples that differ after it for the next round.
   void apply(const Place& cell, const Change& change) {
     for (int c = 0; c < 8; ++c) {
       if (!((change.corners >> c) & 1)) continue;
@@ -173,7 +190,9 @@ class Repair {
     }
   }
 
-  /// One corner to another label of the cell, or a part of the corners to one of its labels.
+  /// The changes that are tried at a cell: one inside corner takes another label of the cell, or all inside
+  /// corners that hang together take a label that one of them has. None touches the outside or brings in a
+  /// label that is not at the cell already.
   static std::vector<Change> changes(const CornerLabels& corners) {
     std::vector<Change> result;
     std::vector<std::uint32_t> present(corners.begin(), corners.end());
@@ -194,7 +213,8 @@ class Repair {
     return result;
   }
 
-  /// The change that leaves the fewest cells not simple, if it is an improvement; of equals the first.
+  /// Makes the change that leaves the fewest cells not simple, of equals the first, if it leaves fewer than
+  /// there were. Returns whether it made one.
   bool better(const Place& cell) {
     std::optional<Change> best;
     int least = 0;
@@ -204,8 +224,8 @@ class Repair {
     return best.has_value();
   }
 
-  /// A change that makes the cell simple and only lowers labels; of those the one that spoils the fewest
-  /// others.
+  /// Makes the cell simple by a change that raises no label; of those the one that spoils the fewest others.
+  /// If there is none, every part of the inside corners takes its lowest label. Returns true.
   bool lower(const Place& cell) {
     const CornerLabels corners = labels(cell);
     std::optional<Change> best;
@@ -214,6 +234,8 @@ class Repair {
       bool lowers = true;
       for (int c = 0; c < 8; ++c)
         if ((change.corners >> c) & 1) lowers = lowers && change.label <= corners[c];
+      // Only such changes are allowed here, so that the sum of all labels falls: nothing else ends this
+      // phase.
       if (!lowers) continue;
       if (const Effect then = effect(cell, change); then.mends && then.more < least)
         least = then.more, best = change;
@@ -254,6 +276,8 @@ CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Plac
 bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell) {
   const CornerLabels labels = corner_labels(solid, cell);
   if (!has_cut(labels)) return true;
+  // The three conditions of label_repair.h. A pinched face counts only if the cell beside is a joint that is
+  // pinched there, too: against a cell without a cut the surface can be held to the segments.
   const JointSheets own = joint_sheets(labels);
   if (!own.single_loops || (own.sheets.sheets > 1 && solid.one_sheet.contains(solid.key(cell)))) return false;
   for (int face = 0; face < 6; ++face) {

@@ -54,18 +54,20 @@
 
 namespace hermesh {
 
-/// Of a cell that begins in one of the solid's blocks.
+/// The labels of the corners of a cell whose first corner lies in one of the solid's blocks.
 CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Place& cell);
+/// Whether a cell, whose first corner lies in one of the solid's blocks, is simple as said above.
 bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell);
 
 struct RepairReport {
-  std::uint64_t cells = 0;  ///< that were not simple
-  std::uint64_t changed_samples = 0;
+  std::uint64_t cells = 0;  ///< cells that were not simple before the repair
+  std::uint64_t changed_samples = 0;  ///< samples whose label is another one after it
   std::uint64_t forced_changes =
-      0;  ///< made towards lower labels, because no other change was an improvement
+      0;  ///< changes towards lower labels, made where no change was an improvement
 };
 
-/// Cells are visited in the order of their place, one after the other: the same result at any thread count.
+/// Changes labels of inside samples until every cell is simple. Cells are visited in the order of their
+/// place, one after the other, so the result is the same at any thread count. @throws Cancelled.
 RepairReport repair_labels(LabelledSolid& solid, RunContext& context);
 
 }  // namespace hermesh

@@ -160,7 +160,7 @@ int euler_characteristic(const std::vector<Triangle>& triangles) {
   return static_cast<int>(points.size()) - static_cast<int>(triangles.size() / 2);
 }
 
-/// By piece its triangles, outwards, without a repair.
+/// The triangles of each piece, oriented outwards, of a fracture whose labels are not repaired.
 std::vector<std::vector<Triangle>> pieces_of(const Solid& object, std::function<CutCode(int, int, int)> code,
                                              const ComponentOptions& options) {
   RunContext context;

@@ -5,6 +5,7 @@
 namespace hermesh {
 namespace {
 
+/// The numbers of cell_sheets.h as tables, for a repair asks for sheets very often: an edge's two corners.
 constexpr std::array<std::array<int, 2>, 12> kCornersOfEdge = [] {
   std::array<std::array<int, 2>, 12> result{};
   for (int edge = 0; edge < 12; ++edge) {
@@ -24,20 +25,26 @@ constexpr std::array<std::array<int, 4>, 6> kFaceCorners = [] {
   return result;
 }();
 
-/// Which corner of an ambiguous face is cut off, and with it the one opposite: 0 or 1. Of (a, b, a, b) see
-/// the header.
+/// The first of the two opposite corners of an ambiguous face that are cut off one by one: 0 (with corner 2)
+/// or 1 (with corner 3). `l` holds the labels in the order of face_corners().
 int cut_off(const std::array<std::uint32_t, 4>& l) {
+  // Both diagonals are alike: inside corners are cut off against the outside, corners 00 and 11 between two
+  // pieces. Which label is the lower is not asked, so the sheets stay when pieces get other numbers.
   if (l[0] == l[2] && l[1] == l[3]) return l[0] == 0 ? 1 : 0;
+  // One diagonal is alike and hangs together; the ends of the other are cut off.
   return l[0] == l[2] ? 1 : 0;
 }
 
+/// Works out JointSheets for the labels of one cell.
 class Sheets {
  public:
   explicit Sheets(const CornerLabels& labels) : labels_(labels) {
     for (auto& face : sheets().partner) face.fill(CellSheets::kNone);
     for (int edge = 0; edge < 12; ++edge) group_[edge] = edge;
+    // Edges start as groups of their own; the lines on the faces unite them into sheets.
     for (int face = 0; face < 6; ++face) cut_face(face);
     number_sheets();
+    // Whether the two segments of a face are of one sheet shows only when all faces are cut.
     for (int face = 0; face < 6; ++face) {
       const auto& edges = kFaceEdges[face];
       if (((sheets().ambiguous_faces >> face) & 1) &&
@@ -55,22 +62,26 @@ class Sheets {
   bool is_crossed(int edge) const {
     return labels_[kCornersOfEdge[edge][0]] != labels_[kCornersOfEdge[edge][1]];
   }
+  /// Whether an edge has one end of this label: then the boundary of the label's piece passes through it.
   bool bounds(int edge, std::uint32_t label) const {
     return (labels_[kCornersOfEdge[edge][0]] == label) != (labels_[kCornersOfEdge[edge][1]] == label);
   }
 
-  /// Twelve edges: the lowest number stands for its group.
+  /// Makes one group of two. With twelve edges a pass over all is cheap; the lowest edge stands for its
+  /// group.
   void unite(int a, int b) {
     const int low = std::min(group_[a], group_[b]), high = std::max(group_[a], group_[b]);
     for (int& g : group_)
       if (g == high) g = low;
   }
+  /// Draws the segment between the crossings of two edges of a face.
   void join(int face, int a, int b) {
     sheets().partner[face][a] = static_cast<std::uint8_t>(b);
     sheets().partner[face][b] = static_cast<std::uint8_t>(a);
     unite(a, b);
   }
 
+  /// Draws the lines of one face: a segment, two, or a star. A face with one crossing does not exist.
   void cut_face(int face) {
     const auto& edges = kFaceEdges[face];
     int crossed[4] = {}, count = 0;
@@ -81,9 +92,11 @@ class Sheets {
     for (int i = 0; i < 4; ++i) l[i] = labels_[kFaceCorners[face][i]];
     if (count == 4 && (l[0] == l[2] || l[1] == l[3])) {
       sheets().ambiguous_faces |= static_cast<std::uint8_t>(1 << face);
+      // Corner i lies between edges i − 1 and i, so the segment between their crossings cuts it off.
       for (int i = cut_off(l); i < 4; i += 2) join(face, edges[(i + 3) % 4], edges[i]);
       return;
     }
+    // Three or four labels meet in a star, which has no segments: `partner` stays kNone.
     for (int i = 1; i < count; ++i) unite(crossed[0], crossed[i]);
   }
 
@@ -91,13 +104,15 @@ class Sheets {
     sheets().sheet_of.fill(CellSheets::kNone);
     for (int edge = 0; edge < 12; ++edge) {
       if (!is_crossed(edge)) continue;
+      // Edges ascend and the lowest stands for its group, so its number is there when the others look it up.
       const int first = group_[edge];
       sheets().sheet_of[edge] = first == edge ? sheets().sheets++ : sheets().sheet_of[first];
     }
   }
 
-  /// The other end, on a face, of the line that bounds a label from this edge on: of two edges that do the
-  /// other one, of four the segment's.
+  /// The other end of the line on a face that starts at this edge and bounds the label. If two edges of the
+  /// face bound it, it is the other one, across a star, too; if four do, the face is ambiguous and the
+  /// segment tells.
   int next(int face, int edge, std::uint32_t label) const {
     int count = 0, other = -1;
     for (const int e : kFaceEdges[face])
@@ -108,6 +123,7 @@ class Sheets {
     return count == 2 ? other : result_.sheets.partner[face][edge];
   }
 
+  /// Walks the loops that bound a label on the cell's boundary, and looks for two of them in one sheet.
   void follow_loops(std::uint32_t label) {
     unsigned seen = 0, sheets_seen = 0;  // edges and sheets, a bit each
     for (int first = 0; first < 12; ++first) {

@@ -9,10 +9,10 @@
 
 namespace hermesh {
 
-/// By corner as in cell_sheets.h; 0 is the outside.
+/// The labels of a cell's corners, numbered as in cell_sheets.h; 0 is the outside.
 using CornerLabels = std::array<std::uint32_t, 8>;
 
-/// Whether an edge joins two pieces: the cell is a joint then.
+/// Whether an edge of the cell has its ends in two pieces, so that the cell is a joint.
 bool has_cut(const CornerLabels& labels);
 
 /// A *sheet* of a joint is what hangs together of the crossings of its edges by the lines that the surfaces
@@ -29,12 +29,13 @@ struct JointSheets {
   /// Whether the part of each sheet that bounds a label, the outside included, is a single loop on the cell's
   /// boundary: then the polygons of a piece around the sheet's point are one fan.
   bool single_loops = true;
-  /// A bit a face: ambiguous, and both segments belong to one sheet.
+  /// A bit for each face: whether the face is ambiguous and both its segments belong to one sheet.
   std::uint8_t pinched = 0;
 
-  /// One point does for the cell, as for most joints, and nobody needs to be told of its segments.
+  /// Whether one point does for the cell, as for most joints, and its segments need not be recorded.
   bool is_plain() const { return sheets.sheets <= 1 && sheets.ambiguous_faces == 0; }
 };
+/// The sheets of a cell with these labels at its corners.
 JointSheets joint_sheets(const CornerLabels& labels);
 
 }  // namespace hermesh

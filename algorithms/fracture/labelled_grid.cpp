@@ -12,6 +12,8 @@ LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, co
       joint_sheets_(solid.blocks.size()),
       first_(solid.blocks.size()) {
   const Stage stage(context, "crossings of the cuts");
+  // Count, scan, fill (parallel.h): each block writes its own range of crossings and sides, so no two threads
+  // write the same place, and the order is that of block, axis and sample whatever the number of threads.
   find_edges(context);
   std::vector<std::uint64_t> made_up(solid.blocks.size());
   parallel_blocks(solid.blocks.size(), context,
@@ -20,10 +22,12 @@ LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, co
 }
 
 void LabelledGrid::find_edges(RunContext& context) {
+  // Steps along x, y and z within a LabelCube.
   static constexpr int kStep[3] = {81, 9, 1};
   std::vector<std::uint64_t> counts(solid_.blocks.size());
   parallel_blocks(solid_.blocks.size(), context, [&](std::size_t b) {
     auto& crossing = solid_.blocks[b].crossing;
+    // The masks of an earlier grid over this solid are replaced: labels may have changed since.
     crossing = {};
     cuts_[b] = {};
     LabelCube cube;
@@ -39,6 +43,8 @@ void LabelledGrid::find_edges(RunContext& context) {
         if (label > 0 && next > 0) cuts_[b][axis][sample >> 6] |= bit;
       }
     }
+    // Joints of one point and no ambiguous face need not be told (CellGrid::joint_sheets()). Most are such,
+    // so the lists stay short.
     for (int cell = 0; cell < 512; ++cell) {
       const CornerLabels labels = labels_in(cube, cell);
       if (!has_cut(labels)) continue;
@@ -66,15 +72,20 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
     for_each_bit(solid_.blocks[b].crossing[axis], [&](int sample) {
       const LabelledSolid::Place next = solid_.locate(
           block, (sample >> 6) + (axis == 0), ((sample >> 3) & 7) + (axis == 1), (sample & 7) + (axis == 2));
+      // Labels and codes are looked up one by one here: only crossing edges come this far.
       const std::uint32_t from = solid_.labels(block, sample), to = solid_.label(next);
       EdgeSides& sides = sides_[number];
       EdgeCrossing& crossing = crossings_[number];
       ++number;
+      // Where the first sample is outside, the polygon faces it, so the piece of the second is at the back.
       sides = from > 0 ? EdgeSides{from, to, -1} : EdgeSides{to, 0, -1};
       if (!test(cuts_[b][axis], sample)) {
         crossing = *original++;
         return;
       }
+      // First the codes of the samples: the cutter's own surface passes between them. If a repair or a merge
+      // gave a sample to another piece, the codes may be one and the same; then those of the two pieces are
+      // asked.
       const std::uint32_t codes[2][2] = {{solid_.codes(block, sample), solid_.codes(next.block, next.sample)},
                                          {solid_.code_of[from], solid_.code_of[to]}};
       for (const auto& [first, second] : codes) {
@@ -85,6 +96,8 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
         sides.cutter = found->cutter;
         return;
       }
+      // No surface passes between these samples. The edge needs a crossing all the same, for polygons close
+      // the two pieces here: the end nearer to the surface misplaces it least.
       ++made_up;
       if (codes[1][0] != codes[1][1])
         if (const auto found =
@@ -93,6 +106,7 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
           sides.cutter = found->cutter;
           return;
         }
+      // Nothing is known of a surface between these pieces: the middle of the edge, and a plane across it.
       crossing = {0.5f, {}};
       crossing.normal[axis] = 1.0f;
     });
@@ -101,6 +115,7 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
 
 EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) const {
   const auto& edges = solid_.blocks[static_cast<std::size_t>(block)].crossing;
+  // The same order as in fill_block(): the edges of lower axes come first.
   std::uint32_t number = first_[static_cast<std::size_t>(block)] + rank_in(edges[axis], sample);
   for (int a = 0; a < axis; ++a) number += static_cast<std::uint32_t>(count(edges[a]));
   return crossings_[number];
@@ -109,6 +124,7 @@ EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) co
 bool LabelledGrid::is_of_one_piece(std::int32_t block, int cell, int face) const {
   const CornerLabels labels = corner_labels(solid_, {block, cell});
   const std::array<int, 4> corners = face_corners(face);
+  // On an ambiguous face without a cut one diagonal is inside and the other outside.
   const int inside = labels[corners[0]] > 0 ? 0 : 1;
   return labels[corners[inside]] == labels[corners[inside + 2]];
 }
@@ -124,6 +140,8 @@ std::size_t LabelledGrid::memory_bytes() const {
 
 void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                        RunContext& context) {
+  // The solid is of one piece here, so this is the lattice of the whole: no cell is a joint, and faces are
+  // cut as the normals of the original surface have it (CellBlocks::sheets()).
   const LabelledGrid grid(solid, hermite, cutters, context);
   const CellBlocks cells(grid, context);
   const Stage stage(context, "find joined faces");
@@ -141,6 +159,7 @@ void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const 
         if (!((sheets.ambiguous_faces >> face) & 1)) continue;
         const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
         const int inside = (signs >> corners[0]) & 1 ? 0 : 1;
+        // Corner i lies between edges i − 1 and i of the face: a segment that joins these cuts it off.
         const bool is_cut_off = sheets.partner[face][edges[inside]] == edges[(inside + 3) % 4];
         if (!is_cut_off)
           found[b].push_back(
@@ -148,6 +167,7 @@ void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const 
       }
     });
   });
+  // Lists of blocks follow one another in order of blocks, not of threads.
   solid.joined_faces.clear();
   for (const auto& list : found)
     solid.joined_faces.insert(solid.joined_faces.end(), list.begin(), list.end());

@@ -12,20 +12,22 @@ namespace hermesh {
 
 /// What lies on the two sides of a crossing edge.
 struct EdgeSides {
-  std::uint32_t back;   ///< the piece on the side that the edge's polygons are the boundary of; at least 1
-  std::uint32_t front;  ///< the piece on the other side, which they face; 0 for the outside
+  std::uint32_t back;   ///< the piece behind the edge's polygons, whose boundary they are; at least 1
+  std::uint32_t front;  ///< the piece that the polygons face; 0 for the outside
   std::int32_t
       cutter;  ///< −1 for the original surface, and where no cutter's surface passes between the samples
 };
 
-/// An edge is crossed if its ends have different labels. The original surface's crossings are those of the
-/// Hermite data. A cut's is the cutters' between the codes of the two samples; if there is none, that between
-/// the codes of the two pieces. If there is none either, for a label was repaired or a sliver merged, it is
-/// *made up*, and counted: the end of the edge that the surface between the two pieces is nearer to, or, if
-/// the cutters cannot tell, the middle of the edge with a normal along it.
+/// The lattice of a labelled solid. An edge is crossed if its ends have different labels. Crossings of the
+/// original surface are those of the Hermite data. The crossing of a cut is that of the cutters' surface
+/// between the codes of the two samples; if there is none, that between the codes of the two pieces. If there
+/// is none either, because a label was repaired or a sliver merged, the crossing is *made up*, and counted:
+/// the end of the edge that the surface between the two pieces is nearer to, or, if the cutters cannot tell,
+/// the middle of the edge with a normal along it.
 class LabelledGrid : public CellGrid {
  public:
-  /// The solid has to outlive the grid. @throws Error for 2³² crossing edges or more; Cancelled.
+  /// Marks the crossing edges in the solid's blocks, too. The solid has to outlive the grid, and its labels
+  /// must not change as long as the grid is used. @throws Error for 2³² crossing edges or more; Cancelled.
   LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                RunContext& context);
 
@@ -36,10 +38,10 @@ class LabelledGrid : public CellGrid {
   std::span<const SheetsOfBlock> joint_sheets() const override { return joint_sheets_; }
   bool is_of_one_piece(std::int32_t block, int cell, int face) const override;
 
-  /// By the number of the crossing edge: by block, axis and sample.
+  /// The two sides of a crossing edge, by its number in the order of blocks, axes and samples.
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
   std::size_t edge_count() const { return sides_.size(); }
-  std::uint64_t made_up() const { return made_up_; }  ///< crossings
+  std::uint64_t made_up() const { return made_up_; }  ///< how many crossings are made up
   std::size_t memory_bytes() const;
 
  private:
@@ -49,13 +51,14 @@ class LabelledGrid : public CellGrid {
   LabelledSolid& solid_;
   std::vector<std::array<BlockMask, 3>> cuts_;
   std::vector<SheetsOfBlock> joint_sheets_;
-  std::vector<std::uint32_t> first_;  ///< by block its first crossing edge
+  std::vector<std::uint32_t> first_;  ///< number of each block's first crossing edge
   LargeArray<EdgeCrossing> crossings_;
   LargeArray<EdgeSides> sides_;
   std::uint64_t made_up_ = 0;
 };
 
-/// Fills in the solid's `joined_faces`. @param solid as whole_solid() makes it @throws as LabelledGrid does
+/// Fills in the `joined_faces` of a solid that is as whole_solid() makes it, still of one piece.
+/// @throws Error as LabelledGrid does; Cancelled
 void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                        RunContext& context);
 

@@ -9,6 +9,8 @@ namespace hermesh {
 JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context) {
   const FilePoints file(grid.placement());
   PolygonEdges edges;
+  // uniform_mesh() asks nothing of what lies on the two sides of an edge, so one call makes the polygons of
+  // all pieces, each seam once; `edges` tells which edge a polygon came from, and the edge knows its sides.
   UniformMesh uniform = uniform_mesh(grid, options, file, context, &edges);
   const Stage stage(context, "sides of the triangles");
   JointMesh mesh;
@@ -20,6 +22,7 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
   mesh.escaped = uniform.counts.escaped;
   for (const auto& [block, cell] : uniform.counts.meeting_joints)
     mesh.meeting_joints.push_back({block, cell});
+  // Triangles of fanned edges come first, then each quad as two, abc and acd: the split that its maker chose.
   const std::size_t fanned = uniform.triangles.size(), quads = uniform.quads.size();
   mesh.triangles = std::move(uniform.triangles);
   mesh.triangles.resize(fanned + 2 * quads);
@@ -30,6 +33,7 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
       for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) f(i);
     });
   };
+  // Each polygon writes its own places only, so threads do not meet.
   in_chunks(fanned, [&](std::size_t i) { mesh.sides[i] = grid.sides(edges.triangles[i]); });
   in_chunks(quads, [&](std::size_t i) {
     const Quad& q = uniform.quads[i];
@@ -41,10 +45,12 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
 }
 
 PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : first_(pieces + 2) {
+  // A triangle of a seam counts for both of its pieces, one of the original surface for the piece behind it.
   for (const EdgeSides& sides : mesh.sides) {
     ++first_[sides.back];
     if (sides.front > 0) ++first_[sides.front];
   }
+  // Counts become first places; the entry after the last piece ends it, and that of piece 0 is empty.
   std::size_t sum = 0;
   for (std::size_t& first : first_) {
     const std::size_t here = first;
@@ -53,6 +59,7 @@ PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : fi
   }
   sides_.resize(sum);
   std::vector<std::size_t> next = first_;
+  // Triangles ascend, so each piece has them in the order of the joint mesh.
   for (std::uint32_t t = 0; t < mesh.sides.size(); ++t) {
     sides_[next[mesh.sides[t].back]++] = {t, false};
     if (mesh.sides[t].front > 0) sides_[next[mesh.sides[t].front]++] = {t, true};
@@ -60,6 +67,9 @@ PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : fi
 }
 
 PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Side> triangles) {
+  // A piece's points ascend as in the joint mesh, so both pieces of a seam number its points in the same
+  // order. The coordinates are the same bits in both, for rounding to single precision knows nothing of
+  // pieces.
   std::vector<std::uint32_t> used;
   used.reserve(3 * triangles.size());
   for (const PieceTriangles::Side& side : triangles)
@@ -75,10 +85,14 @@ PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Si
   std::vector<std::int32_t> surface, cutter, neighbour;
   result.triangles.reserve(triangles.size());
   const bool mirrors = mesh.placement.mirrors();
+  // `neighbour` is the piece on the other side, so the two copies of a seam's triangle name each other's
+  // piece.
   for (const auto& [number, reversed] : triangles) {
     Triangle t = mesh.triangles[number];
     for (std::uint32_t& p : t)
       p = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), p) - used.begin());
+    // Two reasons to turn a triangle, which cancel: the piece lies in front of it, or the lattice is
+    // mirrored.
     if (reversed != mirrors) std::swap(t[1], t[2]);
     result.triangles.push_back(t);
     const EdgeSides& sides = mesh.sides[number];

@@ -12,7 +12,7 @@
 
 namespace hermesh {
 
-/// One point for each sheet of a cell, and triangles for each crossing edge.
+/// The mesh of all pieces together: one point for each sheet of a cell, and triangles for each crossing edge.
 ///
 /// **Guarantees**, if every cell of the grid is simple (label_repair.h) and no joints meet: the triangles
 /// with a piece on one side, turned so that it is behind them, are a closed oriented manifold; the triangles
@@ -22,32 +22,36 @@ namespace hermesh {
 struct JointMesh {
   IndexToWorld placement;
   std::vector<Eigen::Vector3d>
-      points;  ///< index space relative to the placement's base; FilePoints::rounded()
-  /// Counter-clockwise in index space seen from `front`.
+      points;  ///< index coordinates relative to the placement's base, as FilePoints::rounded() gives them
+  /// Corners are counter-clockwise in index space, seen from the triangle's side `front`.
   std::vector<Triangle> triangles;
-  std::vector<EdgeSides> sides;  ///< of each triangle
+  std::vector<EdgeSides> sides;  ///< pieces and cutter of each triangle
 
   std::uint64_t joints = 0;          ///< cells where pieces meet
-  std::uint64_t several_sheets = 0;  ///< cells with them
-  std::uint64_t fanned_edges = 0, escaped = 0;
-  std::vector<LabelledSolid::Place> meeting_joints;  ///< cells, as in UniformMesh
+  std::uint64_t several_sheets = 0;  ///< cells with several sheets
+  std::uint64_t fanned_edges = 0, escaped = 0;  ///< as in UniformCounts
+  std::vector<LabelledSolid::Place> meeting_joints;  ///< as in UniformCounts
 };
 
-/// With placement by all of a joint's crossings, so that the rim of a cut is a sharp crease where the
-/// original surface is smooth, too. The same bytes at any thread count. @throws Cancelled.
+/// Makes the mesh of all pieces. A joint's point is placed by all crossings of the joint, so that the rim of
+/// a cut is a sharp crease where the original surface is smooth, too. The result has the same bytes at any
+/// thread count. @throws Cancelled.
 JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context);
 
 /// Which triangles of a joint mesh bound each piece.
 class PieceTriangles {
  public:
+  /// A triangle of the joint mesh as one of its pieces has it.
   struct Side {
     std::uint32_t triangle;
     bool reversed;  ///< the piece is in front of the triangle
   };
+  /// Sorts the triangles of the mesh, whose sides name no piece above `pieces`.
   PieceTriangles(const JointMesh& mesh, std::uint32_t pieces);
 
+  /// How many pieces there are.
   std::uint32_t count() const { return static_cast<std::uint32_t>(first_.size()) - 2; }
-  /// Of piece 1 … count(), in the order of the joint mesh.
+  /// The triangles that bound a piece from 1 to count(), in the order of the joint mesh.
   std::span<const Side> of(std::uint32_t piece) const {
     return std::span(sides_).subspan(first_[piece], first_[piece + 1] - first_[piece]);
   }

@@ -12,7 +12,8 @@ namespace {
 using Lower = std::array<std::int32_t, 3>;
 using ViewBlock = HermiteView::Block;
 
-/// Blocks with a leaf, and those full of samples between two leaves of a column along z.
+/// The first samples of all blocks with an inside sample: of leaves, and of blocks without a leaf between two
+/// leaves of a column along z, which are inside if the leaf below leaves that sign behind (SparseHermite).
 std::vector<Lower> blocks_with_samples(const FloatHermite& hermite) {
   std::vector<Lower> result;
   for (std::size_t i = 0; i < hermite.leaves.size(); ++i) {
@@ -21,19 +22,24 @@ std::vector<Lower> blocks_with_samples(const FloatHermite& hermite) {
     if (!(leaf.beyond[2] & 1)) continue;
     const bool last = i + 1 == hermite.leaves.size() || hermite.leaves[i + 1].lower[0] != leaf.lower[0] ||
                       hermite.leaves[i + 1].lower[1] != leaf.lower[1];
-    if (last) continue;  // the next block, which is mixed, is then that leaf itself
+    // Nothing is inside above the last leaf of a column, for the solid has an end.
+    if (last) continue;
+    // Where the layer beyond is mixed, the block above has a crossing edge: it is the next leaf, and no block
+    // lies between the two. Else one bit of the layer tells the sign of all.
     for (std::int32_t z = leaf.lower[2] + 8; z < hermite.leaves[i + 1].lower[2]; z += 8)
       result.push_back({leaf.lower[0], leaf.lower[1], z});
   }
   return result;
 }
 
+/// The given blocks and, for each, the seven that lie one step down along some axes; ascending, each once.
 std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
   std::vector<Lower> all;
   all.reserve(8 * blocks.size());
   for (const Lower& b : blocks)
     for (int down = 0; down < 8; ++down)
       all.push_back({b[0] - 8 * (down & 1), b[1] - 8 * ((down >> 1) & 1), b[2] - 8 * (down >> 2)});
+  // Equal entries cannot be told apart, so an unstable sort gives the same list at any thread count.
   tbb::parallel_sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
@@ -45,6 +51,7 @@ struct BlockCodes {
   LabelField::Values numbers{};  ///< 0 outside, else 1 + place in `values`
 };
 
+/// Asks the cutters for one block. Only codes of inside samples are kept: what lies outside is no piece.
 BlockCodes codes_of_block(const ViewBlock& block, const Cutters& cutters) {
   std::array<CutCode, 512> codes;
   cutters.codes(block.lower, codes);
@@ -64,6 +71,7 @@ BlockCodes codes_of_block(const ViewBlock& block, const Cutters& cutters) {
 
 void LabelField::assign(std::int32_t block, const Values& values) {
   const auto b = static_cast<std::size_t>(block);
+  // A block of one value needs no array: `set` may leave it one, `assign` never does.
   const bool uniform =
       std::all_of(values.begin(), values.end(), [&](std::uint32_t v) { return v == values[0]; });
   uniform_[b] = values[0];
@@ -94,6 +102,8 @@ std::size_t LabelField::memory_bytes() const {
 bool gather_labels(const LabelledSolid& solid, const LabelField& field, std::int32_t block, LabelCube& cube) {
   const auto& neighbours = solid.blocks[static_cast<std::size_t>(block)].neighbours;
   std::array<std::int32_t, 8> from;
+  // A missing neighbour is outside, label 0. With one label all around no edge that begins in the block is
+  // crossed, and the 729 labels need not be copied: so it is with most blocks of a solid.
   bool mixed = !field.is_uniform(block);
   const std::uint32_t own = field(block, 0);
   for (int up = 0; up < 8; ++up) {
@@ -129,11 +139,13 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
   solid.leaf_of.resize(lowers.size());
   solid.labels = LabelField(lowers.size());
   solid.codes = LabelField(lowers.size());
+  // Each thread fills in whole blocks, and counts are summed after it.
   std::vector<std::uint64_t> samples(lowers.size());
   parallel_blocks(lowers.size(), context, [&](std::size_t b) {
     ViewBlock& block = solid.blocks[b];
     block = {};
     block.lower = lowers[b];
+    // Not −1: CellGrid takes the signs of such a block for unknown, and here they are known of all.
     block.leaf = static_cast<std::int32_t>(b);
     const SignLeaf* leaf = hermite.find(lowers[b]);
     solid.leaf_of[b] = leaf ? static_cast<std::int32_t>(leaf - hermite.leaves.data()) : -1;
@@ -143,12 +155,14 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
       block.inside.fill(~std::uint64_t{0});
     samples[b] = static_cast<std::uint64_t>(count(block.inside));
     LabelField::Values values{};
+    // All of one piece and one code, until label_by_codes() tells more.
     for_each_bit(block.inside, [&](int i) { values[static_cast<std::size_t>(i)] = 1; });
     solid.labels.assign(static_cast<std::int32_t>(b), values);
     solid.codes.assign(static_cast<std::int32_t>(b), values);
   });
   for (const std::uint64_t n : samples) solid.samples += n;
   find_neighbours(solid.blocks, context);
+  // Code 1 stands for the only piece; its value means nothing yet.
   solid.code_values = {0};
   solid.code_of = {0, 1};
   return solid;
@@ -157,6 +171,8 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
 void label_by_codes(LabelledSolid& solid, const Cutters& cutters, RunContext& context) {
   const Stage stage(context, "label samples");
   const std::size_t n = solid.blocks.size();
+  // First every block numbers its own codes, for the list of all is known only when all blocks are done;
+  // codes are sparse (patterns of up to 64 planes), so they cannot be indices themselves.
   std::vector<std::vector<CutCode>> values(n);
   parallel_blocks(n, context, [&](std::size_t b) {
     BlockCodes codes = codes_of_block(solid.blocks[b], cutters);
@@ -166,13 +182,16 @@ void label_by_codes(LabelledSolid& solid, const Cutters& cutters, RunContext& co
   solid.code_values.clear();
   for (const auto& list : values) {
     solid.code_values.insert(solid.code_values.end(), list.begin(), list.end());
+    // Blocks repeat each other's codes: to drop doubles every million bounds the memory.
     if (solid.code_values.size() < 1'000'000 && &list != &values.back()) continue;
     std::sort(solid.code_values.begin(), solid.code_values.end());
     solid.code_values.erase(std::unique(solid.code_values.begin(), solid.code_values.end()),
                             solid.code_values.end());
   }
+  // Then a block's numbers become places in the ascending list of all, which no order of threads changes.
   parallel_blocks(n, context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
+    // `codes` holds the block's own numbers here, and those of the whole list from here on.
     std::vector<std::uint32_t> number(values[b].size() + 1);
     for (std::size_t i = 0; i < values[b].size(); ++i)
       number[i + 1] = static_cast<std::uint32_t>(

@@ -29,7 +29,8 @@ class LabelField {
     return values ? (*values)[static_cast<std::size_t>(sample)] : uniform_[static_cast<std::size_t>(block)];
   }
   bool is_uniform(std::int32_t block) const { return !values_[static_cast<std::size_t>(block)]; }
-  /// Different blocks may be written by different threads.
+  /// Sets all values of a block, which is stored as one value if they are equal. Different blocks may be
+  /// written by different threads, by assign() and by set().
   void assign(std::int32_t block, const Values& values);
   void set(std::int32_t block, int sample, std::uint32_t value);
 
@@ -40,66 +41,76 @@ class LabelField {
   std::vector<std::unique_ptr<Values>> values_;
 };
 
+/// A solid as blocks of samples, with the code that the cutters give each sample and the piece that it
+/// belongs to.
 struct LabelledSolid {
   IndexToWorld placement;
   /// Each block that holds an inside sample, and the seven below it, so that every cell with an inside corner
-  /// begins in one of them; ascending. What is in no block is outside. `leaf` is the number of the block, −1
-  /// nowhere, and `crossing` is empty until a LabelledGrid is made.
+  /// begins in one of them; ascending. Samples of no block are outside. In each block `leaf` is the block's
+  /// own number, never −1, and `crossing` is empty until a LabelledGrid is made.
   HermiteView::Blocks blocks;
-  std::vector<std::int32_t> leaf_of;  ///< by block the leaf of the Hermite data, −1 for none
-  /// What the cutters say of a sample: 0 outside, else 1 + its place in `code_values`. Never changed.
+  std::vector<std::int32_t> leaf_of;  ///< each block's leaf of the Hermite data; −1 for none
+  /// The cutters' code of each sample: 0 outside, else 1 + its place in `code_values`. Repairs and merges
+  /// change labels, never codes.
   LabelField codes;
-  std::vector<CutCode> code_values;  ///< those that occur, ascending
-  LabelField labels;                 ///< 0 outside, else the piece, from 1 on
+  std::vector<CutCode> code_values;  ///< codes that occur, ascending
+  LabelField labels;                 ///< each sample's piece, from 1 on; 0 outside
   std::vector<std::uint32_t>
-      code_of;  ///< of a piece the code that it is named after, as in `codes`; [0] is 0
+      code_of;  ///< the code, as in `codes`, that each piece is named after; [0] is 0
 
   std::uint32_t piece_count() const { return static_cast<std::uint32_t>(code_of.size()) - 1; }
-  std::uint64_t samples = 0;  ///< inside
+  std::uint64_t samples = 0;  ///< how many samples are inside
 
+  /// A sample, or the cell whose first corner it is.
   struct Place {
-    std::int32_t block;  ///< −1: outside
+    std::int32_t block;  ///< −1 if no block holds the sample, which is outside then
     int sample;
   };
-  /// Of a place in a block: one number for it.
+  /// One number for a place in a block; ascending numbers are ascending places.
   static std::uint64_t key(const Place& at) {
     return static_cast<std::uint64_t>(at.block) << 9 | static_cast<std::uint64_t>(at.sample);
   }
-  /// Keys of cells that are to have one sheet if they are joints (label_repair.h), because polygons met where
+  /// Keys of cells that must have one sheet if they are joints (label_repair.h), because polygons met where
   /// they had several.
   std::set<std::uint64_t> one_sheet;
-  /// An ambiguous face of which the whole's surface joins the inside corners across the middle.
+  /// An ambiguous face whose two inside corners the surface of the whole solid joins across the face.
   struct JoinedFace {
     std::array<Place, 2> samples;  ///< the inside corners
     std::array<Place, 2> cells;    ///< on either side of the face
   };
   std::vector<JoinedFace> joined_faces;  ///< empty until find_joined_faces() of labelled_grid.h fills it
 
-  /// Local coordinates from −8 to 15.
+  /// The sample at local coordinates of a block, each from −8 to 15, in the block or one beside it.
   Place locate(std::int32_t block, int x, int y, int z) const {
     const std::int32_t there =
         blocks[static_cast<std::size_t>(block)].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
     return {there, sample_index(x & 7, y & 7, z & 7)};
   }
+  /// The label of a sample; 0 where there is no block.
   std::uint32_t label(const Place& at) const { return at.block < 0 ? 0 : labels(at.block, at.sample); }
   std::uint32_t label(std::int32_t block, int x, int y, int z) const { return label(locate(block, x, y, z)); }
+  /// Index coordinates of a block's sample.
   std::array<std::int32_t, 3> index(std::int32_t block, int sample) const {
     const auto& lower = blocks[static_cast<std::size_t>(block)].lower;
     return {lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7)};
   }
 };
 
-/// Labels of a block's samples and of the layers one step beyond: 81x + 9y + z.
+/// Labels, or codes, of a block's samples and of the layers one step beyond along each axis: sample (x, y,
+/// z), each from 0 to 8, is at 81x + 9y + z.
 using LabelCube = std::array<std::uint32_t, 729>;
-/// False, and the cube not filled, if all of these are one value.
+/// Fills the cube from a field of the solid. Returns false, with the cube not filled, if all its values are
+/// one.
 bool gather_labels(const LabelledSolid& solid, const LabelField& field, std::int32_t block, LabelCube& cube);
-/// Of the corners of one of the block's cells.
+/// The labels of the corners of one of the block's 512 cells.
 CornerLabels labels_in(const LabelCube& cube, int cell);
 
-/// The blocks of a solid, all its samples of one piece. @throws Error if the solid has no end.
+/// The blocks of a solid, with all inside samples of one code and one piece. @throws Error if the solid has
+/// no end; Cancelled.
 LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context);
 
-/// Gives each sample the piece of its code.
+/// Asks the cutters for the code of each inside sample, and makes the samples of each code one piece. Fills
+/// in `codes`, `code_values`, `labels` and `code_of`. @throws Cancelled.
 void label_by_codes(LabelledSolid& solid, const Cutters& cutters, RunContext& context);
 
 }  // namespace hermesh

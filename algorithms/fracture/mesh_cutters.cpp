@@ -17,9 +17,10 @@ std::array<std::int32_t, 3> block_near(const IndexToWorld& placement) {
   return {placement.base[0] & ~7, placement.base[1] & ~7, placement.base[2] & ~7};
 }
 
-/// In index coordinates relative to that sample, where a voxel is 1 along every axis, however the lattice
-/// lies in the world.
+/// The mesh in index coordinates relative to block_near(), where a voxel is 1 along every axis, however the
+/// lattice lies in the world.
 PolygonMesh in_index_space(const PolygonMesh& mesh, const IndexToWorld& placement) {
+  // Points are rounded to single precision about a block near the base, not about the world's zero.
   const Eigen::Matrix3d to_index = placement.linear.inverse();
   const std::array<std::int32_t, 3> corner = block_near(placement);
   Vector3d base;
@@ -30,11 +31,14 @@ PolygonMesh in_index_space(const PolygonMesh& mesh, const IndexToWorld& placemen
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     result.points.push_back(
         Vector3d(to_index * (mesh.world(i) - placement.origin - placement.offset) + base).cast<float>());
+  // A mirrored lattice turns triangles inside out; turned about, their normals lead outwards in index space.
   if (placement.mirrors())
     for (Triangle& t : result.triangles) std::swap(t[1], t[2]);
   return result;
 }
 
+/// Keeps the Hermite data of all cutting solids on the object's lattice. Where the thesis (§7.1) takes each
+/// cutter's difference from the object before the next one's turn, here the codes tell who comes first.
 class MeshCutters : public Cutters {
  public:
   MeshCutters(const std::vector<CuttingMesh>& meshes, const IndexToWorld& placement, RunContext& context) {
@@ -47,6 +51,7 @@ class MeshCutters : public Cutters {
 
   void codes(const At& lower, std::span<CutCode, 512> codes) const override {
     std::fill(codes.begin(), codes.end(), solids_.size());
+    // From the last to the first, so that of several that hold a sample the first overwrites the others.
     for (std::size_t k = solids_.size(); k-- > 0;) {
       for_each_bit(inside(k, lower), [&](int i) { codes[static_cast<std::size_t>(i)] = k; });
     }
@@ -57,11 +62,13 @@ class MeshCutters : public Cutters {
     // left.
     const std::size_t k = std::min(first, second);
     if (k >= solids_.size() || !solids_[k]) return std::nullopt;
+    // An edge belongs to its first sample's leaf; without a leaf no edge that starts there is crossed.
     const SignLeaf* leaf = solids_[k]->find({at[0] & ~7, at[1] & ~7, at[2] & ~7});
     if (!leaf) return std::nullopt;
     const int sample = sample_index(at[0] & 7, at[1] & 7, at[2] & 7);
     const std::array<BlockMask, 3> edges = crossing_edges(*leaf);
     if (!test(edges[axis], sample)) return std::nullopt;
+    // Crossings lie by axis and then by sample: the place of one is its rank among the leaf's set bits.
     std::size_t rank = leaf->first;
     for (int a = 0; a < axis; ++a) rank += static_cast<std::size_t>(hermesh::count(edges[a]));
     rank += rank_in(edges[axis], sample);
@@ -83,6 +90,7 @@ class MeshCutters : public Cutters {
   }
 
  private:
+  /// The samples of a block within cutter k, whatever the other cutters hold.
   BlockMask inside(std::size_t k, const At& lower) const {
     BlockMask mask{};
     if (!solids_[k]) return mask;
@@ -101,6 +109,7 @@ std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const In
                                                RunContext& context) {
   if (mesh.empty()) return std::nullopt;
   const PolygonMesh turned = in_index_space(mesh, placement);
+  // A voxel of band is enough: the level set gives signs and tells where to look, the polygons give the hits.
   const LevelSet level_set =
       hermesh_voxelizer({.mesh = turned,
                          .voxel_size = 1.0,
@@ -111,6 +120,8 @@ std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const In
   FloatHermite hermite = sample_polygons(level_set, 0.0, turned, context);
   if (hermite.leaves.empty()) return std::nullopt;
   const std::array<std::int32_t, 3> corner = block_near(placement);
+  // Back to the object's index coordinates, by multiples of 8, so that leaves stay leaves. Offsets and
+  // normals are those of index space already.
   for (SignLeaf& leaf : hermite.leaves)
     for (int a = 0; a < 3; ++a) leaf.lower[a] += corner[a];
   hermite.placement = placement;
@@ -120,6 +131,7 @@ std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const In
 PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& rotation, double scale,
                    const Vector3d& centre, const Vector3d& place) {
   PolygonMesh result = mesh;
+  // Single precision is about the new place, so the copy is as exact there as the mesh was.
   result.origin = place;
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     result.points[i] = Vector3d(scale * (rotation * (mesh.world(i) - centre))).cast<float>();

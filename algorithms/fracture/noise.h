@@ -7,7 +7,8 @@
 
 namespace hermesh {
 
-/// splitmix64 (Steele, Lea & Flood 2014): every bit of the result depends on every bit of the argument.
+/// One step of splitmix64 (Steele, Lea & Flood 2014): every bit of the result depends on every bit of the
+/// argument.
 constexpr std::uint64_t hashed(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15u;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -15,18 +16,19 @@ constexpr std::uint64_t hashed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// A sequence of such numbers.
+/// A sequence of pseudorandom numbers: hashed() of consecutive whole numbers.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(hashed(seed)) {}
+  /// The next 64 random bits.
   std::uint64_t bits() { return hashed(state_++); }
-  /// Uniform in [0, 1).
+  /// A random number, uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  /// Uniform in 0 … n−1; off by less than n / 2⁵³.
+  /// A random whole number, uniform in 0 … n − 1 but for a bias of less than n / 2⁵³.
   std::uint64_t below(std::uint64_t n) {
     return static_cast<std::uint64_t>(uniform() * static_cast<double>(n));
   }
-  /// Uniform on the unit sphere, by rejection from the cube.
+  /// A random unit vector, uniform on the sphere, by rejection from the cube.
   Eigen::Vector3d direction() {
     for (;;) {
       Eigen::Vector3d v;
@@ -40,13 +42,13 @@ class Random {
   std::uint64_t state_;
 };
 
-/// Random values between −1 and 1 at whole numbers, joined by quintic polynomials: twice continuously
-/// differentiable.
+/// A smooth random field of three components: random values between −1 and 1 at points with whole
+/// coordinates, joined by quintic polynomials, hence twice continuously differentiable.
 class VectorNoise {
  public:
   explicit VectorNoise(std::uint64_t seed) : octaves_{hashed(seed), hashed(seed + 1)} {}
 
-  /// Two octaves, the finer one half as strong, scaled so that no component leaves [−1, 1].
+  /// The sum of two octaves, the finer one half as strong, scaled so that no component leaves [−1, 1].
   Eigen::Vector3d operator()(const Eigen::Vector3d& x) const {
     return (octave(x, octaves_[0]) + 0.5 * octave(2.0 * x + Eigen::Vector3d::Constant(0.5), octaves_[1])) /
            1.5;
@@ -62,7 +64,7 @@ class VectorNoise {
     return {component(0), component(21), component(42)};
   }
 
-  /// The corners of a cell share the hashes of their first coordinates.
+  /// One octave at x. The corners of a cell share the hashes of their first coordinates.
   static Eigen::Vector3d octave(const Eigen::Vector3d& x, std::uint64_t start) {
     std::uint64_t cell[3];
     double t[3];

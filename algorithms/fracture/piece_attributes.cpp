@@ -14,16 +14,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Two axes at right angles to a normal, the same for its opposite.
+/// Two unit axes at right angles to a normal and to each other, the same for the opposite normal.
 std::array<Vector3d, 2> frame_of(Vector3d normal) {
   int largest, smallest;
   normal.cwiseAbs().maxCoeff(&largest);
   normal.cwiseAbs().minCoeff(&smallest);
+  // The largest component decides the sign, so a normal and its opposite give one frame. The axis of the
+  // smallest component is the farthest from parallel to the normal, so the product is never near zero.
   if (normal[largest] < 0) normal = -normal;
   const Vector3d u = normal.cross(Vector3d(Vector3d::Unit(smallest))).normalized();
   return {u, normal.cross(u)};
 }
 
+/// The two coordinate axes other than the one along which the triangle's normal is greatest. The sign of the
+/// normal is not asked, so a seam's triangle has the same from both sides.
 std::array<Vector3d, 2> frame_of_triangle(const PolygonMesh& mesh, const Triangle& t) {
   const auto at = [&](int c) { return Vector3d(mesh.points[t[c]].cast<double>()); };
   int axis;
@@ -31,13 +35,15 @@ std::array<Vector3d, 2> frame_of_triangle(const PolygonMesh& mesh, const Triangl
   return {Vector3d::Unit((axis + 1) % 3), Vector3d::Unit((axis + 2) % 3)};
 }
 
+/// The polygons' attribute of that name, of whole numbers. @throws Error if the piece has none.
 const std::vector<std::int32_t>& whole_numbers(const PolygonMesh& mesh, const std::string& name) {
   for (const MeshAttribute& a : mesh.attributes)
     if (a.name == name && a.domain == AttributeDomain::polygon) return std::get<1>(a.values);
   throw Error("the piece lacks the attribute " + name);
 }
 
-/// The values of one element of an attribute, or a mixture of three.
+/// Sets one element of `to` to the mean of three elements of `from` by their weights, or, of whole numbers,
+/// to the element of the greatest weight, for numbers of materials cannot be mixed.
 void take(const MeshAttribute& from, const std::array<std::size_t, 3>& elements, const Vector3d& weights,
           MeshAttribute& to, std::size_t element) {
   const auto n = static_cast<std::size_t>(from.components);
@@ -55,6 +61,7 @@ void take(const MeshAttribute& from, const std::array<std::size_t, 3>& elements,
   }
 }
 
+/// An attribute of the same kind for so many elements, all of them 0 or, of whole numbers, −1 (none).
 MeshAttribute empty_like(const MeshAttribute& source, std::size_t elements) {
   MeshAttribute result{source.name, source.domain, source.components, {}, source.labels};
   const std::size_t values = elements * static_cast<std::size_t>(source.components);
@@ -74,10 +81,13 @@ void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane) {
   std::map<std::int32_t, std::optional<std::array<Vector3d, 2>>> frames;
   for (std::size_t t = 0; t < piece.triangles.size(); ++t) {
     if (surface[t] == 0) continue;
+    // The plane depends on the two pieces alone, so one frame does for all triangles of a seam.
     auto [at, is_new] = frames.try_emplace(neighbour[t]);
     if (is_new)
       if (const auto normal = plane(neighbour[t])) at->second = frame_of(*normal);
     const auto axes = at->second ? *at->second : frame_of_triangle(piece, piece.triangles[t]);
+    // Points are relative to the origin, which all pieces share, so both sides of a seam compute the same
+    // bits.
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t i = 0; i < 2; ++i)
         uv[6 * t + 2 * c + i] =
@@ -86,6 +96,8 @@ void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane) {
   piece.attributes.push_back({"uv", AttributeDomain::corner, 2, std::move(uv), {}});
 }
 
+/// The search for the nearest polygon of the source. Positions are in world units relative to the source's
+/// origin; the tree scales them to voxels.
 struct SourceAttributes::Tree {
   std::vector<Triangle> triangles;
   TriangleTree tree;
@@ -109,7 +121,9 @@ SourceAttributes::~SourceAttributes() = default;
 
 void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
   if (!tree_) return;
+  // A copy, for the piece gets more attributes below and a reference would not outlast that.
   const std::vector<std::int32_t> surface = whole_numbers(piece, "surface");
+  // The piece and the source may be about different origins.
   const auto local = [&](std::uint32_t p) { return Vector3d(piece.world(p) - source_.origin); };
   const std::size_t triangles = source_.triangles.size();
   // A quad's corner is one of four; triangulated() makes abc and acd of it.
@@ -127,8 +141,10 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
   std::vector<std::size_t> to;
   for (const MeshAttribute& attribute : source_.attributes) {
     const auto same = [&](const MeshAttribute& a) { return a.name == attribute.name; };
+    // An attribute that the piece has already is its own (`surface`, `cutter`, `neighbour`) and stays.
     const auto there = std::find_if(piece.attributes.begin(), piece.attributes.end(), same);
-    // Those of points go into the corners, too, where seams need values of their own.
+    // Texture coordinates alone are merged: those of the source's points, too, go into the piece's corners,
+    // where seams need values of their own.
     const bool fills_uv = attribute.name == "uv" && attribute.domain != AttributeDomain::polygon &&
                           attribute.components == 2 && attribute.values.index() == 0;
     if (there != piece.attributes.end() && !fills_uv) continue;
@@ -137,6 +153,8 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
     if (there == piece.attributes.end())
       piece.attributes.push_back(empty_like(attribute, elements[static_cast<std::size_t>(attribute.domain)]));
   }
+  // Elements are independent of one another, and each is written by one thread: any order gives the same
+  // values.
   constexpr std::size_t kChunk = 256;
   const auto in_chunks = [&](std::size_t n, auto&& f) {
     parallel_blocks((n + kChunk - 1) / kChunk, context, [&](std::size_t chunk) {
@@ -155,6 +173,8 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
   in_chunks(piece.triangles.size(), [&](std::size_t i) {
     if (surface[i] != 0) return;
     const Triangle& own = piece.triangles[i];
+    // One polygon of the source for all three corners: were each corner to look for its own, a triangle
+    // beside a seam of the source's texture might take corners from both sides of it.
     const std::uint32_t t = tree_->nearest((local(own[0]) + local(own[1]) + local(own[2])) / 3.0);
     for (std::size_t a = 0; a < from.size(); ++a) {
       MeshAttribute& target = piece.attributes[to[a]];

@@ -12,28 +12,32 @@
 
 namespace hermesh {
 
-/// Normal of the plane between the piece and its neighbour of that number, or nothing; see
-/// Cutters::plane_between().
+/// A function that gives the normal of the plane between a piece and its neighbour of that number, or
+/// nothing, as Cutters::plane_between() does.
 using PlaneOfNeighbour = std::function<std::optional<Eigen::Vector3d>(std::int32_t neighbour)>;
 
-/// Adds "uv" of corners: for cut polygons (attribute `surface`) the coordinates, in world units relative to
-/// the mesh's origin, along two axes at right angles in the plane between the two pieces, so that nothing is
-/// stretched; where there is no such plane, the two coordinates other than the one along which the triangle's
-/// normal is greatest. Both depend on places and on the two pieces' cutters alone, so both sides of a seam
-/// have the same, and a point keeps its own when the resolution changes. Original polygons get (0, 0).
+/// Adds the corner attribute "uv": for cut polygons (attribute `surface`) the coordinates, in world units
+/// relative to the mesh's origin, along two axes at right angles in the plane between the two pieces, so that
+/// nothing is stretched; where there is no such plane, the two coordinates other than the one along which the
+/// triangle's normal is greatest. The coordinates depend on places and on the two pieces' cutters alone, so
+/// both sides of a seam have the same, and a point keeps its own when the resolution changes. Original
+/// polygons get (0, 0). @throws Error if the piece lacks the attributes `surface` and `neighbour` of
+/// piece_mesh().
 void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane);
 
 /// Carries the attributes of the original over to the original polygons of pieces, from the nearest of its
-/// polygons: those of polygons from the one nearest to the middle of the triangle, those of its corners from
-/// that one's nearest point to each corner, those of points from the polygon nearest to each point. Floats
-/// are interpolated, whole numbers taken from the nearest corner. Cut polygons and their corners get 0, whole
-/// numbers −1; points of the cuts take the nearest polygon's, as the rims must. "uv", of corners or of
-/// points, goes into the corners that add_cut_uv() made.
+/// polygons. An attribute of polygons is taken from the polygon nearest to the middle of the triangle, one of
+/// corners from that polygon's nearest point to each corner, one of points from the polygon nearest to each
+/// point. Floats are interpolated, whole numbers are taken from the nearest corner. Cut polygons and their
+/// corners get 0, or −1 of whole numbers; points of cuts take the values of the nearest polygon, as rims
+/// must. The attribute "uv", of corners or of points, goes into the corners that add_cut_uv() made.
 class SourceAttributes {
  public:
-  /// The mesh has to outlive it. `voxel_size` in world units, as the scale of distances.
+  /// The source has to outlive this object. `voxel_size` (world units) is the scale of distances.
   SourceAttributes(const PolygonMesh& source, double voxel_size);
   ~SourceAttributes();
+  /// Adds the source's attributes to a piece as piece_mesh() makes it. The same values at any thread count.
+  /// @throws Error if the piece lacks the attribute `surface`; Cancelled.
   void add_to(PolygonMesh& piece, RunContext& context) const;
 
  private:

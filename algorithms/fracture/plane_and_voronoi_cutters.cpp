@@ -21,6 +21,7 @@ class Places {
   explicit Places(const IndexToWorld& placement) : placement_(placement) {}
 
   Vector3d operator()(const At& at, const Vector3d& step = Vector3d::Zero()) const {
+    // Differences from the base are small and exact, wherever in the world the lattice lies.
     Vector3d index = step;
     for (int a = 0; a < 3; ++a) index[a] += double(at[a]) - double(placement_.base[a]);
     return placement_.local(index) + placement_.origin;
@@ -29,10 +30,13 @@ class Places {
     return {lower[0] + (i >> 6), lower[1] + ((i >> 3) & 7), lower[2] + (i & 7)};
   }
 
-  /// No sample of a block is farther from its middle, in world units.
+  /// A bound, in world units, of the distance from a block's middle to its samples: the middle is 3.5 voxels
+  /// away from them along each axis, and the triangle inequality holds for any affine map.
   double block_radius() const { return 3.5 * placement_.linear.colwise().norm().sum(); }
   double edge_length(int axis) const { return placement_.linear.col(axis).norm(); }
 
+  /// A crossing at `offset` of an edge; the normal need not be of unit length, and if it vanishes the edge's
+  /// direction takes its place.
   EdgeCrossing crossing(double offset, const Vector3d& world_normal, int axis) const {
     // The transposed map turns covectors of the world into those of the grid.
     Vector3d n = placement_.linear.transpose() * world_normal;
@@ -45,6 +49,8 @@ class Places {
   IndexToWorld placement_;
 };
 
+/// The parts of space between planes: bit k of a code is set where a sample lies on plane k or on the side
+/// that the plane's normal points to.
 class PlaneCutters : public Cutters {
  public:
   PlaneCutters(std::vector<CuttingPlane> planes, const IndexToWorld& placement)
@@ -56,6 +62,7 @@ class PlaneCutters : public Cutters {
       const double length = plane.normal.norm();
       if (!(length > 0) || !std::isfinite(length) || !std::isfinite(plane.distance))
         throw Error("a cutting plane has a normal of no length or a number that is not finite");
+      // With a unit normal value() is a distance in world units, to be compared with block_radius().
       plane.normal /= length;
       plane.distance /= length;
     }
@@ -66,6 +73,8 @@ class PlaneCutters : public Cutters {
     const Vector3d middle = places_(lower, Vector3d::Constant(3.5));
     for (std::size_t k = 0; k < planes_.size(); ++k) {
       const CutCode bit = CutCode{1} << k;
+      // A plane that passes the block by has all 512 samples on one side. The bound is exceeded by far more
+      // than rounding may do.
       if (const double off = value(k, middle); std::abs(off) > places_.block_radius() * 1.001) {
         if (off > 0)
           for (CutCode& code : codes) code |= bit;
@@ -77,10 +86,13 @@ class PlaneCutters : public Cutters {
   }
 
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override {
+    // Planes whose side differs, the lowest first. Sides are told as in codes(), so between the samples' own
+    // codes the first plane crosses the edge; codes of other samples may have none that does.
     for (CutCode left = first ^ second; left != 0; left &= left - 1) {
       const auto k = static_cast<std::size_t>(std::countr_zero(left));
       const double a = value(k, places_(at)), b = value(k, places_(at, Vector3d::Unit(axis)));
       if ((a >= 0) == (b >= 0)) continue;
+      // The distance is linear along the edge; a and b have different signs, so the offset lies from 0 to 1.
       return CutCrossing{places_.crossing(a / (a - b), planes_[k].normal, axis),
                          static_cast<std::int32_t>(k)};
     }
@@ -110,6 +122,7 @@ class PlaneCutters : public Cutters {
     return "sides " + sides;
   }
   std::optional<Vector3d> plane_between(CutCode first, CutCode second) const override {
+    // Parts that differ in the sides of several planes meet in no one plane.
     if (std::popcount(first ^ second) != 1) return std::nullopt;
     return planes_[static_cast<std::size_t>(std::countr_zero(first ^ second))].normal;
   }
@@ -123,6 +136,7 @@ class PlaneCutters : public Cutters {
   std::vector<CuttingPlane> planes_;
 };
 
+/// The cells of a Voronoi diagram: a code is the number of the seed nearest to the displaced sample.
 class VoronoiCutters : public Cutters {
  public:
   VoronoiCutters(std::vector<Vector3d> seeds, const Displacement& displacement, const IndexToWorld& placement)
@@ -133,6 +147,7 @@ class VoronoiCutters : public Cutters {
   void codes(const At& lower, std::span<CutCode, 512> codes) const override {
     const std::vector<std::uint32_t> near = candidates(lower);
     if (near.size() == 1) return std::fill(codes.begin(), codes.end(), near.front());
+    // Candidates ascend and only a smaller distance replaces one, so of equal distances the lower seed wins.
     for (int i = 0; i < 512; ++i) {
       const Vector3d x = displaced(places_(Places::sample(lower, i)));
       std::uint32_t best = near.front();
@@ -147,10 +162,16 @@ class VoronoiCutters : public Cutters {
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override {
     const Vector3d across = seeds_[second] - seeds_[first];
     const auto value = [&](double t) { return beyond(places_(at, t * Vector3d::Unit(axis)), first, second); };
+    // The wall lies between the two if the first seed is nearer at the first end and the second at the other.
+    // A third seed may be nearer than both in between; the wall of these two is taken all the same.
     const double a = value(0.0), b = value(1.0);
     if (!(a <= 0 && b >= 0 && b > a)) return std::nullopt;
     const auto cutter = static_cast<std::int32_t>(std::min(first, second));
+    // Without displacement the difference of squared distances is linear along the edge.
     if (displacement_.amplitude == 0) return CutCrossing{places_.crossing(a / (a - b), across, axis), cutter};
+    // Displaced, it is not; a bracketing method (TOMS 748: Alefeld, Potra & Shi 1995) needs no derivative and
+    // ends with an interval of kCrossingError or less that still has a change of sign in it. 200 steps are
+    // far more than it takes; they only bound the loop.
     std::uintmax_t steps = 200;
     const auto close = [](double low, double high) { return high - low <= kCrossingError; };
     const auto [low, high] = boost::math::tools::toms748_solve(value, 0.0, 1.0, a, b, close, steps);
@@ -162,6 +183,7 @@ class VoronoiCutters : public Cutters {
   std::optional<CutCrossing> nearest(const At& at, int axis, CutCode first, CutCode second) const override {
     if (first == second) return std::nullopt;
     const Vector3d start = places_(at), next = places_(at, Vector3d::Unit(axis));
+    // Half the difference of the squared distances to the two seeds is the measure of nearness to the wall.
     const bool first_end = std::abs(beyond(start, first, second)) <= std::abs(beyond(next, first, second));
     const Vector3d normal = gradient(first_end ? start : next, seeds_[second] - seeds_[first]);
     return CutCrossing{places_.crossing(first_end ? 0.0 : 1.0, normal, axis),
@@ -173,23 +195,26 @@ class VoronoiCutters : public Cutters {
   std::string name_of(CutCode code) const override { return name(code); }
   std::optional<Vector3d> plane_between(CutCode first, CutCode second) const override {
     if (first == second) return std::nullopt;
+    // From the lower seed to the higher, so that the normal does not depend on the order of the two.
     const auto [low, high] = std::minmax(first, second);
     return (seeds_[high] - seeds_[low]).normalized();
   }
 
  private:
+  /// A world position moved by the noise, at most the amplitude along each axis.
   Vector3d displaced(const Vector3d& x) const {
     if (displacement_.amplitude == 0) return x;
     return x + displacement_.amplitude * noise_(x / displacement_.wavelength);
   }
 
-  /// Positive where the second seed is the nearer one.
+  /// Half the squared distance to the first seed less that to the second, of the displaced position: negative
+  /// where the first is nearer, positive where the second is.
   double beyond(const Vector3d& x, CutCode first, CutCode second) const {
     return (seeds_[second] - seeds_[first]).dot(displaced(x) - 0.5 * (seeds_[second] + seeds_[first]));
   }
 
-  /// Of across · displaced(x), by central differences: the field is smooth, and an error of a millionth harms
-  /// no normal.
+  /// The gradient of across · displaced(x) by x, which is normal to the wall there; by central differences,
+  /// for the field is smooth and an error of a millionth harms no normal.
   Vector3d gradient(const Vector3d& x, const Vector3d& across) const {
     if (displacement_.amplitude == 0) return across;
     const double step = 1e-4 * displacement_.wavelength;
@@ -204,7 +229,10 @@ class VoronoiCutters : public Cutters {
   /// Seeds that may be nearest to a sample of the block, ascending.
   std::vector<std::uint32_t> candidates(const At& lower) const {
     const Vector3d middle = places_(lower, Vector3d::Constant(3.5));
-    // Each component of the displacement is at most the amplitude.
+    // A displaced sample is at most r = block_radius() + √3 · amplitude from the middle, for each component
+    // of the displacement is at most the amplitude. Its nearest seed is no farther from it than the seed
+    // nearest to the middle, hence no farther from the middle than that one by more than 2r; 1.001 covers
+    // rounding.
     const double slack = 2.0 * 1.001 * (places_.block_radius() + std::sqrt(3.0) * displacement_.amplitude);
     double least = std::numeric_limits<double>::infinity();
     for (const Vector3d& seed : seeds_) least = std::min(least, (seed - middle).squaredNorm());

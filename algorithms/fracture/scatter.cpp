@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Inside samples, all equally likely.
+/// Draws inside samples, all equally likely, without a list of them: only sums by block are kept.
 class InsideSamples {
  public:
   explicit InsideSamples(const LabelledSolid& solid) : solid_(solid), first_(solid.blocks.size() + 1) {
@@ -20,10 +20,15 @@ class InsideSamples {
   }
   std::uint64_t size() const { return first_.back(); }
 
+  /// A world position within half a voxel, along each axis, of a random inside sample; beside the surface it
+  /// may lie outside the solid by that much.
   Vector3d place(Random& random) const {
     const std::uint64_t wanted = random.below(size());
+    // The last block whose first sample is not beyond the wanted one; blocks without inside samples are
+    // passed over, for the next one begins with the same number.
     const auto b =
         static_cast<std::size_t>(std::upper_bound(first_.begin(), first_.end(), wanted) - first_.begin()) - 1;
+    // Then the sample by its rank within the block.
     std::uint64_t left = wanted - first_[b];
     int sample = 0;
     for_each_bit(solid_.blocks[b].inside, [&](int i) {
@@ -45,6 +50,8 @@ class InsideSamples {
 
 std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, const ScatterOptions& options,
                               RunContext& context) {
+  // More candidates make the spacing more even, and cost as much more: each is compared with all places so
+  // far. The tries end a search in a density that accepts next to nothing.
   constexpr int kCandidates = 24;
   constexpr int kTries = 100'000;
   const Stage stage(context, "scatter");
@@ -62,13 +69,18 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
       if (++tries > kTries) break;
       const Vector3d place = samples.place(random);
       const double density = options.density ? options.density(place) : 1.0;
+      // Accepted in proportion to the density. The generator is asked for one number after the other in this
+      // thread alone, so the seed decides everything.
       if (!(density > 0) || random.uniform() >= density) continue;
       ++candidate;
       double nearest = std::numeric_limits<double>::infinity();
       for (const Vector3d& other : places) nearest = std::min(nearest, (other - place).squaredNorm());
+      // Where places are to be n times as dense, their spacing is smaller by the cube root of n; scaled by
+      // it, distances compare between dense parts and sparse ones.
       nearest = std::sqrt(nearest) * std::cbrt(density);
       if (nearest > farthest) farthest = nearest, best = place;
     }
+    // Nothing was accepted, or only places that are taken already: so all places differ.
     if (!(farthest > 0))
       throw Error("only " + std::to_string(places.size()) + " of " + std::to_string(count) +
                   " places could be scattered: the density is nowhere above 0 inside the solid, or too low");

@@ -14,9 +14,11 @@ using Eigen::Vector3d;
 Vector3d closest_on_segment(const Vector3d& a, const Vector3d& b, const Vector3d& p) {
   const Vector3d ab = b - a;
   const double squared = ab.squaredNorm();
+  // A side without length is its first corner.
   return squared > 0.0 ? Vector3d(a + ab * std::clamp((p - a).dot(ab) / squared, 0.0, 1.0)) : a;
 }
 
+/// The nearest point of the three sides, for triangles without an area to speak of.
 Vector3d closest_on_border(const GridTriangle& t, const Vector3d& p) {
   Vector3d best = closest_on_segment(t[0], t[1], p);
   for (const Vector3d& q : {closest_on_segment(t[1], t[2], p), closest_on_segment(t[2], t[0], p)})
@@ -24,6 +26,7 @@ Vector3d closest_on_border(const GridTriangle& t, const Vector3d& p) {
   return best;
 }
 
+/// Merges a block of a later subset into that of an earlier one, which wins where distances are equal.
 void merge_block(BandBlock& into, const BandBlock& from) {
   into.boundary = either(into.boundary, from.boundary);
   into.set = either(into.set, from.set);
@@ -36,7 +39,8 @@ void merge_block(BandBlock& into, const BandBlock& from) {
 
 }  // namespace
 
-/// Ericson, Real-Time Collision Detection, §5.1.5.
+/// Tells by the Voronoi regions of the corners, sides and inside where the nearest point is (Ericson, Real-Time
+/// Collision Detection, §5.1.5).
 Vector3d closest_point(const GridTriangle& triangle, const Vector3d& p) {
   const auto& [a, b, c] = triangle;
   const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -64,6 +68,8 @@ std::int32_t Band::find_or_add(const Voxel& lower) {
 void Band::merge(Band other, const RunContext& context) {
   for (std::unique_ptr<BandBlock>& theirs : other.blocks_) {
     context.check();
+    // Blocks that only the other grid has move over whole; each that was merged is freed at once, so that memory does
+    // not double.
     const auto [entry, is_new] = numbers_.try_emplace(theirs->lower, size());
     if (is_new) {
       blocks_.push_back(std::move(theirs));
@@ -78,6 +84,8 @@ void Band::link(std::int32_t first, const RunContext& context) {
   parallel_blocks(std::size_t(size() - first), context, [&](std::size_t i) {
     BandBlock& own = *blocks_[first + std::int32_t(i)];
     for (int slot = 0; slot < 27; ++slot) {
+      // Lookups only read the map, and each thread writes to its own block. The other direction, below, is for one
+      // thread, for an old block may have several new neighbours.
       const auto there =
           numbers_.find({own.lower[0] + 8 * (slot / 9 - 1), own.lower[1] + 8 * (slot / 3 % 3 - 1),
                          own.lower[2] + 8 * (slot % 3 - 1)});
@@ -86,6 +94,7 @@ void Band::link(std::int32_t first, const RunContext& context) {
   });
   for (std::int32_t number = first; number < size(); ++number)
     for (int slot = 0; slot < 27; ++slot)
+      // Slot 26 − s is opposite to slot s.
       if (const std::int32_t there = blocks_[number]->neighbours[slot]; there != kNoBlock)
         blocks_[there]->neighbours[26 - slot] = number;
 }
@@ -94,6 +103,7 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
   const BlockMask* masks[27];
   static constexpr BlockMask kEmpty{};
   for (int slot = 0; slot < 27; ++slot) {
+    // Slot 13 is the block itself. A neighbour that is not there has no voxel set.
     const std::int32_t number = slot == 13 ? kNoBlock : block.neighbours[slot];
     masks[slot] = number == kNoBlock ? &kEmpty : &(band.block(number).*mask);
   }
@@ -104,6 +114,7 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
         const BlockMask& m = *masks[neighbour_slot(x >> 3, y >> 3, dz)];
         return std::uint32_t(m[x & 7] >> (8 * (y & 7))) & 0xff;
       };
+      // Ten voxels along z in one word: the neighbour's last, this block's eight, the other neighbour's first.
       rows_[x + 1][y + 1] = bits(-1) >> 7 | bits(0) << 1 | (bits(1) & 1) << 9;
     }
 }
@@ -111,6 +122,7 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
 void PaddedMask::set_inner(const BlockMask& mask) {
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
+      // 0x201 are the two bits of the neighbours.
       std::uint32_t& r = rows_[x + 1][y + 1];
       r = (r & 0x201) | (std::uint32_t(mask[x] >> (8 * y)) & 0xff) << 1;
     }
@@ -121,6 +133,7 @@ BlockMask PaddedMask::face_neighbours() const {
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
       const std::uint32_t straight = row(x - 1, y) | row(x + 1, y) | row(x, y - 1) | row(x, y + 1);
+      // A bit is set where one of its six neighbours has it; shifts are steps along z.
       const std::uint32_t bits = straight | row(x, y) >> 1 | row(x, y) << 1;
       result[x] |= std::uint64_t((bits >> 1) & 0xff) << (8 * y);
     }
@@ -132,6 +145,7 @@ BlockMask PaddedMask::face_and_edge_neighbours() const {
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
       const std::uint32_t straight = row(x - 1, y) | row(x + 1, y) | row(x, y - 1) | row(x, y + 1);
+      // Eighteen neighbours: 4 straight and 4 diagonal in the layer, and 5 above and below each.
       const std::uint32_t diagonal =
           row(x - 1, y - 1) | row(x - 1, y + 1) | row(x + 1, y - 1) | row(x + 1, y + 1);
       const std::uint32_t slanted = straight | row(x, y);  // these count a step along z to either side

@@ -11,9 +11,10 @@ struct Limits {
   double exterior, interior;
 };
 
-/// True if a voxel of the mask at slot's side of the block has a neighbour in that slot's block.
+/// Whether a voxel of the mask, on the block's side towards slot, has a neighbour in that slot's block.
 bool reaches(const BlockMask& mask, int slot) {
   constexpr std::uint64_t kAll = ~std::uint64_t(0);
+  // Rows are y, columns z, in a word of one x: first, all, or last.
   constexpr std::uint64_t kRows[3] = {0xff, kAll, kAll - (kAll >> 8)};
   constexpr std::uint64_t kColumns[3] = {0x0101010101010101u, kAll, 0x8080808080808080u};
   const std::uint64_t bits = kRows[slot / 3 % 3] & kColumns[slot % 3];
@@ -23,7 +24,8 @@ bool reaches(const BlockMask& mask, int slot) {
   return found != 0;
 }
 
-/// Makes the blocks that the neighbours of the last layer lie in.
+/// Makes the blocks that the neighbours of the last layer lie in. One thread does, in the order of the blocks, so
+/// that numbers are the same on every run.
 void add_blocks(Band& band, const RunContext& context) {
   const std::int32_t before = band.size();
   for (std::int32_t number = 0; number < before; ++number) {
@@ -31,6 +33,7 @@ void add_blocks(Band& band, const RunContext& context) {
     const BandBlock& block = band.block(number);
     if (!any(block.layer)) continue;
     for (int slot = 0; slot < 27; ++slot) {
+      // Neighbours share a face or an edge; across a corner none is reached.
       const bool corner = slot / 9 != 1 && slot / 3 % 3 != 1 && slot % 3 != 1;
       if (slot == 13 || corner || block.neighbours[slot] != kNoBlock || !reaches(block.layer, slot)) continue;
       const Voxel& lower = block.lower;
@@ -41,12 +44,15 @@ void add_blocks(Band& band, const RunContext& context) {
   band.link(before, context);
 }
 
+/// One layer of §5.5. Limits are squares of the widths.
 struct Expansion {
   Band& band;
   const Triangles& triangles;
   Limits limits;
 
-  /// Algorithm 5. Writes a distance only where none is set, which nobody reads.
+  /// Adds a voxel as algorithm 5 does: by the triangle of the neighbour that is nearest to the surface, whether or
+  /// not that triangle is the nearest to the voxel. Threads write distances only where none is set, which nobody
+  /// reads.
   void add_voxel(BandBlock& block, int sample) const {
     Place closest{nullptr, 0};
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -66,6 +72,8 @@ struct Expansion {
     if (outside) add(block.found_outside, sample);
   }
 
+  /// Tries the voxels around the last layer. What is found waits until all blocks are done, so that a layer sees only
+  /// the layers before it.
   void find_voxels(BandBlock& block) const {
     block.found = block.found_outside = {};
     const BlockMask near = PaddedMask(band, block, &BandBlock::layer).face_and_edge_neighbours();
@@ -73,7 +81,7 @@ struct Expansion {
   }
 };
 
-/// What was found becomes the last layer.
+/// Makes what was found the last layer.
 void take_layer(BandBlock& block) {
   block.layer = block.found;
   block.set = either(block.set, block.found);
@@ -89,6 +97,7 @@ void expand(Band& band, const Triangles& triangles, double exterior, double inte
                     [&](std::size_t i) { f(band.block(std::int32_t(i))); });
   };
   const Expansion expansion{band, triangles, {exterior * exterior, interior * interior}};
+  // "In the initial step all non-boundary voxels are visited."
   for_each_block([](BandBlock& block) { block.layer = without(block.set, block.boundary); });
   const double layers = std::max(exterior, interior);
   bool more = true;

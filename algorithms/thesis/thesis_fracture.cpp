@@ -17,7 +17,8 @@ namespace {
 using At = Cutters::At;
 using Codes = std::array<CutCode, 512>;
 
-/// All blocks of a box around the object, those of the outermost layer being outside of every solid.
+/// A part of space as a solid: all blocks of a box around the object, those of the outermost layer being outside of
+/// every solid.
 class CodeSolid {
  public:
   CodeSolid(const FloatHermite& object, const Cutters& cutters, CutCode code)
@@ -31,12 +32,15 @@ class CodeSolid {
         upper[a] = std::max(upper[a], leaf.lower[a]);
       }
     for (int a = 0; a < 3; ++a) {
+      // Two blocks beyond the object's on every side: an empty layer, which closes the solid, and one between it and
+      // the object, so that the closing faces cut nothing of the object.
       first_[a] = lower[a] - 16;
       size_[a] = (upper[a] - lower[a]) / 8 + 5;
     }
     masks_.resize(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]));
   }
 
+  /// Signs of all blocks first, since an edge at a block's upper side needs those of the next block; then crossings.
   FloatHermite run(RunContext& context) {
     parallel_blocks(masks_.size(), context, [&](std::size_t b) {
       if (is_border(b)) return;
@@ -54,6 +58,7 @@ class CodeSolid {
     });
     FloatHermite result;
     result.placement = placement_;
+    // Blocks in lexicographic order, as SparseHermite has them; each was one thread's.
     for (std::size_t b = 0; b < masks_.size(); ++b) {
       if (crossings[b].empty()) continue;
       leaves[b].first = static_cast<std::uint32_t>(result.crossings.size());
@@ -64,15 +69,18 @@ class CodeSolid {
   }
 
  private:
+  /// Place of a block in the box, in blocks.
   std::array<std::int32_t, 3> place(std::size_t b) const {
     const auto y = static_cast<std::size_t>(size_[1]), z = static_cast<std::size_t>(size_[2]);
     return {static_cast<std::int32_t>(b / (y * z)), static_cast<std::int32_t>(b / z % y),
             static_cast<std::int32_t>(b % z)};
   }
+  /// Index coordinates of a block's first sample.
   At lower_of(std::size_t b) const {
     const auto p = place(b);
     return {first_[0] + 8 * p[0], first_[1] + 8 * p[1], first_[2] + 8 * p[2]};
   }
+  /// Whether a block is of the outermost layer.
   bool is_border(std::size_t b) const {
     const auto p = place(b);
     for (int a = 0; a < 3; ++a)
@@ -80,6 +88,7 @@ class CodeSolid {
     return false;
   }
 
+  /// A block's signs, with those of the first samples beyond its upper sides.
   SignLeaf leaf_at(std::size_t b) const {
     SignLeaf leaf{lower_of(b), 0, masks_[b], {}};
     const std::size_t steps[3] = {std::size_t(size_[1]) * std::size_t(size_[2]), std::size_t(size_[2]), 1};
@@ -89,7 +98,9 @@ class CodeSolid {
     return leaf;
   }
 
+  /// The crossings of a block's edges by axis and sample, as Hermite data is ordered.
   std::vector<EdgeCrossing> crossings_of(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges) const {
+    // Codes of the block itself, last, and of its upper neighbour along each axis.
     std::array<Codes, 4> codes;
     cutters_.codes(leaf.lower, codes[3]);
     std::vector<EdgeCrossing> result;
@@ -109,7 +120,8 @@ class CodeSolid {
     return result;
   }
 
-  /// The normal looks out of the solid. Where the box cuts it off there is no crossing to ask for.
+  /// A crossing, whose normal looks out of the solid. Where the box cuts the solid off there is no crossing to ask
+  /// for; the middle of the edge will do.
   EdgeCrossing crossing(const SignLeaf& leaf, int sample, int axis, CutCode first, CutCode second) const {
     const At at{leaf.lower[0] + (sample >> 6), leaf.lower[1] + ((sample >> 3) & 7),
                 leaf.lower[2] + (sample & 7)};
@@ -118,6 +130,8 @@ class CodeSolid {
     if (first != second)
       if (const auto found = cutters_.crossing(at, axis, first, second)) result = found->crossing;
     const bool inside_first = test(leaf.inside, sample);
+    // From inside to outside the normal points along the edge, from outside to inside against it. A cutter does not
+    // know which of its sides the solid is on.
     if ((result.normal[axis] >= 0) != inside_first)
       for (float& n : result.normal) n = -n;
     return result;
@@ -131,6 +145,7 @@ class CodeSolid {
   std::vector<BlockMask> masks_;
 };
 
+/// Meshes a piece by itself: along a rim its points need not be those of the next piece.
 PolygonMesh meshed(const FloatHermite& piece, double threshold, RunContext& context) {
   if (piece.leaves.empty()) return {};
   if (threshold > 0) return adaptive_dual_contouring(piece, {.threshold = threshold}, nullptr, context);
@@ -153,6 +168,7 @@ std::vector<CutCode> codes_within(const FloatHermite& object, const Cutters& cut
 void thesis_fracture(const FloatHermite& object, const Cutters& cutters, double threshold,
                      const std::function<void(ThesisPiece&&)>& hand_over, RunContext& context) {
   FloatHermite rest = object;
+  // Solids have Hermite data of their own; planes and cells of seeds are made into solids code by code.
   const bool solids = cutters.count() > 0 && !cutters.plane_sides() && cutters.signs(0, {}).has_value();
   std::vector<CutCode> codes = codes_within(object, cutters, context);
   if (solids) {  // each is a solid of its own, and what is left is no cutter's
@@ -164,13 +180,16 @@ void thesis_fracture(const FloatHermite& object, const Cutters& cutters, double 
     ThesisPiece piece;
     piece.name = cutters.name_of(codes[i]);
     Stopwatch watch;
+    // The first step of §7.1: the cutter as a Hermite grid.
     const FloatHermite* solid = solids ? cutters.solid(codes[i]) : nullptr;
     FloatHermite made;
     if (!solids) made = solid_of_code(object, cutters, codes[i], context);
+    // The watch gives lap times, so that each step has its own.
     piece.conversion_seconds = watch.seconds();
     FloatHermite taken;
     if (!solids) solid = &made;
     if (solid) {
+      // The second and the third: what is left is the object from now on.
       taken = combine(Boolean::intersect, rest, *solid, context);
       rest = combine(Boolean::subtract, rest, *solid, context);
     }

@@ -18,22 +18,26 @@
 
 namespace hermesh {
 
+/// A piece, and what it took to make it.
 struct ThesisPiece {
   std::string name;
   PolygonMesh mesh;  ///< empty where the cutter takes nothing
   double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
 };
 
-/// The part of space with that code as a solid, cut off by a box two blocks around the object, where the
+/// Makes the part of space with that code into a solid, cut off by a box two blocks around the object, where the
 /// object is not.
+/// @throws Cancelled
 FloatHermite solid_of_code(const FloatHermite& object, const Cutters& cutters, CutCode code,
                            RunContext& context);
 
-/// Codes that samples of the object have, ascending.
+/// The codes that samples of the object have, ascending.
+/// @throws Cancelled
 std::vector<CutCode> codes_within(const FloatHermite& object, const Cutters& cutters, RunContext& context);
 
-/// `threshold` is that of adaptive_dual_contouring.h, in square voxels; 0 meshes by uniform dual contouring.
-/// Each piece is handed over as it is made. @throws Cancelled
+/// Breaks the object along the cutters. `threshold` is that of adaptive_dual_contouring.h, in square voxels; 0 meshes
+/// by uniform dual contouring. Each piece is handed over as it is made, and what no cutter takes in the end.
+/// @throws Cancelled
 void thesis_fracture(const FloatHermite& object, const Cutters& cutters, double threshold,
                      const std::function<void(ThesisPiece&&)>& hand_over, RunContext& context);
 

@@ -17,14 +17,15 @@ using Eigen::Vector3d;
 
 // ---- §5.3, the outer shell.
 
-/// Sample at step k along an axis, on line (u,v) of a block.
+/// The sample at step k along an axis, on line (u, v) of a block.
 int sample_on_line(int axis, int u, int v, int k) {
   std::array<int, 3> local;
   local[axis] = k, local[(axis + 1) % 3] = u, local[(axis + 2) % 3] = v;
   return sample_index(local[0], local[1], local[2]);
 }
 
-/// Marks the first voxel of every line along a column of blocks, unless it is a boundary voxel.
+/// Marks the first voxel with a distance of every line along a column of blocks, unless it is a boundary voxel. Each
+/// of the 64 lines has a bit in `pending` until its first voxel is met.
 template <class Iterator>
 void mark_first_voxels(Band& band, int axis, bool backwards, Iterator begin, Iterator end) {
   std::uint64_t pending = ~std::uint64_t(0);
@@ -43,12 +44,15 @@ void mark_first_voxels(Band& band, int axis, bool backwards, Iterator begin, Ite
   }
 }
 
+/// Marks where the flood begins, from both ends of every grid line along an axis.
 void mark_seeds(Band& band, int axis, const RunContext& context) {
   std::vector<std::pair<Voxel, std::int32_t>> order(band.size());
   parallel_blocks(order.size(), context, [&](std::size_t i) {
     const Voxel& lower = band.block(std::int32_t(i)).lower;
     order[i] = {{lower[(axis + 1) % 3], lower[(axis + 2) % 3], lower[axis]}, std::int32_t(i)};
   });
+  // Sorted by line and then along it, the blocks of a column are consecutive, and columns share no block: each is one
+  // thread's.
   tbb::parallel_sort(order.begin(), order.end());
   std::vector<std::size_t> columns;  // where each begins
   for (std::size_t i = 0; i < order.size(); ++i)
@@ -65,6 +69,7 @@ void mark_seeds(Band& band, int axis, const RunContext& context) {
 
 /// Lets the outside grow within a block, and from its neighbours into it. True if it grew.
 bool flood_block(const Band& band, BandBlock& block) {
+  // The boundary voxels are the wall that restricts the flood.
   const BlockMask open = without(block.set, block.boundary), before = block.outside;
   PaddedMask outside(band, block, &BandBlock::outside);
   while (true) {
@@ -75,6 +80,8 @@ bool flood_block(const Band& band, BandBlock& block) {
   }
 }
 
+/// Floods block by block, and looks again at the blocks next to one that changed, until none changes. The outside
+/// only grows, so that the end is the same in any order.
 void flood(Band& band, const RunContext& context) {
   std::deque<std::int32_t> queue;
   std::vector<bool> queued(band.size(), true);
@@ -95,16 +102,20 @@ void flood(Band& band, const RunContext& context) {
 
 // ---- §5.3, boundary voxels.
 
+/// The rule of §5.3 for boundary voxels.
 struct BoundarySigns {
   Band& band;
   const Triangles& triangles;
   double cosine;  ///< of the sign angle
 
+  /// The vector from a voxel's centre to its closest point, made again from its triangle.
   Vector3d to_surface(const BandBlock& block, int sample) const {
     const Vector3d p = centre(block.voxel(sample));
     return closest_point(triangles[block.triangle[sample]], p) - p;
   }
 
+  /// Whether the vector of a neighbour that the flood marked makes an angle below the sign angle with the voxel's
+  /// own: both then look at the surface from one side.
   bool is_outside(const BandBlock& block, int sample) const {
     Vector3d own = Vector3d::Zero();
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -118,6 +129,8 @@ struct BoundarySigns {
     return false;
   }
 
+  /// Judges the boundary voxels of a block by the flood's marks alone. Results wait in `found_outside`, so that no
+  /// voxel sees what was found for another.
   void evaluate(BandBlock& block) const {
     block.found_outside = {};
     for_each_bit(block.boundary, [&](int sample) {

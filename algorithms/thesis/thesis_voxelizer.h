@@ -1,10 +1,10 @@
 // The voxelizer of the thesis, chapter 5 (algorithms 1 to 5) and §3.4: rasterise sampled triangles, flood the
 // outside, clean up what lies inside, expand the band layer by layer.
 //
-// It is kept as printed, with its traps: boundary voxels that the samples miss, and shells that leak where samples lie
-// halfway between voxels (§5.2), distances that depend on the order of the triangles (algorithm 2), closed cavities that come out filled (§5.3), wrong signs of
-// single voxels next to sharp edges and self-intersections (§5.3), and distances beyond the first band that
-// rest on a neighbour's triangle (algorithm 5).
+// It is kept as printed, with its traps: boundary voxels that the samples miss, and shells that leak where samples
+// lie halfway between voxels (§5.2), distances that depend on the order of the triangles (algorithm 2), closed
+// cavities that come out filled (§5.3), wrong signs of single voxels next to sharp edges and self-intersections
+// (§5.3), and distances beyond the first band that rest on a neighbour's triangle (algorithm 5).
 #pragma once
 
 #include <Eigen/Core>
@@ -16,39 +16,40 @@
 
 namespace hermesh {
 
+/// What the text leaves open, and the order of the triangles, on which its distances depend.
 struct ThesisVoxelizerOptions {
-  /// Degrees, above 0 and at most 180: a boundary voxel is outside if its closest-point vector and that of an
-  /// outside neighbour make a smaller angle.
+  /// The sign angle in degrees, above 0 and at most 180: a boundary voxel is outside if its closest-point vector and
+  /// that of an outside neighbour make a smaller angle.
   double sign_angle = 90.0;
-  /// 0 takes the triangles in the order of the mesh (then the quads' halves); any other seed shuffles them.
+  /// Seed of the triangles' order: 0 takes them as in the mesh (then the quads' halves), any other shuffles them.
   std::uint64_t shuffle_seed = 0;
 };
 
-/// Grid "sdf" of class level set; works on any polygon soup, with any winding. Active voxels lie within the
-/// band of their side; values outside of it are exterior_band and −interior_band voxels in world units. A
-/// note says so when next to nothing is inside. The bytes do not depend on the number of threads.
+/// The level set of any polygon soup, with any winding, as a grid "sdf" of class level set. Active voxels lie within
+/// the band of their side; values outside of it are exterior_band and −interior_band voxels in world units. A note
+/// says so when next to nothing is inside. The bytes do not depend on the number of threads.
 ///
 /// Readings, where the text leaves a choice:
-/// - §5.2, subsets: 32 runs of consecutive triangles, whatever the number of threads. Each is rasterised into
-///   a grid of its own; two neighbouring grids are merged at a time, the smaller distance wins, and of equal
-///   ones the earlier triangle's.
+/// - §5.2, subsets: 32 runs of consecutive triangles, whatever the number of threads. Each is rasterised into a grid
+/// of its own; two neighbouring grids are merged at a time, the smaller distance wins, and of equal ones the earlier
+/// triangle's.
 /// - §5.2, samples: see rasterize_by_samples().
 /// - §5.3, start of the flood: on every grid line along every axis, the first and the last voxel that holds a
-///   distance, unless it is a boundary voxel. A part that no such line sees from outside stays inside.
+/// distance, unless it is a boundary voxel. A part that no such line sees from outside stays inside.
 /// - §5.3, flood: from face to face, through voxels that hold a distance and are not boundary voxels.
-/// - §5.3, boundary voxels (the rule is cut off by a page break): outside if the angle is below sign_angle
-///   for any of the 18 neighbours that the flood marked, as in OpenVDB's meshToVolume; a voxel on the
-///   surface itself, whose vector has no direction, is not.
+/// - §5.3, boundary voxels (the rule is cut off by a page break): outside if the angle is below sign_angle for any of
+/// the 18 neighbours that the flood marked, as in OpenVDB's meshToVolume; a voxel on the surface itself, whose vector
+/// has no direction, is not.
 /// - §5.4: "marked as outside" includes the boundary voxels that the rule above found outside.
-/// - §5.5: N_closest is the neighbour with the least distance, the first of equal ones in the order of
-///   kNeighbours; a layer sees only the layers before it.
+/// - §5.5: N_closest is the neighbour with the least distance, the first of equal ones in the order of kNeighbours; a
+/// layer sees only the layers before it.
 /// - The first band reaches up to 2.3 voxels; what of it lies beyond a narrower band is dropped in the end.
 /// @throws Error for what check_voxelization_fits() refuses, and for a sign_angle out of range; Cancelled
 LevelSet thesis_voxelizer(const VoxelizationInput& input, const ThesisVoxelizerOptions& options = {});
 
 /// Index coordinates of a voxel; its centre is there, and it reaches half a voxel to every side.
 using Voxel = std::array<std::int32_t, 3>;
-/// Corners in index coordinates.
+/// Corners of a triangle in index coordinates.
 using GridTriangle = std::array<Eigen::Vector3d, 3>;
 
 /// The boundary voxels of a triangle as §5.2 finds them, in lexicographic order, each once. With n = d_T, the

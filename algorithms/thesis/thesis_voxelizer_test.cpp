@@ -52,7 +52,7 @@ Eigen::Matrix3d turn() {
       .toRotationMatrix();
 }
 
-/// Six quads with edge 2·half, turned about the origin.
+/// A cube of six quads with edge 2·half, turned about the origin.
 PolygonMesh cube(double half) {
   PolygonMesh mesh;
   for (int i = 0; i < 8; ++i)
@@ -86,7 +86,7 @@ void for_each_voxel(int half, F&& f) {
       for (int z = -half; z <= half; ++z) f(Coord(x, y, z));
 }
 
-/// Same value and same state in every voxel and tile.
+/// Whether two grids have the same value and the same state in every voxel and tile.
 bool same(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
   if (a.tree().leafCount() != b.tree().leafCount() || !a.tree().hasSameTopology(b.tree())) return false;
   auto other = b.cbeginValueAll();

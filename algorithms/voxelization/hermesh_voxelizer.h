@@ -7,13 +7,14 @@ namespace hermesh {
 
 struct VoxelizeOptions;  // voxelize.h
 
-/// What the variant takes: signs = auto | flood-fill | winding-number | unsigned.
+/// Options that the variant declares: signs = auto | flood-fill | winding-number | unsigned.
 std::vector<OptionSpec> hermesh_voxelizer_options();
 
-/// What they ask of voxelize(). An input without options has the defaults.
+/// The input's options in the form that voxelize() takes. An input without options has the defaults.
 VoxelizeOptions voxelize_options(const VoxelizationInput& input);
 
-/// voxelize() with its options. @throws Error as check_voxelization_fits(); Cancelled.
+/// The level set that voxelize() makes of the mesh with the input's options, distances only.
+/// @throws Error as check_voxelization_fits(); Cancelled.
 LevelSet hermesh_voxelizer(const VoxelizationInput& input);
 
 }  // namespace hermesh

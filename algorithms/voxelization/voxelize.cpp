@@ -14,9 +14,8 @@
 namespace hermesh {
 namespace {
 
-/// Where a band is wider than `kWide` voxels, the triangles look for the voxels within `kNear` alone, which
-/// is as far as they get by looking at the blocks next to theirs, and each voxel beyond looks for its
-/// triangle.
+/// Where a band is wider than `kWide` voxels, the triangles look for the voxels within `kNear` alone, which is as far
+/// as they get by looking at the blocks next to theirs, and each voxel beyond looks for its triangle (wide_band.h).
 constexpr double kWide = 16.0, kNear = 6.0;
 
 /// Widths of the band in world units.
@@ -30,6 +29,7 @@ struct Widths {
         least(float(kLeastDepth * voxel_size)) {}
 };
 
+/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side.
 void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths,
                const kernels::Kernels& kernels) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
@@ -38,6 +38,7 @@ void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths,
   leaf.setValueMask(mask);
 }
 
+/// A mesh in world units relative to the mesh's origin of triangles in voxels, each with corners of its own.
 PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_size) {
   PolygonMesh mesh;
   for (const TriangleCorners& t : triangles) {
@@ -50,7 +51,8 @@ PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_
   return mesh;
 }
 
-/// Takes the smaller distance of each voxel.
+/// Lowers the leaf's distances to `values`, and activates the voxels that are active there. The inactive voxels of
+/// either hold the reach, which is never the smaller one where the other is active.
 void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
   float* own = leaf.buffer().data();
   for (unsigned i = 0; i < 512; ++i) own[i] = std::min(own[i], values[i]);
@@ -62,6 +64,8 @@ void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
 /// Adds the distances to the caps of the holes, and the blocks that only a cap is near.
 void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band,
               RunContext& context) {
+  // The caps are a mesh of their own with its own blocks; where the mesh has a leaf, too, the two bands merge, and a
+  // voxel keeps its nearest triangle even if the cap is nearer.
   const PolygonMesh caps = to_mesh(signs.caps, voxel_size);
   const IndexSoup soup(caps, voxel_size);
   TriangleBins bins(soup, reach, context);
@@ -75,6 +79,8 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
       lower(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
       continue;
     }
+    // A block that the table has, but without a voxel near the mesh, is there twice from now on; only the new entry
+    // has a leaf.
     band.leaves.push_back(std::move(near_caps.leaves[i]));
     band.blocks.push_back(near_caps.blocks[i]);
     signs.inside.push_back(known != BlockTable::kNone ? VoxelBits(signs.inside[known])
@@ -88,7 +94,8 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
 
 bool has(const VoxelBits& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
 
-/// Gives the voxels inside the values of `other`.
+/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: a way from
+/// outside to an inner sheet passes the solid's boundary first, so the sheet is never the nearest to them.
 void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   for (unsigned i = 0; i < 512; ++i) {
@@ -99,13 +106,15 @@ void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& in
   leaf.setValueMask(mask);
 }
 
-/// Distances of the voxels inside, once more without what does not bound the solid. Leaf by leaf, since all
-/// of the new ones at once could outweigh a small volume.
+/// Computes the distances of the voxels inside once more without what does not bound the solid. It goes leaf by leaf,
+/// since all of the new ones at once could outweigh a small volume.
 InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
                                    BandWork work, Band& band, RunContext& context) {
   InnerSheets sheets =
       find_inner_sheets(soup, bins, band, signs, work.reach, work.voxel_size, context);
   if (sheets.triangles.empty()) return sheets;
+  // First without any triangle that is inner, if only in part. Each call back writes to its own block's leaf, so that
+  // threads need no lock.
   work.blocks = &sheets.blocks;
   work.without = &sheets.triangles;
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
@@ -117,6 +126,8 @@ InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, co
       if (has(inside, v)) (*band.nearest[found.block])[v] = found.nearest[v];
   });
   if (sheets.pieces.triangles.empty()) return sheets;
+  // Then the outer pieces of the triangles that were cut are put back. They lie within their triangles, so that
+  // whatever is within their reach has a block in `bins`.
   const IndexSoup pieces(sheets.pieces, work.voxel_size);
   TriangleBins piece_bins(pieces, work.reach, context);
   work.blocks = work.without = nullptr;
@@ -133,12 +144,14 @@ InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, co
   return sheets;
 }
 
+/// From voxels to world units: sample (0, 0, 0) is at the mesh's origin.
 openvdb::math::Transform::Ptr placement(const PolygonMesh& mesh, double voxel_size) {
   const auto transform = openvdb::math::Transform::createLinearTransform(voxel_size);
   transform->postTranslate(openvdb::Vec3d(mesh.origin.x(), mesh.origin.y(), mesh.origin.z()));
   return transform;
 }
 
+/// The grid of the nearest triangles; its active voxels are those of the band's leaves.
 openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   using IntLeaf = openvdb::Int32Tree::LeafNodeType;
   const auto grid = openvdb::Int32Grid::create(-1);
@@ -153,13 +166,15 @@ openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   return grid;
 }
 
+/// The grid of the distances. It takes the leaves out of the band; one without an active voxel becomes background.
 openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool is_signed) {
   const auto grid = openvdb::FloatGrid::create(widths.exterior);
   for (std::unique_ptr<FloatLeaf>& leaf : band.leaves)
     if (leaf && !leaf->isEmpty()) grid->tree().addLeaf(leaf.release());
   grid->setName(is_signed ? "sdf" : "udf");
   if (!is_signed) return grid;
-  // Leaves are signed already; what is left are the tiles.
+  // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the sign of
+  // the side they lie on, and its width.
   openvdb::tools::signedFloodFillWithValues(grid->tree(), widths.exterior, -widths.interior, true, 1, 1);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return grid;
@@ -172,6 +187,8 @@ struct Boundary {
   std::vector<TriangleCorners> caps;
 };
 
+/// Finds the sides and makes `band` signed. The order matters: the caps come after the inner sheets, whose search
+/// replaces distances by those to the mesh alone; the signs last, once every distance is the least.
 Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, TriangleBins& bins,
               const Widths& widths, Band& band, RunContext& context) {
   const Stage stage(context, "signs");
@@ -193,6 +210,7 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
 BoundaryTriangles boundary_triangles(const IndexSoup& soup, const Boundary& boundary) {
   BoundaryTriangles result;
   result.points = soup.mesh().points;
+  // Both lists ascend, so that one walk finds the triangles that are left.
   auto inner = boundary.sheets.triangles.begin();
   for (std::uint32_t t = 0; t < soup.size(); ++t) {
     if (inner != boundary.sheets.triangles.end() && *inner == t) {
@@ -237,14 +255,17 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   if (options.signs != SignRule::none) {
     boundary = sign(soup, options.signs, work, *bins, Widths(near, options.voxel_size), band, context);
   }
+  // From here on nobody asks for triangles by block; their memory is free before the tree grows.
   bins.reset();
   Voxelization result;
   result.is_signed = boundary.is_signed;
   {
     const Stage stage(context, "tree");
+    // The triangles first: the distances take the leaves away.
     if (options.nearest) result.nearest = assemble_nearest(band);
     result.distance = assemble_distance(band, Widths(wide, options.voxel_size), result.is_signed);
   }
+  // Without signs `near` is as wide as asked.
   if (result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior)) {
     const Stage stage(context, "wide band");
     band = {};
@@ -261,6 +282,7 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
   initialize_openvdb();
+  // What is done when there is no inside: all space is outside, and as wide as the exterior band.
   VoxelizeOptions outside_only = options;
   outside_only.signs = SignRule::none;
   outside_only.interior_band = options.exterior_band;
@@ -269,6 +291,8 @@ Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, R
   const bool is_wide = std::max(wide.exterior, wide.interior) > kWide;
   const BandWidths near = is_wide ? BandWidths{std::min(wide.exterior, kNear), std::min(wide.interior, kNear)} : wide;
   Voxelization result = voxelize_within(mesh, options, near, context);
+  // No inside was found. What is there already is right where the search went as far as the exterior band, no more
+  // and no less.
   if (result.is_signed || (!is_wide && wide.interior == wide.exterior)) return result;
   return voxelize_within(mesh, outside_only, exterior, context);
 }

@@ -11,7 +11,7 @@ namespace hermesh {
 
 /// How a voxel's side is found.
 enum class SignRule {
-  automatic,   ///< flood fill, and winding numbers where the flood leaks in through a hole; says so in a note
+  automatic,   ///< flood fill, or winding numbers where the flood leaks in through a hole, with a note
   flood_fill,  ///< inside is what cannot be reached from infinity: any orientation, cavities filled (Aldén
                ///< §5.3)
   winding_number,  ///< inside is where the generalised winding number is above ½: keeps cavities, closes
@@ -19,30 +19,33 @@ enum class SignRule {
   none             ///< no sign: distance alone
 };
 
+/// What voxelize() is asked for.
 struct VoxelizeOptions {
   double voxel_size = 1.0;     ///< world units
   double exterior_band = 3.0;  ///< voxels, at least 1
   double interior_band = 3.0;  ///< voxels, at least 1
   SignRule signs = SignRule::automatic;
-  bool nearest = false;  ///< also the nearest triangles
+  bool nearest = false;  ///< whether `Voxelization::nearest` is made, too
 };
 
+/// The grids that voxelize() makes, on one lattice.
 struct Voxelization {
-  /// World units, negative inside; a grid named "sdf", or "udf" without signs. Its transform is the voxel
-  /// size and the mesh's origin.
+  /// Distance in world units, negative inside, in a grid named "sdf", or "udf" without signs. Its transform scales by
+  /// the voxel size and moves by the mesh's origin.
   openvdb::FloatGrid::Ptr distance;
+  /// False without signs: none were asked for, or the polygons give no inside.
   bool is_signed = true;
-  /// For each voxel that is active in `distance` the number of the mesh's nearest triangle (as triangulated()
-  /// numbers them), or −1 where only the cap of a hole is near; a grid named "triangle-id" with background
-  /// −1.
+  /// The number of the mesh's nearest triangle (as triangulated() numbers them) for each voxel that is active in
+  /// `distance`, or −1 where only the cap of a hole is near, in a grid named "triangle-id" with background −1. Null
+  /// unless asked for.
   openvdb::Int32Grid::Ptr nearest;
 };
 
-/// A voxel on a polygon is on the side that sample_side.h gives it; inside, its distance is kLeastDepth voxels, so that it
-/// carries a sign. Every voxel nearer to the surface than the band is wide is active, no other, and its value is the distance
-/// to the nearest triangle that bounds the solid, right to 1e-5 voxel. Without signs the exterior band's width counts.
-/// Polygons may come in any order and orientation, twice, degenerate, intersecting, open. The same bytes at any thread count
-/// and any level of vector code.
+/// Narrow band of distances to any polygons: in any order and orientation, twice, degenerate, intersecting, open.
+/// Every voxel nearer to the surface than the band is wide is active, no other, and its value is the distance to the
+/// nearest triangle that bounds the solid, right to 1e-5 voxel. A voxel on a polygon is on the side that
+/// sample_side.h gives it; inside, its distance is kLeastDepth voxels, so that it carries a sign. Without signs the
+/// exterior band's width counts. The bytes are the same at any thread count and any level of vector code.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context);
 

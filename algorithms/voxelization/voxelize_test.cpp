@@ -74,13 +74,13 @@ double at(const Voxelization& v, int x, int y, int z) {
 }
 
 struct Errors {
-  double worst = 0;        ///< of a magnitude, voxels
+  double worst = 0;        ///< largest error of a magnitude, voxels
   std::size_t active = 0;  ///< voxels whose state is wrong by more than the tolerance
   std::size_t checked = 0;
 };
 
-/// Every voxel of the box against the tree: exact in double precision, and independent of blocks and vector
-/// code.
+/// Compares every voxel of the box with the tree of triangles, which is exact in double precision, and independent of
+/// blocks and vector code.
 Errors compare(const PolygonMesh& mesh, const Voxelization& v, double voxel_size, double band, int margin) {
   const std::vector<Triangle> triangles = triangulated(mesh);
   const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
@@ -492,8 +492,8 @@ TEST(Voxelize, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
 }
 
 TEST(Voxelize, APocketThatLooksIntoASharpCreaseFromWithinIsNotOutside) {
-  // A closed prism, inside out, that narrows to a crease on the lattice: a hair off one of the walls there is behind the
-  // other.
+  // A closed prism, inside out, that narrows to a crease on the lattice: a hair off one of the walls there is behind
+  // the other.
   PolygonMesh mesh;
   for (const float z : {-1.3f, 1.3f})
     for (const Vector3f& p : {Vector3f(3.5f, 0, z), Vector3f(3.2f, 0.0685714286f, z), Vector3f(-3.5f, 1.6f, z),

@@ -14,11 +14,13 @@ namespace hermesh::validation {
 Distances sampled_distances(const TriangleSoup& from, const TriangleTree& to, std::int64_t samples,
                             RunContext& context);
 
-/// The same over a list of points with weights; a list of no points gives zeros.
+/// A point that stands for a part of a surface or of its edges, with the size of that part.
 struct WeightedPoint {
   Eigen::Vector3d point;
   double weight;
 };
+/// Distances from a list of points to the surface `to`; mean and rms are weighted. An empty list gives zeros.
+/// @throws Cancelled.
 Distances point_distances(const std::vector<WeightedPoint>& points, const TriangleTree& to,
                           RunContext& context);
 

@@ -10,14 +10,15 @@
 namespace hermesh::validation {
 
 namespace exact {
-/// −1, 0 or 1 by CGAL; slower than orientation() below.
+/// orientation() below by CGAL's exact kernel, which is slower.
 int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                 const Eigen::Vector3d& d);
 }  // namespace exact
 
-/// 1 if abc turns counter-clockwise seen from d, −1 if clockwise, 0 if the four points lie in one plane. The
-/// bound of the filter is Shewchuk's (Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
-/// Predicates, 1997); it does not cover underflow, hence the floor under the permanent.
+/// The exact orientation of four points: 1 if abc turns counter-clockwise seen from d, −1 if clockwise, 0 if
+/// the four points lie in one plane. The bound of the filter is Shewchuk's (Adaptive Precision Floating-Point
+/// Arithmetic and Fast Robust Geometric Predicates, 1997); it does not cover underflow, hence the floor under
+/// the permanent.
 inline int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                        const Eigen::Vector3d& d) {
   const Eigen::Vector3d u = b - a, v = c - a, w = d - a;

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// Of two segments (Ericson, Real-Time Collision Detection, 2005, §5.1.9).
+/// The squared distance of two segments (Ericson, Real-Time Collision Detection, 2005, §5.1.9).
 double squared_distance(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2, const Vector3d& q2) {
   const Vector3d d1 = q1 - p1, d2 = q2 - p2, r = p1 - p2;
   const double a = d1.squaredNorm(), e = d2.squaredNorm(), b = d1.dot(d2), c = d1.dot(r), f = d2.dot(r);

@@ -11,11 +11,12 @@
 
 namespace hermesh::validation {
 
-/// All pairs, by the triangles' numbers, the smaller one first, in increasing order, of which
-///  - no corner is shared, and the triangles come within `reach` of one another;
-///  - one is, and a side opposite to it comes within `reach` of the other triangle;
-///  - two are, and a corner opposite to their edge comes within `reach` of the other triangle;
-///  - all three are.
+/// Finds pairs of triangles that meet or nearly meet, by their numbers, the smaller one first, in increasing
+/// order. A pair is listed if
+///  - the two share no corner and come within `reach` of one another;
+///  - they share one corner, and a side opposite to it comes within `reach` of the other triangle;
+///  - they share two, and a corner opposite to their edge comes within `reach` of the other triangle;
+///  - they share all three.
 /// Corners are shared by number. Faces that lie upon one another but for rounding are such pairs, which exact
 /// predicates (self_intersection.h) would tell apart; a triangle smaller than `reach` may be one with its
 /// neighbours. @throws Cancelled.

@@ -5,6 +5,7 @@
 
 namespace hermesh::validation {
 
+/// Adds a place unless there are kMaxPlaces already.
 inline void add_place(Places& places, const Eigen::Vector3d& point, std::int64_t first,
                       std::int64_t second = -1) {
   if (places.points.size() >= kMaxPlaces) return;
@@ -12,7 +13,7 @@ inline void add_place(Places& places, const Eigen::Vector3d& point, std::int64_t
   places.polygons.push_back({first, second});
 }
 
-/// Appends what `later` holds, up to kMaxPlaces; `places` comes first in the order.
+/// Appends the places of `later` behind those of `places`, up to kMaxPlaces in all.
 inline void append_places(Places& places, const Places& later) {
   for (std::size_t i = 0; i < later.points.size(); ++i)
     add_place(places, later.points[i], later.polygons[i][0], later.polygons[i][1]);

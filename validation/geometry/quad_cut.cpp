@@ -9,9 +9,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Beyond rounding, of a cosine and of a ratio of squared lengths.
+/// The least difference of two cosines, or of a ratio of squared lengths from 1, that is no rounding error.
 constexpr double kAlike = 1e-9;
-/// How far from plane a plane quad may be in a file of single precision, of its longest side.
+/// How far off a plane, as a part of its longest side, a plane quad may be in a file of single precision.
 constexpr double kPlane = 1e-6;
 
 bool is_plane(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
@@ -22,14 +22,14 @@ bool is_plane(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 
 /// One of two ways to cut a quad into two triangles.
 struct Halves {
-  Vector3d first, second;  ///< twice their areas
-  double squared_length;   ///< of the diagonal
+  Vector3d first, second;  ///< normals of the two triangles, of twice their areas
+  double squared_length;   ///< squared length of the diagonal
 
   Halves(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d)
       : first((b - a).cross(c - a)), second((c - a).cross(d - a)), squared_length((c - a).squaredNorm()) {}
 
-  /// The halves add up to the same whole, whichever diagonal parts them. A half that rounding leaves of none
-  /// has no area.
+  /// Whether both halves face with the whole, which is the same for either diagonal. A half that is there by
+  /// rounding alone has no area.
   bool proper() const {
     const Vector3d whole = first + second;
     const double least = kAlike * whole.squaredNorm();

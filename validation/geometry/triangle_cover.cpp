@@ -16,7 +16,7 @@ struct Polygon {
   std::array<Eigen::Vector3d, kMostCorners> corners;
   int count = 0;
 
-  /// False where there is no room.
+  /// Adds a corner; returns false if there is no room.
   bool add(const Eigen::Vector3d& corner) {
     if (count == kMostCorners) return false;
     corners[count++] = corner;
@@ -30,7 +30,7 @@ struct Prism {
   Eigen::Vector3d normal;
   std::array<Eigen::Vector3d, 3> outwards;
 
-  /// False for a triangle whose plane is all rounding.
+  /// Sets the prism of a triangle; returns false for a triangle whose plane is all rounding.
   bool set(const Corners& triangle) {
     corners = triangle;
     std::array<Eigen::Vector3d, 3> sides;
@@ -59,7 +59,7 @@ class Cover {
   bool complete() const { return count_ == 0; }
   double bound() const { return bound_; }
 
-  /// Takes away what is near this triangle; false where that leaves too many parts.
+  /// Takes away all that is near the prism's triangle; returns false if that leaves too many parts.
   bool take(const Prism& prism) {
     // Backwards, for the last part takes the place of one that goes, and new ones need no second look.
     for (int i = count_ - 1; i >= 0; --i) {
@@ -75,7 +75,7 @@ class Cover {
   }
 
  private:
-  /// Whether some of the part is shown to be near; the others are outside_, then.
+  /// Whether some of the part is shown to be near the triangle; the rest of the part is then in outside_.
   bool settle(const Polygon& part, const Prism& prism) {
     double height = 0.0;
     for (int i = 0; i < part.count; ++i) height = std::max(height, std::abs(prism.height(part.corners[i])));
@@ -93,7 +93,8 @@ class Cover {
     return true;
   }
 
-  /// Cuts off what is beyond a side and adds it to outside_; false where nothing else is left, or no room.
+  /// Cuts off what is beyond a side and adds it to outside_; returns false if nothing else is left, or there
+  /// is no room.
   bool split(Polygon& inside, const Prism& prism, int side, double margin) {
     std::array<double, kMostCorners> beyond;
     double least = kInfinity, most = -kInfinity;

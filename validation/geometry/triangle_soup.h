@@ -14,7 +14,7 @@
 
 namespace hermesh::validation {
 
-/// Axis-aligned box, closed.
+/// A closed axis-aligned box.
 struct Box {
   Eigen::Vector3d lower = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector3d upper = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
@@ -31,16 +31,16 @@ struct Box {
     return lower.x() <= other.upper.x() && other.lower.x() <= upper.x() && lower.y() <= other.upper.y() &&
            other.lower.y() <= upper.y() && lower.z() <= other.upper.z() && other.lower.z() <= upper.z();
   }
-  /// Zero inside.
+  /// Squared distance to a point, zero inside.
   double squared_distance(const Eigen::Vector3d& point) const {
     return (lower - point).cwiseMax(point - upper).cwiseMax(0.0).squaredNorm();
   }
-  /// Zero where they overlap.
+  /// Squared distance to another box, zero if the two overlap.
   double squared_distance(const Box& other) const {
     return (lower - other.upper).cwiseMax(other.lower - upper).cwiseMax(0.0).squaredNorm();
   }
   bool empty() const { return !(lower.x() <= upper.x()); }
-  /// The origin if the box is empty.
+  /// The centre of the box; the origin if the box is empty.
   Eigen::Vector3d centre() const {
     return empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(0.5 * lower + 0.5 * upper);
   }
@@ -49,8 +49,8 @@ struct Box {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-/// The triangles of the file first, then the two of each quad, cut by the rule. Refers to the file's points, so the
-/// file has to outlive it.
+/// A file's polygons as triangles: those of the file first, then the two of each quad, cut by the rule. The
+/// soup refers to the file's points, so the file has to outlive it.
 struct TriangleSoup {
   const std::vector<Eigen::Vector3d>& points;
   std::vector<Triangle> triangles;
@@ -66,7 +66,7 @@ struct TriangleSoup {
       triangles.push_back({q[0], q[2], q[3]});
     }
   }
-  /// Number of the polygon that a triangle belongs to: triangles first, then quads.
+  /// Number of the polygon that a triangle belongs to; polygons are numbered triangles first, then quads.
   std::int64_t polygon(std::size_t t) const {
     return std::int64_t(t < undivided ? t : undivided + (t - undivided) / 2);
   }
@@ -80,7 +80,7 @@ inline Box box_of(const Corners& c) {
   return {c[0].cwiseMin(c[1]).cwiseMin(c[2]), c[0].cwiseMax(c[1]).cwiseMax(c[2])};
 }
 
-/// Box of the points that a polygon uses.
+/// The box of the points that polygons use.
 inline Box box_of(const MeshFile& mesh) {
   Box box;
   for (const Triangle& t : mesh.triangles)

@@ -17,19 +17,20 @@ Eigen::Vector3d closest_point(const Corners& triangle, const Eigen::Vector3d& po
 struct ClosestHit {
   double squared = std::numeric_limits<double>::infinity();  ///< squared distance
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  std::uint32_t slot = 0;  ///< of the triangle, in the order of the tree
+  std::uint32_t slot = 0;  ///< place of the triangle in the order of the tree
 };
 
-/// A complete binary tree in heap order: the children of node i are 2i+1 and 2i+2, the leaves are the last
-/// level, and leaf k holds the slots first_slot(k) to first_slot(k+1). Built in parallel by median splits,
-/// the same for any number of threads.
+/// A bounding volume hierarchy as a complete binary tree in heap order: the children of node i are 2i+1 and
+/// 2i+2, the leaves are the last level, and leaf k holds the slots first_slot(k) to first_slot(k+1). It is
+/// built in parallel by median splits, and is the same for any number of threads.
 class TriangleTree {
  public:
   /// @throws Error if there is no triangle.
   explicit TriangleTree(const TriangleSoup& soup);
 
   ClosestHit closest(const Eigen::Vector3d& point) const { return closest(point, slot_hit(point, 0)); }
-  /// With a first guess, such as the slot of the answer to a query nearby, which makes it faster.
+  /// The closest point, sought from a first guess, such as the slot of the answer to a query nearby, which
+  /// makes the search faster.
   ClosestHit closest(const Eigen::Vector3d& point, std::uint32_t guess) const {
     return closest(point, slot_hit(point, guess));
   }
@@ -39,11 +40,11 @@ class TriangleTree {
   std::size_t first_slot(std::size_t leaf) const { return (size() * leaf) >> depth_; }
   const Box& leaf_box(std::size_t leaf) const { return boxes_[leaves() - 1 + leaf]; }
   const Box& bounds() const { return boxes_[0]; }
-  std::uint32_t triangle(std::size_t slot) const { return order_[slot]; }  ///< its number in the soup
+  std::uint32_t triangle(std::size_t slot) const { return order_[slot]; }  ///< triangle number in the soup
   const Corners& corners(std::size_t slot) const { return corners_[slot]; }
 
-  /// Calls visit(slot) for each triangle whose box is within `reach` of a box, until it says no. Whether it
-  /// never did.
+  /// Calls visit(slot) for each triangle whose box is within `reach` of a box, until visit() returns false.
+  /// Returns whether it never did.
   template <class Visit>
   bool for_each_near(const Box& box, double reach, const Visit& visit) const {
     const double squared = reach * reach;

@@ -16,8 +16,8 @@ class WeldedSurface {
   struct Edge {
     std::array<std::uint32_t, 2> points;
     std::array<std::uint32_t, 2> triangles;
-    /// Radians between the normals of the two triangles, positive where the surface is convex; 0 ≤ |turning|
-    /// ≤ π.
+    /// The angle between the normals of the two triangles, in radians, positive where the surface is convex;
+    /// 0 ≤ |turning| ≤ π.
     double turning;
   };
 
@@ -36,8 +36,8 @@ class WeldedSurface {
   };
   /// Walks from a point near the middle of an edge into its first or second triangle (`side` 0 or 1), at
   /// right angles to the edge and straight on over the unfolded surface, across edges that turn by less than
-  /// `least_turning`. The first edge that turns by more; nothing at a border, beyond `farthest`, or once it
-  /// has crossed as many triangles as there are.
+  /// `least_turning`. Returns the first edge that turns by more; nothing at a border, beyond `farthest`, or
+  /// once the walk has crossed as many triangles as there are.
   std::optional<Arrival> walk(std::size_t edge, int side, double least_turning, double farthest) const;
 
  private:
@@ -52,7 +52,7 @@ class WeldedSurface {
   std::vector<Triangle> triangles_;
   std::vector<Edge> edges_;
   std::vector<std::array<std::uint32_t, 3>>
-      edge_of_;  ///< of each triangle's side k to k + 1; kNoEdge at a border
+      edge_of_;  ///< edge of each triangle's side k to k + 1; kNoEdge at a border
 };
 
 }  // namespace hermesh::validation

@@ -19,15 +19,15 @@ constexpr int kLevels = 4;  ///< blocks of 2^kLevels voxels are the largest
 /// A node's point may be farther from the planes that it stands for than this share of the tolerance, root mean square.
 constexpr double kShare = 0.45;
 
-/// Trees of one block of the largest kind after another.
+/// Makes the trees of sets in one block of the largest kind after another. One object for each thread.
 class BlockTrees {
  public:
   BlockTrees(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
              const FilePoints& file)
       : fine_(fine), tolerance_(tolerance), pinned_(pinned), file_(file) {}
 
-  /// `position` by point: in which place of `order`; the block's points are in `order` from `begin` to `end`. Writes their
-  /// node_of, counted from 0.
+  /// Makes the sets of the block whose points are in `order` from `begin` to `end`. `position` has each point's place
+  /// in `order`. Writes node_of of these points, counted from 0, and appends to `nodes`, children first.
   void run(std::span<const std::uint32_t> order, std::span<const std::uint32_t> position, std::uint32_t begin,
            std::uint32_t end, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
     points_ = order.subspan(begin, end - begin);
@@ -43,6 +43,7 @@ class BlockTrees {
   }
 
  private:
+  /// What a set adds up to; places and quadrics are those of its points.
   struct Sum {
     std::uint32_t points = 1, first = 0;
     std::int32_t euler = 1;  ///< points - edges + triangles
@@ -71,14 +72,16 @@ class BlockTrees {
     for (int a = 0; a < 3; ++a) cells_[i][a] = static_cast<std::int32_t>(std::floor(sum.places[a]));
   }
 
-  /// The least block that holds both.
+  /// The level of the least block that holds two points: the highest bit in which their cells differ. Two's complement
+  /// makes blocks below zero as wide as the others.
   int level(std::uint32_t i, std::uint32_t j) const {
     std::uint32_t differ = 1;
     for (int a = 0; a < 3; ++a) differ |= static_cast<std::uint32_t>((cells_[i][a] ^ cells_[j][a]));
     return std::bit_width(differ);
   }
 
-  /// Edges and triangles within the block, by level.
+  /// Lists the edges and triangles whose points are all in the block and not pinned, by the level of the least block
+  /// that holds them. So an edge of a level connects points of different smaller blocks, never of one set.
   void gather(std::span<const std::uint32_t> position, std::uint32_t begin, std::uint32_t end) {
     for (auto& edges : edges_) edges.clear();
     for (auto& triangles : triangles_) triangles.clear();
@@ -92,21 +95,26 @@ class BlockTrees {
         if (!joins(q)) continue;
         const std::uint32_t j = position[q] - begin;
         const int of_edge = level(i, j);
+        // In a closed and oriented mesh an edge is met once each way.
         if (p < q) edges_[of_edge - 1].push_back({i, j});
         if (corners[0] != p || !joins(corners[2])) continue;
+        // The least block that holds a first corner and each of the others holds all three.
         triangles_[std::max(of_edge, level(i, position[corners[2]] - begin)) - 1].push_back(i);
       }
     }
   }
 
+  /// The root of a point's set, with paths halved.
   std::uint32_t find(std::uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
 
+  /// Joins what the edges of a level connect to sets, and makes a node for each.
   void merge(int level, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
     merged_.clear();
     const auto first_new = static_cast<std::uint32_t>(nodes.size());
+    // Union: each set or single point that becomes part of a new set is noted once, with its node so far.
     for (const auto& [i, j] : edges_[level - 1]) {
       const std::uint32_t a = find(i), b = find(j);
       if (a == b) continue;
@@ -116,8 +124,11 @@ class BlockTrees {
       sums_[a].add(sums_[b]);
       node_at_[a] = first_new;  // some new node
     }
+    // Only now, for the sets of this level are known: an edge or a triangle lies in the set of any of its points.
     for (const auto& [i, j] : edges_[level - 1]) --sums_[find(i)].euler;
     for (const std::uint32_t i : triangles_[level - 1]) ++sums_[find(i)].euler;
+    // One new node for each root; sets and single points of before become its children. A set that does not merge gets
+    // one as well, for a larger one around it may.
     for (const auto& [root, node] : merged_) node_at_[find(root)] = MergeForest::kNone;
     for (const auto& [root, node] : merged_) {
       std::uint32_t& at = node_at_[find(root)];
@@ -133,6 +144,8 @@ class BlockTrees {
   MergeForest::Node node_of_sum(const Sum& sum, int level) const {
     MergeForest::Node node;
     node.first = sum.first;
+    // Connected, with Euler characteristic 1: a disc or a tree, which can shrink to a point without a change of
+    // topology.
     if (sum.euler != 1) return node;
     const Vector3d middle = sum.places / double(sum.points);
     WideQuadric q = sum.quadric;  // about the middle
@@ -141,6 +154,7 @@ class BlockTrees {
     q.b += q.a * shift;
     Vector3d x = q.minimiser();
     const double reach = double(1 << level);
+    // Planes that are nearly parallel meet far away: no farther than the block is wide.
     if (x.squaredNorm() > reach * reach) x *= reach / x.norm();
     node.merges = q(x) <= kShare * kShare * double(sum.tolerance) * double(sum.tolerance) * q.a.trace();
     node.error = static_cast<float>(q(x) / (double(sum.tolerance) * double(sum.tolerance) * q.a.trace() + 1e-30));
@@ -157,14 +171,15 @@ class BlockTrees {
   std::span<const std::uint32_t> points_;
   Vector3d anchor_;
   std::vector<std::array<std::int32_t, 3>> cells_;
-  std::vector<Sum> sums_;              ///< by point, of those that have come to it
-  std::vector<std::uint32_t> parent_;  ///< by point, of disjoint sets
-  std::vector<std::uint32_t> node_at_; ///< by root of these
+  std::vector<Sum> sums_;              ///< one per point; a root's is that of its set
+  std::vector<std::uint32_t> parent_;  ///< disjoint sets of points
+  std::vector<std::uint32_t> node_at_; ///< node of each root, or kNone
   std::array<std::vector<std::pair<std::uint32_t, std::uint32_t>>, kLevels> edges_;
-  std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< by a corner
+  std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< one corner of each, for each level
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;
 };
 
+/// The number of the largest block that a place is in: 21 bits an axis.
 std::uint64_t block_key(const Vector3d& p) {
   std::uint64_t key = 0;
   for (int a = 0; a < 3; ++a)
@@ -177,6 +192,7 @@ std::uint64_t block_key(const Vector3d& p) {
 MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
                          const FilePoints& file, const RunContext& context) {
   const std::vector<Vector3d>& points = fine.points();
+  // Points by block, in each by number: one order for every number of threads.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
   parallel_blocks(points.size(), context, [&](std::size_t p) { keys[p] = {block_key(points[p]), static_cast<std::uint32_t>(p)}; });
   tbb::parallel_sort(keys.begin(), keys.end());
@@ -188,6 +204,7 @@ MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
   }
   first.push_back(static_cast<std::uint32_t>(points.size()));
 
+  // Blocks share no points and no edges count between them, so each makes its trees by itself.
   std::vector<std::uint32_t> node_of(points.size(), MergeForest::kNone);
   const std::size_t n = first.size() - 1;
   std::vector<std::vector<MergeForest::Node>> nodes(n);
@@ -195,6 +212,7 @@ MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
   parallel_blocks(n, context, [&](std::size_t b) {
     trees.local().run(order, position, first[b], first[b + 1], node_of, nodes[b]);
   });
+  // Nodes are numbered block by block: children stay before their parents.
   std::vector<std::uint64_t> start(n);
   for (std::size_t b = 0; b < n; ++b) start[b] = nodes[b].size();
   std::vector<MergeForest::Node> all(exclusive_scan(start, "blocks"));

@@ -1,4 +1,5 @@
-// Which points of a fine mesh hang together within blocks of 16, 8, 4 and 2 voxels: the first, bold step of a decimation.
+// Which points of a fine mesh hang together within blocks of 16, 8, 4 and 2 voxels: the first step of a decimation, and
+// a bold one, for nothing is proved of it yet.
 #pragma once
 
 #include <span>
@@ -10,9 +11,15 @@
 
 namespace hermesh {
 
-/// A set is what edges connect within a lattice-aligned block; it merges if its points, edges and triangles are a disc or a
-/// tree and their planes pass well within the tolerance of one point. Pinned points are in none. The greatest blocks
-/// are 16 voxels wide.
+/// The sets of points that edges connect within lattice-aligned blocks of 2, 4, 8 and 16 voxels, each made of those of
+/// the next smaller blocks. A set merges if its points, edges and triangles are a disc or a tree and their planes pass
+/// well within the tolerance of one place.
+/// @param fine the mesh, in index space
+/// @param tolerance by point, voxels
+/// @param pinned by point: points that are in no set
+/// @param file rounds places to the file's precision
+/// @param context asked whether to stop
+/// @throws Cancelled
 MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
                          const FilePoints& file, const RunContext& context);
 

@@ -16,6 +16,7 @@ constexpr int kMostPasses = 3;
 
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context) {
+  // Where no distance is allowed nothing may move, whatever the caller has pinned.
   pinned.resize(tolerance.size());
   for (std::size_t p = 0; p < tolerance.size(); ++p)
     if (!(tolerance[p] > 0)) pinned[p] = 1;
@@ -23,6 +24,8 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     Stage stage(context, name);
     return work();
   };
+  // *Propose* by blocks, the cheapest way by far to be rid of most points. Only the topology is looked at yet:
+  // distances are proved once edges have been collapsed, too.
   MergeForest forest = timed("decimate", [&] { return block_forest(fine, tolerance, pinned, file, context); });
   MergedMesh merged = timed("decimate", [&] { return sort_out_merges(forest, fine, context); });
   // Points that the proof brought back, of those that the mesh has then.
@@ -34,6 +37,8 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     const std::size_t now = merged.mesh->points().size();
     return now <= proposed ? 0.0 : double(now - proposed) / double(now);
   };
+  // All sets are new to the proof now, those of blocks as well. Later passes begin with a mesh that is proved, and the
+  // proof takes their own sets back first.
   brought_back(Collapses::bold, false);
   for (int i = 0; i < kMostPasses; ++i) {
     const double before = double(merged.mesh->points().size());

@@ -18,19 +18,27 @@
 
 namespace hermesh {
 
+/// A coarse mesh, with the fine triangle that each of its triangles stands for.
 struct CertifiedMesh {
   std::vector<Eigen::Vector3d> points;       ///< FilePoints::rounded()
   std::vector<Triangle> triangles;
-  std::vector<std::uint32_t> fine_triangle;  ///< by triangle: one of the fine mesh, all of whose corners went into its corners
+  /// For each triangle one of the fine mesh, whose corners went into the corners of this one.
+  std::vector<std::uint32_t> fine_triangle;
 };
 
-/// A triangle's tolerance is the least of its corners. Each place of the fine mesh is then within its
-/// triangle's tolerance of the coarse one, and for each place of the coarse one there is a fine triangle
-/// within its own tolerance, which where tolerances differ need not be the nearest.
-/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into
-///   another; others may go into them.
-/// @param pinned by point of `fine`, or empty: others that do. Where more than two triangles meet in an edge
-///   its ends must be such; so a complex of patches keeps their rims.
+/// Merges points of a fine mesh where the outcome is proved: the same topology, no two triangles that meet, and the
+/// distance both ways. A triangle's tolerance is the least of its corners. Each place of the fine mesh is within its
+/// triangle's tolerance and kDistanceSlack of the coarse one, and for each place of the coarse one there is a fine
+/// triangle within its own tolerance and that slack, which where tolerances differ need not be the nearest. The same
+/// bytes for every number of threads.
+/// @param fine closed and oriented, or a complex of patches; index space
+/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into another;
+///   others may go into them.
+/// @param pinned by point of `fine`, or empty: further points that stay. Where more than two triangles meet in an edge
+///   its ends must be pinned; so a complex of patches keeps their rims.
+/// @param file rounds places to the file's precision
+/// @param context told of progress, and asked whether to stop
+/// @throws Cancelled
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);
 

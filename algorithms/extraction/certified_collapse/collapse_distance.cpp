@@ -16,6 +16,9 @@ constexpr double kShortestStep = 0.03;
 
 bool CollapseDistance::passes() { return attach_samples() && point_is_near() && new_edges_are_near(); }
 
+/// Attaches every sample concerned to a new triangle within its tolerance: those of the faces that go or change, and
+/// the ends that move, unless they have moved before and are samples of a face already. So each place of the fine mesh
+/// that is a point has the new mesh near it.
 bool CollapseDistance::attach_samples() {
   reach_.clear();
   for (const Collapse::NewFace& made : collapse_.made) reach_.emplace_back(made.at);
@@ -31,7 +34,7 @@ bool CollapseDistance::attach_samples() {
   return true;
 }
 
-/// To the triangle below or above the sample, or else to any that is near.
+/// Attaches a sample to the new triangle right below or above it, or else to any that is near.
 bool CollapseDistance::attach(std::uint32_t sample) {
   const Vector3d& p = mesh_.fine->points()[sample];
   const double within = mesh_.tolerance[sample];
@@ -45,7 +48,7 @@ bool CollapseDistance::attach(std::uint32_t sample) {
   return found != CubeMesh::kNone;
 }
 
-/// The new point, by the triangles around the sample next to it.
+/// Whether the new point is near the fine mesh, looked for from a triangle around a sample next to it.
 bool CollapseDistance::point_is_near() {
   if (collapse_.attached.empty()) return false;  // no place to start from; rare, for ends that move leave samples behind
   const FineMesh& fine = *mesh_.fine;
@@ -66,6 +69,7 @@ bool CollapseDistance::near_fine_around(const Vector3d& p, double radius) {
   return false;
 }
 
+/// Whether a ball about p lies within the tolerance of a fine triangle, which is the least of its corners'.
 bool CollapseDistance::near_fine(std::uint32_t t, const Vector3d& p, double radius) const {
   const FineMesh& fine = *mesh_.fine;
   const Triangle& c = fine.triangles()[t];
@@ -76,11 +80,13 @@ bool CollapseDistance::near_fine(std::uint32_t t, const Vector3d& p, double radi
   return squared_distance(p, corner, fine.points()[c[1]], fine.points()[c[2]]) <= within * within;
 }
 
-/// The new edges. A narrow ridge could rise above the fine mesh and yet have its flanks near every edge of that.
+/// Whether the new edges are near the fine mesh. Samples alone would not tell: a narrow ridge could rise above the fine
+/// mesh and yet have its flanks near every edge of that.
 bool CollapseDistance::new_edges_are_near() {
   const std::uint32_t below_x = below_;
   for (const Collapse::NewFace& made : collapse_.made) {
     below_ = below_x;
+    // The faces go around the new point, so the first of the other corners of each names every edge once.
     const Vector3d& to = cube_.vertices[made.others[0]].point;
     if (!is_near_below(to, made.normal) && !segment_is_near(collapse_.x, to)) return false;
   }
@@ -94,6 +100,8 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
   const FineMesh& fine = *mesh_.fine;
   const Vector3d along = to - collapse_.x, across = normal.cross(along);
   const double squared = along.squaredNorm(), height = 1.0 / normal.norm();
+  // All relative to the new point. `across` is at right angles to the plane that stands on the edge: its sign tells on
+  // which side of the edge a fine point is seen.
   std::uint32_t t = below_;
   int entry = -1;
   for (int step = 0; step < kMostSteps; ++step) {
@@ -112,6 +120,8 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
     const int j = (exit + 1) % 3;
     const double share = side[exit] / (side[exit] - side[j]);
     const Vector3d q = at[exit] + share * (at[j] - at[exit]);
+    // How far along the edge it passes over the fine one, and how high there. Between two such places the fine mesh is
+    // flat and the edge straight, so nothing in between is farther.
     const double way = q.dot(along) / squared;
     if (way >= 1.0) return true;
     const double within = std::min(mesh_.tolerance[c[exit]], mesh_.tolerance[c[j]]);
@@ -125,13 +135,15 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
   return false;
 }
 
-/// In steps, each near one fine triangle as a whole, that are found by a walk over the fine mesh beside the segment.
+/// Whether a segment is near the fine mesh: in steps, each near one fine triangle as a whole, that are found by a walk
+/// over the fine mesh beside the segment.
 bool CollapseDistance::segment_is_near(const Vector3d& from, const Vector3d& to) {
   const double length = (to - from).norm();
   double done = 0, step = 1.0;
   while (done < length) {
     step = std::min(step, length - done);
     const Vector3d begin = from + (done / length) * (to - from), end = from + ((done + step) / length) * (to - from);
+    // The distance to a triangle is convex: with both ends of the step within the bound all of it is.
     if (near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) {
       done += step;
       step *= 2;

@@ -6,14 +6,15 @@
 
 namespace hermesh {
 
-/// For one collapse after another, whose data it reads and, as for Collapse::attached, writes.
+/// The test of distances for one collapse after another. It reads the collapse that is under way, and writes
+/// Collapse::attached.
 class CollapseDistance {
  public:
   CollapseDistance(DecimatedMesh& mesh, CubeMesh& cube, Collapse& collapse)
       : mesh_(mesh), cube_(cube), collapse_(collapse) {}
 
-  /// Finds a new triangle within the tolerance for every sample of the old ones and for the ends that move; and whether the
-  /// new point and the new edges are within the tolerance of the fine mesh.
+  /// Whether the collapse keeps to the tolerance: every sample of the old triangles, and the ends that move, have a new
+  /// triangle within their tolerance, and the new point and the new edges are within the tolerance of the fine mesh.
   bool passes();
 
  private:
@@ -29,8 +30,8 @@ class CollapseDistance {
   DecimatedMesh& mesh_;
   CubeMesh& cube_;
   Collapse& collapse_;
-  std::vector<TriangleReach> reach_;  ///< of the new triangles
-  std::uint32_t below_ = 0;           ///< a fine triangle near the place looked at
+  std::vector<TriangleReach> reach_;  ///< tells what is near each new triangle
+  std::uint32_t below_ = 0;           ///< a fine triangle near the place looked at last
 };
 
 }  // namespace hermesh

@@ -9,15 +9,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Shape of a triangle, 1 for equilateral and 0 for degenerate: a collapse makes none below this unless there was a worse
-/// one in its place.
+/// What shape() of a triangle a collapse may make at least, unless there was a worse one in its place.
 constexpr double kPoorShape = 0.05;
 /// A triangle may not turn by more than some 84 degrees in one collapse.
 constexpr double kLeastCosine = 0.1;
-/// Nor, where nobody looks at what is below, face away from the fine triangle that it began as by more than some 72 degrees.
-/// What faces the wrong way before need not do so for ever then.
+/// How far a triangle of a bold collapse, where nobody looks at what is below, may face away from the fine triangle
+/// that it began as: some 72 degrees. A triangle that faced the wrong way before need not do so for ever then.
 constexpr double kLeastCosineToFine = 0.3;
 
+/// Shape of a triangle, 1 for equilateral and 0 for degenerate: its area over the sum of its squared sides, scaled.
 double shape(const Corners& t) {
   const double twice_area = (t[1] - t[0]).cross(t[2] - t[0]).norm();
   const double squares = (t[1] - t[0]).squaredNorm() + (t[2] - t[1]).squaredNorm() + (t[0] - t[2]).squaredNorm();
@@ -34,6 +34,7 @@ CubeCollapse::CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints
       cube_(cube),
       local_(mesh, cube, triangles, numbers),
       distance_(mesh, local_, collapse_) {
+  // What the cube's border forbids now may be done in the next round, whose borders lie elsewhere.
   for (std::uint32_t v = 0; v < local_.vertices.size(); ++v)
     if (local_.vertices[v].here && !local_.vertices[v].free) stir(v);
 }
@@ -46,6 +47,7 @@ WideQuadric CubeCollapse::quadric_about(std::uint32_t u, std::uint32_t v, const 
 }
 
 bool CubeCollapse::gather(std::uint32_t going, std::uint32_t v, const Vector3d& x) {
+  // Points stay in the cube, or triangles that belong to it could reach into another one.
   if (!cube_.holds(x)) {
     stir(v);
     return false;
@@ -57,10 +59,12 @@ bool CubeCollapse::gather(std::uint32_t going, std::uint32_t v, const Vector3d& 
   collapse_.made.clear();
   collapse_.old.clear();
   collapse_.attached.clear();
+  // The faces beside the edge are found from both ends, and counted as old from the one that goes.
   return make_faces(going) && (!collapse_.v_moves || make_faces(v));
 }
 
-/// The faces of an end of the edge, but for those beside that, which go; the other end, if it moves, finds them as well.
+/// Makes the faces around one end of the edge as they will be, but for the two beside the edge, which go. If the other
+/// end moves, the same is done for it.
 bool CubeCollapse::make_faces(std::uint32_t moved) {
   const std::uint32_t other = moved == collapse_.v ? collapse_.going : collapse_.v;
   bool good = true;
@@ -81,6 +85,8 @@ bool CubeCollapse::make_faces(std::uint32_t moved) {
   return good;
 }
 
+/// Whether the new edges of a face are no longer than a cube of this round may make; where they are, the next round
+/// may.
 bool CubeCollapse::is_short(const Corners& at, std::uint32_t moved) {
   const double limit = cube_.longest_edge * cube_.longest_edge;
   const bool is = (at[1] - at[0]).squaredNorm() <= limit && (at[2] - at[0]).squaredNorm() <= limit;
@@ -88,6 +94,7 @@ bool CubeCollapse::is_short(const Corners& at, std::uint32_t moved) {
   return is;
 }
 
+/// Whether a face keeps some area, does not turn over and is no sliver.
 bool CubeCollapse::is_well_shaped(const Collapse::NewFace& made, const Corners& before) const {
   const Vector3d normal_before = kind_ == Collapses::bold
                                      ? mesh_.fine->normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
@@ -104,6 +111,8 @@ bool CubeCollapse::is_well_shaped(const Collapse::NewFace& made, const Corners& 
 bool CubeCollapse::passes() { return kind_ == Collapses::bold || distance_.passes(); }
 
 void CubeCollapse::apply() {
+  // All old faces are gone first, and those that are only changed come back: what is gone then are the two beside the
+  // edge. Samples are in the lists of the new faces alone.
   for (const std::uint32_t f : collapse_.old) mesh_.first_sample[local_.faces[f].global] = kNoSample;
   for (const std::uint32_t f : collapse_.old) local_.faces[f].gone = true;
   for (const Collapse::NewFace& made : collapse_.made) {
@@ -119,6 +128,7 @@ void CubeCollapse::apply() {
     mesh_.next_sample[entry.sample] = mesh_.first_sample[triangle];
     mesh_.first_sample[triangle] = entry.sample;
   }
+  // What has changed is worth another look in the next round; points of other cubes are not ours to write.
   merge_vertices();
   stir(collapse_.v);
   for (const Collapse::NewFace& made : collapse_.made)
@@ -127,6 +137,7 @@ void CubeCollapse::apply() {
 
 void CubeCollapse::merge_vertices() {
   CubeMesh::Vertex &staying = local_.vertices[collapse_.v], &going = local_.vertices[collapse_.going];
+  // The point stands for the planes of both ends, whatever they stood for themselves.
   const WideQuadric q = quadric_about(collapse_.going, collapse_.v, collapse_.x);
   float& tolerance = mesh_.least_tolerance[staying.global];
   tolerance = std::min(tolerance, mesh_.least_tolerance[going.global]);

@@ -6,7 +6,8 @@
 
 namespace hermesh {
 
-/// Of one cube. First gather(), then passes(), then apply(); each only after the one before said yes.
+/// The collapses of one cube, one after another. For each first gather(), then passes(), then apply(), each only if the
+/// one before said yes.
 class CubeCollapse {
  public:
   CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
@@ -15,21 +16,22 @@ class CubeCollapse {
   CubeMesh& mesh() { return local_; }
   const Collapse& collapse() const { return collapse_; }
 
-  /// Makes the faces as they will be when two ends of an edge have become the point at x; v keeps its number, and moves only
-  /// if x is not where it is, and must be free then, as the one that goes must be. False if x lies outside of the cube, or
-  /// if a face turns over, degenerates or gets too long.
+  /// Makes the faces as they will be when `going` and `v`, two ends of an edge, have become the point at `x`. v keeps
+  /// its number, and moves only if x is not where it is; whichever of the two moves must be free. False if x lies
+  /// outside of the cube, or if a face turns over, degenerates or gets too long.
   bool gather(std::uint32_t going, std::uint32_t v, const Eigen::Vector3d& x);
-  /// Whether it keeps near enough (decimation.h); the topology is the caller's.
+  /// Whether the gathered collapse keeps near enough to the fine mesh (decimation.h); the topology is the caller's.
   bool passes();
+  /// Carries out the collapse that was gathered, and notes what it joins.
   void apply();
   std::vector<Join>& joins() { return joins_; }
 
-  /// Sum of their quadrics.
+  /// Sum of the quadrics of two vertices, about `anchor`.
   WideQuadric quadric_about(std::uint32_t u, std::uint32_t v, const Eigen::Vector3d& anchor) const;
 
   float tolerance_at(std::uint32_t v) const { return mesh_.least_tolerance[local_.vertices[v].global]; }
   bool is_stirred(std::uint32_t v) const { return mesh_.stirred[local_.vertices[v].global] != 0; }
-  /// What failed at this point may succeed in the next round.
+  /// Has the edges at a vertex looked at in the next round: what failed there may succeed then.
   void stir(std::uint32_t v) { mesh_.stirred_next[local_.vertices[v].global] = 1; }
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const { return file_.rounded(p); }
 

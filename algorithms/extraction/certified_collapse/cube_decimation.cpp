@@ -11,18 +11,21 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// An edge is not worth a test if the planes that its ends stand for are farther from the new point than this many
-/// tolerances squared in the mean. (1 would lose some 4 % of the collapses of a scan, 4 none and save nothing.)
+/// What the mean squared distance of the new point to the planes that an edge's ends stand for may be, in tolerances
+/// squared: beyond, the edge is not worth a test. (1 would lose some 4 % of the collapses of a scan, 4 none and save
+/// nothing.)
 constexpr double kHopeless = 2.0;
-/// And this where nothing else is asked.
+/// What the mean squared distance of the new point to the planes may be in a bold collapse, in tolerances squared:
+/// nothing else is asked of distances there.
 constexpr double kBold = 0.3;
 
-/// Collapses of edges, cheapest first.
+/// Collapses edges of a cube, cheapest first. The heap may hold proposals that are out of date: the versions of their
+/// ends tell.
 class EdgeCollapses {
   struct Proposal {
     float cost;
     std::uint32_t u, v, version_u, version_v;
-    /// For a heap with the cheapest on top; ties by number, so that there is one order.
+    /// The order of a heap with the cheapest on top; ties are broken by number, so that there is one order.
     bool operator<(const Proposal& other) const {
       if (cost != other.cost) return cost > other.cost;
       return u != other.u ? u > other.u : v > other.v;
@@ -37,6 +40,8 @@ class EdgeCollapses {
       if (!face.own || face.gone) continue;
       for (int i = 0; i < 3; ++i) {
         const std::uint32_t u = face.corners[i], v = face.corners[(i + 1) % 3];
+        // Each edge between two own faces once. One at the border of these may be left out: both its ends have a face
+        // that is not the cube's, and neither may move.
         if (u < v && (collapses_.is_stirred(u) || collapses_.is_stirred(v))) propose(u, v);
       }
     }
@@ -57,7 +62,7 @@ class EdgeCollapses {
     bool hopeless;
   };
 
-  /// Where the ends of an edge would go; an end that may not move stays.
+  /// Where the ends of an edge would go, and at what cost; an end that may not move stays.
   Target target(std::uint32_t u, std::uint32_t v) const {
     const CubeMesh::Vertex &at_u = mesh_.vertices[u], &at_v = mesh_.vertices[v];
     const Vector3d middle = 0.5 * (at_u.point + at_v.point);
@@ -69,6 +74,7 @@ class EdgeCollapses {
     // Planes that are nearly parallel meet far away: no farther than the edge is long.
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();
     const double off = q(x), tolerance = std::min(collapses_.tolerance_at(u), collapses_.tolerance_at(v));
+    // Where planes tell nothing apart, as on flat parts, short edges come before long ones.
     return {middle + x, off + kPull * q.a.trace() * squared, off > hopeless_ * tolerance * tolerance * q.a.trace()};
   }
 
@@ -94,7 +100,8 @@ class EdgeCollapses {
     try_at(u, v, q(at_u - at_v) < q(Vector3d::Zero()) ? at_u : at_v);
   }
 
-  /// The link condition: the ends have two neighbours in common, those beside the edge.
+  /// Whether the link condition holds (Dey et al. 1999): the ends have two adjacent vertices in common, those opposite
+  /// the edge. A tetrahedron, all of whose vertices have three faces, must not collapse either.
   bool keeps_topology(std::uint32_t u, std::uint32_t v) {
     const std::uint32_t question = mesh_.ask();
     std::size_t at_u = 0, at_v = 0;
@@ -117,6 +124,7 @@ class EdgeCollapses {
   bool try_at(std::uint32_t u, std::uint32_t v, const Vector3d& x) {
     if (!collapses_.gather(u, v, x) || !collapses_.passes()) return false;
     collapses_.apply();
+    // The new edges; those proposed at v before are out of date.
     mesh_.for_each_face(v, [&](std::uint32_t f, int i) { propose(v, mesh_.faces[f].corners[(i + 1) % 3]); });
     return true;
   }

@@ -10,12 +10,14 @@
 
 namespace hermesh {
 
-/// What a thread keeps from cube to cube: numbers in a cube by numbers in the whole mesh. Old entries do no harm.
+/// What a thread keeps from cube to cube: numbers in a cube by numbers in the whole mesh. Entries left by other cubes
+/// do no harm.
 struct CubeNumbers {
   std::vector<std::uint32_t> vertex;
 };
 
-/// Vertices and faces have numbers of their own here, in the order in which the triangles name them.
+/// The triangles that touch a cube. Vertices and faces have numbers of their own here, in the order in which the
+/// triangles name them.
 struct CubeMesh {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -44,14 +46,14 @@ struct CubeMesh {
     for (std::uint32_t corner = vertices[v].first_corner; corner != kNone; corner = next_corner[corner])
       if (!faces[corner / 3].gone) f(corner / 3, static_cast<int>(corner % 3));
   }
-  /// `staying` takes over the corners of `going` that are left: dead ones would make the walk around it longer and longer.
+  /// Gives `staying` the corners of `going` that are left: dead ones would make the walk around it longer and longer.
   void merge_corners(std::uint32_t going, std::uint32_t staying);
-  /// A new question, for `seen`.
+  /// Begins a new question, and returns its number for Vertex::seen.
   std::uint32_t ask() { return ++question; }
 
   std::vector<Vertex> vertices;
   std::vector<Face> faces;
-  std::vector<std::uint32_t> next_corner;  ///< by corner, 3 × face + i: the next one at the same vertex
+  std::vector<std::uint32_t> next_corner;  ///< for corner 3 × face + i: the next one at the same vertex
   std::uint32_t question = 0;
 };
 
@@ -59,7 +61,7 @@ struct CubeMesh {
 struct Collapse {
   struct NewFace {
     std::uint32_t face;
-    int corner;  ///< of x
+    int corner;  ///< which of the face's corners x is
     Corners at;  ///< x first, in the order of the face
     std::array<std::uint32_t, 2> others;
     Eigen::Vector3d normal;  ///< not of unit length

@@ -24,6 +24,7 @@ constexpr double kDisplacement = 0.382;
 /// Longest edge that a round makes, as a share of the side: what lies at a border must not fall far behind the rest.
 constexpr double kLongestEdge = 0.25;
 
+/// A triangle in one of the cubes that its box touches.
 struct Entry {
   std::uint64_t cube;  ///< 21 bits an axis
   std::uint32_t triangle;
@@ -32,10 +33,12 @@ struct Entry {
   }
 };
 
+/// One round: the mesh divided among cubes of one size, each done by one thread.
 class Round {
  public:
   Round(DecimatedMesh& mesh, const Box3& box, double side, RunContext& context)
       : mesh_(mesh), side_(side), start_(box.lower - Vector3d::Constant(kDisplacement * side)) {
+    // Sorted by cube and then by number: each cube sees its triangles in one order.
     file_triangles(context);
     triangles_.resize(entries_.size());
     for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -47,9 +50,10 @@ class Round {
 
   std::size_t cube_count() const { return first_.size() - 1; }
 
-  /// The joins of all cubes, in their order.
+  /// Collapses edges in all cubes; the joins are returned by cube, in the order of cubes.
   std::vector<std::vector<Join>> run(Collapses kind, const FilePoints& file, const RunContext& context) {
     std::vector<std::vector<Join>> joins(cube_count());
+    // Cubes are taken one by one, not by sixteen as in parallel_blocks(): each is work enough.
     tbb::parallel_for(std::size_t{0}, cube_count(), [&](std::size_t c) {
       context.check();
       const auto cube = static_cast<std::uint32_t>(c);
@@ -68,6 +72,7 @@ class Round {
     return {start_, side_, {key >> 42, (key >> 21) & kMask, key & kMask}, kLongestEdge * side_};
   }
   void file_triangles(RunContext& context) {
+    // Count, scan, fill; the sort makes the order whole.
     const std::size_t n = mesh_.triangles.size();
     std::vector<std::uint64_t> counts(n);
     parallel_blocks(n, context, [&](std::size_t t) {
@@ -85,6 +90,7 @@ class Round {
     if (!mesh_.alive(t)) return;
     Box3 box;
     for (const std::uint32_t p : mesh_.triangles[t]) box.add(mesh_.points[p]);
+    // By box: more cubes than the triangle touches, but never fewer.
     const DecimationCube::Index low = DecimationCube::index_of(box.lower, start_, side_),
                                 high = DecimationCube::index_of(box.upper, start_, side_);
     for (std::uint64_t x = low[0]; x <= high[0]; ++x)
@@ -94,12 +100,14 @@ class Round {
   DecimatedMesh& mesh_;
   const double side_;
   const Vector3d start_;
-  std::vector<Entry> entries_;             ///< by cube
-  std::vector<std::uint32_t> triangles_;   ///< of the entries
-  std::vector<std::size_t> first_;         ///< by cube: its first entry, and the end
+  std::vector<Entry> entries_;             ///< ascending by cube
+  std::vector<std::uint32_t> triangles_;   ///< triangles of the entries, in their order
+  std::vector<std::size_t> first_;         ///< first entry of each cube, and the end
+  // As large as the whole mesh, so there is one for each thread and not one for each cube.
   tbb::enumerable_thread_specific<CubeNumbers> numbers_;
 };
 
+/// Drops the triangles that are gone, in order. Samples keep their lists, which hang on the triangles that stay.
 void forget_the_dead(DecimatedMesh& mesh) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -114,7 +122,7 @@ void forget_the_dead(DecimatedMesh& mesh) {
   mesh.fine_triangle.resize(kept);
 }
 
-/// Every sample to a triangle near it, but for those that are points where they were.
+/// Attaches every sample to a triangle near it, but for those that are points where they were.
 void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged, const RunContext& context) {
   std::vector<std::uint32_t> nearest(mesh.unmoved.size(), kNoTriangle);
   parallel_blocks(nearest.size(), context, [&](std::size_t i) {
@@ -123,8 +131,11 @@ void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const Merged
     const Vector3d& p = mesh.fine->points()[sample];
     double squared;
     const std::uint32_t start = merged.mesh->around(merged.number[forest.leader(sample)]).front();
+    // Found from the point that the sample went into. A nearer triangle may be missed: what is promised rests on
+    // merge_proof.h alone, and not on what is attached here.
     nearest[i] = merged.mesh->nearest_around(merged.mesh->walk(start, p), p, squared);
   });
+  // In one thread, ascending: the lists are the same for every number of threads.
   for (std::uint32_t sample = 0; sample < nearest.size(); ++sample) {
     if (nearest[sample] == kNoTriangle) continue;
     mesh.next_sample[sample] = mesh.first_sample[nearest[sample]];
@@ -132,6 +143,8 @@ void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const Merged
   }
 }
 
+/// The merged mesh with the numbers of the fine one, and with the planes and tolerances of all that its points stand
+/// for. Every edge is worth a look in the first round.
 DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
                     std::span<const float> tolerance, const RunContext& context) {
   const std::size_t n = fine.points().size();
@@ -178,14 +191,19 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMes
   if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
   Box3 box;
   for (const Vector3d& p : merged.mesh->points()) box.add(p);
+  // No edge is longer than the box's diagonal.
   const double largest = (box.upper - box.lower).norm();
   for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
     Round round(mesh, box, side, context);
+    // Joins of one cube build on one another; cubes have no points in common. In the order of cubes, so nodes have the
+    // same numbers for every number of threads.
     for (const auto& joins : round.run(kind, file, context))
       for (const Join& join : joins) forest.join(join.going, join.node);
     forget_the_dead(mesh);
     mesh.stirred.swap(mesh.stirred_next);
     std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);
+    // Then the limit of edges binds no more, and as the first cube begins 0.382 sides before the box, that cube has
+    // held the whole mesh.
     if (kLongestEdge * side > largest) break;
   }
   forest.settle();

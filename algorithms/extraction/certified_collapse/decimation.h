@@ -23,32 +23,42 @@ inline constexpr std::uint32_t kNoSample = 0xffffffffu;
 /// lengths in voxels, index space.
 struct DecimatedMesh {
   const FineMesh* fine = nullptr;
-  std::span<const float> tolerance;          ///< by sample
-  std::span<const std::uint8_t> pinned;      ///< by sample: stays as and where it is
-  std::vector<Eigen::Vector3d> points;       ///< by sample, of those that are points; FilePoints::rounded()
-  std::vector<PlaneQuadric> quadrics;        ///< likewise, about the point
-  std::vector<float> least_tolerance;        ///< likewise: of the samples that it stands for
-  std::vector<std::uint8_t> unmoved;         ///< by sample: it is a point, and where it was
+  // Numbered by sample; `points`, `quadrics` and `least_tolerance` are only set for samples that are points.
+  std::span<const float> tolerance;          ///< how far from its place the mesh may be
+  std::span<const std::uint8_t> pinned;      ///< 1 for samples that stay as and where they are
+  std::vector<Eigen::Vector3d> points;       ///< places now; FilePoints::rounded()
+  std::vector<PlaneQuadric> quadrics;        ///< planes that the point stands for, about the point
+  std::vector<float> least_tolerance;        ///< least among the samples that the point stands for
+  std::vector<std::uint8_t> unmoved;         ///< 1 for samples that are points, and where they were
+  // Numbered by triangle, but for `next_sample`:
   std::vector<Triangle> triangles;           ///< first corner kNoTriangle: no longer there
-  std::vector<std::uint32_t> fine_triangle;  ///< by triangle: the one of the fine mesh that it began as
-  std::vector<std::uint32_t> first_sample;   ///< by triangle: head of the list of samples attached to it
-  std::vector<std::uint32_t> next_sample;    ///< by sample
-  /// By point: whether an edge at it is worth another look in this round, and in the next. An edge that failed fails
-  /// again, unless something near it has changed or it was a cube's border that forbade it.
+  std::vector<std::uint32_t> fine_triangle;  ///< the one of the fine mesh that each began as
+  std::vector<std::uint32_t> first_sample;   ///< head of the list of samples attached to each, or kNoSample
+  std::vector<std::uint32_t> next_sample;    ///< the next sample of the same list, or kNoSample
+  /// Whether an edge at a point is worth another look in this round, and in the next. An edge that failed fails again,
+  /// unless something near it has changed or it was a cube's border that forbade it.
   std::vector<std::uint8_t> stirred, stirred_next;
 
   bool alive(std::size_t triangle) const { return triangles[triangle][0] != kNoTriangle; }
 };
 
-/// `bold` collapses look at the quadrics alone. The others have every sample near a triangle, the new point and the new
-/// edges near the fine mesh; samples are attached for them.
+/// How collapses are tested. *Bold* ones look at the quadrics alone. *Careful* ones keep every sample near a triangle,
+/// and the new point and the new edges near the fine mesh; samples are attached to triangles for them.
 enum class Collapses { bold, careful };
 
-/// Joins sets of the forest, whose merged mesh is given.
+/// Collapses edges of the merged mesh of a forest, and joins the sets of their ends there.
 ///
-/// Work is divided among cubes. A triangle within one cube belongs to it, and stays within it; all others are left alone
-/// for a round. So cubes do not see one another's changes, and the result is the same for every number of threads. The
-/// next round has larger cubes with other borders, until one holds the whole mesh.
+/// Work is divided among cubes. A triangle within one cube belongs to it, and stays within it; all others are left
+/// alone for a round. So cubes do not see one another's changes, and the result is the same for every number of
+/// threads. The next round has larger cubes with other borders, until one holds the whole mesh.
+/// @param forest whose sets are joined
+/// @param merged the mesh of `forest`, as prove_merges() or sort_out_merges() returns it
+/// @param fine the fine mesh
+/// @param tolerance by point of `fine`, voxels
+/// @param pinned by point of `fine`: points that stay as and where they are
+/// @param kind how collapses are tested
+/// @param file rounds places to the file's precision
+/// @param context told of progress, and asked whether to stop
 /// @throws Cancelled
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
                     std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file, RunContext& context);

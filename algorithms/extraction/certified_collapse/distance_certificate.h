@@ -12,10 +12,12 @@
 
 namespace hermesh {
 
-/// What a bound may be exceeded by, voxels: so that pieces need not get smaller than this.
+/// How much the proved distance may exceed the bound, voxels: so that pieces need not get smaller than this.
 inline constexpr double kDistanceSlack = 0.005;
 
-/// **What it proves.** Most triangles are covered by the mesh right above or below, no farther away than the bound
+/// Proves that triangles are near a mesh, one after another.
+///
+/// **Why it holds.** Most triangles are covered by the mesh right above or below, no farther away than the bound
 /// (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so, or until its corners
 /// are within the bound of one triangle of the mesh (the distance to a convex set is convex), or until it is so small that
 /// its middle's distance and its radius add up to no more than the bound and kDistanceSlack. It may fail to prove what is
@@ -24,10 +26,12 @@ class DistanceCertificate {
  public:
   DistanceCertificate(const FineMesh& mesh, TriangleOverlay& overlay) : mesh_(mesh), overlay_(overlay) {}
 
-  /// @param start a triangle of the mesh near the one that is asked about
-  /// @param bound bound(face): how near the triangle has to be to that of the mesh; it hears of every face that the proof
-  ///   rests on
-  /// @param covered told of triangles of the mesh that lie over this one as a whole, within their bounds
+  /// Whether each place of the triangle is proved to be within the bound of the mesh.
+  /// @param triangle the triangle asked about
+  /// @param start a triangle of the mesh near it
+  /// @param bound called with a face of the mesh: how near the triangle has to be to that, voxels; it is called for
+  ///   every face that the proof rests on
+  /// @param covered called with faces of the mesh that lie over the triangle as a whole, within their bounds
   template <class Bound, class Covered>
   bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, const Covered& covered) {
     const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
@@ -38,7 +42,7 @@ class DistanceCertificate {
   }
 
  private:
-  /// A triangle of the mesh, and how near to it one has to be.
+  /// A triangle of the mesh, and how near to it a piece has to be.
   struct Face {
     TriangleReach reach;
     double within;
@@ -47,7 +51,8 @@ class DistanceCertificate {
     }
   };
 
-  /// @param last the one that was nearest to what the piece is cut from
+  /// Whether a piece is near, whole or cut in halves. `last` is the face that was nearest to what the piece is cut
+  /// from, or null.
   template <class Bound>
   bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound, const Face* last) {
     if (last && last->is_near(piece)) return true;

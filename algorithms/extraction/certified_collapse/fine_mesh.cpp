@@ -17,8 +17,9 @@ namespace hermesh {
 
 namespace {
 
-/// Calls f(first, end) for ranges of the points, side by side. Each is to read all triangles for the sake of its own points:
-/// that is cheap, for they are read in order, and what is done about a point is done in the same order by any number of threads.
+/// Calls f(first, end) for ranges of the points, side by side. Each call is to read all triangles for the sake of its
+/// own points: that is cheap, for they are read in order, and what is done about a point is done in the same order by
+/// any number of threads.
 template <class F>
 void for_each_range(std::size_t points, F&& f) {
   constexpr std::size_t kLeast = 1 << 13;
@@ -33,6 +34,7 @@ void for_each_range(std::size_t points, F&& f) {
 
 FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
+  // `around_` has three entries for each triangle, which `first_` counts in 32 bits.
   if (triangles_.size() > kNone / 3)
     throw Error("the surface has " + std::to_string(triangles_.size()) +
                 " triangles, more than can be merged; use larger voxels or tolerance 0");
@@ -44,6 +46,7 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
       normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
     }
   });
+  // Triangles by point: count, scan, fill, so that those around a point ascend.
   const auto for_each_corner = [&](std::uint32_t first, std::uint32_t end, auto&& f) {
     for (std::uint32_t t = 0; t < triangles_.size(); ++t)
       if (triangles_[t][0] != kNone)
@@ -63,6 +66,8 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
 
 std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
   constexpr int kMostSteps = 1000;
+  // Where two triangles would send the walk to one another, the point lies outside of the ridge between them. Walks
+  // that go in longer circles, as around a spike, end with the number of steps.
   std::uint32_t before = triangle;
   for (int step = 0; step < kMostSteps; ++step) {
     const Corners c = corners(triangle);
@@ -71,6 +76,7 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
     double farthest = 0;
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d edge = c[(i + 1) % 3] - c[i];
+      // Beyond the side in the triangle's plane, times the side's length: squares are compared, without a root.
       const double beyond = edge.cross(n).dot(p - c[i]), squared = edge.squaredNorm();
       if (beyond > 0 && beyond * beyond > farthest * squared) {
         farthest = beyond * beyond / squared;
@@ -78,6 +84,7 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
       }
     }
     if (side < 0) return triangle;
+    // Found among the triangles around one end of the side: a step needs no search.
     const std::uint32_t next = across(triangle, side);
     if (next == before || next == kNone) return triangle;
     before = triangle;
@@ -90,6 +97,7 @@ std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vect
   constexpr int kMostSteps = 16;
   constexpr double kNormalRounding = 1e-4;  // over the few voxels that p is away
   squared = std::numeric_limits<double>::infinity();
+  // An upper bound of the distance to the mesh in any case: that of a triangle that has been looked at.
   const auto ask = [&](std::uint32_t t) {
     const Corners c = corners(t);
     // Most are ruled out by their boxes.
@@ -104,6 +112,7 @@ std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vect
   ask(triangle);
   for (int step = 0; step < kMostSteps; ++step) {
     const std::uint32_t from = triangle;
+    // Around all three corners: the nearest may be beyond one of them, and not only beyond a side.
     for (const std::uint32_t corner : triangles_[from])
       for (const std::uint32_t t : around(corner))
         if (t != from) ask(t);

@@ -11,18 +11,21 @@
 
 namespace hermesh {
 
-/// Triangles whose first corner is kNone are not there. Closed and oriented, or a complex of patches that meet in rims; only
-/// at these may a neighbour not be the corner that follows a point in one of its triangles.
+/// A mesh with its triangles by point. Triangles whose first corner is kNone are not there. It is closed and oriented,
+/// or a complex of patches that meet in rims; only at rims may an adjacent point not be the corner that follows a point
+/// in one of its triangles.
 class FineMesh {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
+  /// Finds the normals of the triangles and those around each point.
+  /// @throws Error if three times the triangles are more than 32 bits can number.
   FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles);
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   const std::vector<Triangle>& triangles() const { return triangles_; }
-  /// Unit length; zero of a degenerate triangle.
+  /// The unit normal of a triangle; zero if it is degenerate.
   const Eigen::Vector3f& normal(std::uint32_t triangle) const { return normals_[triangle]; }
-  /// Numbers of the triangles with this corner.
+  /// Numbers of the triangles with this corner, ascending.
   std::span<const std::uint32_t> around(std::uint32_t point) const {
     return std::span(around_).subspan(first_[point], first_[point + 1] - first_[point]);
   }
@@ -44,10 +47,12 @@ class FineMesh {
     const Triangle& t = triangles_[triangle];
     return {points_[t[0]], points_[t[1]], points_[t[2]]};
   }
-  /// From triangle to triangle, across the side that the point lies farthest beyond, until it lies over one; stops at a
-  /// ridge that it lies outside of, and after some steps.
+  /// Walks from triangle to triangle, across the side that the point lies farthest beyond, until it lies over one, and
+  /// returns that one. The walk stops at a ridge that the point lies outside of, and after some steps; so what it
+  /// returns is a good start, and proves nothing.
   std::uint32_t walk(std::uint32_t triangle, const Eigen::Vector3d& p) const;
-  /// From triangle to triangle that touches it, as long as there is a nearer one: the nearest if the mesh is smooth.
+  /// Goes from triangle to triangle that touches it, as long as there is one nearer to p, and returns the last: the
+  /// nearest if the mesh is smooth. `squared` becomes its squared distance, voxels².
   std::uint32_t nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const;
 
  private:

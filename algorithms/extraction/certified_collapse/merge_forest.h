@@ -26,13 +26,14 @@ class MergeForest {
     PlaneQuadric quadric;   ///< about `place`
   };
 
-  /// `nodes` with children before their parents; `node_of` by point: the least set that holds it.
+  /// `nodes` has children before their parents; `node_of` has for each point the least set that holds it, or kNone.
   MergeForest(std::vector<Node> nodes, std::vector<std::uint32_t> node_of);
 
-  /// Two points of the mesh become one, in the place of `node`; its `first` is the one that stays.
+  /// Makes two points of the mesh one, in the place of `node`, whose `first` is the one that stays.
   void join(std::uint32_t going, Node node);
-  /// To be called after join(), before anything else.
+  /// Finds the sets and members anew. To be called after join(), before anything else is asked.
   void settle();
+  /// Has a set give way to its children.
   void split(std::uint32_t node);
 
   const Node& node(std::uint32_t n) const { return nodes_[n]; }
@@ -49,9 +50,9 @@ class MergeForest {
 
  private:
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> node_of_, set_of_;      ///< by point
+  std::vector<std::uint32_t> node_of_, set_of_;      ///< each point's least set, and the one that it is merged into
   std::vector<std::uint32_t> members_;               ///< the points in sets, those of any one set together
-  std::vector<std::uint32_t> begin_, count_;         ///< by node: where its members are
+  std::vector<std::uint32_t> begin_, count_;         ///< where each node's members are
 };
 
 }  // namespace hermesh

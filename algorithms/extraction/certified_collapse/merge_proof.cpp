@@ -17,25 +17,28 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uint32_t kNone = MergeForest::kNone;
-/// What the bound is at least: what rounding makes of the distance of a triangle to itself.
+/// What the bound is at least, in voxels: what rounding makes of the distance of a triangle to itself.
 constexpr double kRounding = 1e-6;
 
 /// What is known of a fine triangle, as bits.
 enum Proof : std::uint8_t {
   kStays = 1,    ///< it is a triangle of the merged mesh
-  kNear = 2,     ///< this one is near the fine mesh
-  kApart = 4,    ///< and meets no other one that is marked so
+  kNear = 2,     ///< the merged triangle is near the fine mesh
+  kApart = 4,    ///< the merged triangle meets no other one that is marked so
   kCovered = 8,  ///< the fine triangle is near the merged mesh
-  kFar = 16,     ///< of which that proof looked at a triangle that has none of its sets for a corner
-  kOpen = 32     ///< it waits for that proof
+  kFar = 16,     ///< the proof of kCovered looked at a merged triangle that has none of its sets for a corner
+  kOpen = 32     ///< it waits for the proof of kCovered
 };
 
-/// One in so many merged triangles.
+/// Sets to be split are few if there is one in so many merged triangles.
 constexpr std::size_t kFew = 512;
 
-/// After so many splits all sets of what fails are split, and not only the worst.
+/// After so many rounds of splits all sets of what fails are split, and not only the worst.
 constexpr int kPatience = 8;
 
+/// Splits sets of a forest until the merged mesh is proved. What was proved of a triangle is kept until a set near it
+/// is split. Sets are called bold from many threads, by bits that are only ever set, and split by one: so the outcome
+/// does not depend on threads.
 class MergeProof {
  public:
   MergeProof(MergeForest& forest, std::size_t proved, const FineMesh& fine, std::span<const float> tolerance,
@@ -60,7 +63,9 @@ class MergeProof {
     build();
   }
 
-  /// The tests that cost least come first, and the next ones once these have little left to say.
+  /// Looks and splits until nothing fails; `geometry` asks for more than the topology. The tests that cost least come
+  /// first, and the next ones once these have little left to say. The mesh returned has passed all tests in one round:
+  /// where none calls a set bold, none is left out.
   MergedMesh run(bool geometry) {
     do {
       look_at_topology();
@@ -83,7 +88,7 @@ class MergeProof {
   }
   std::uint32_t merged_point(std::uint32_t p) const { return merged_.number[forest_.leader(p)]; }
 
-  /// Points are numbered in the order of the fine ones that they go by.
+  /// Makes the merged mesh. Its points are numbered in the order of the fine ones that they go by.
   void build() {
     merged_.number.assign(fine_.points().size(), kNone);
     const auto for_each_corner = [&](auto&& f) {
@@ -93,6 +98,7 @@ class MergeProof {
       });
     };
     for_each_corner([&](std::size_t, int, std::uint32_t leader) {
+      // Several triangles have one leader, and all of them write the same.
       std::atomic_ref(merged_.number[leader]).store(0, std::memory_order_relaxed);
     });
     merged_.leaders.clear();
@@ -111,8 +117,8 @@ class MergeProof {
     merged_.mesh.emplace(std::move(points), std::move(triangles));
   }
 
-  /// Of the sets at a fine triangle's corners the one whose planes are farthest from its place, among the new ones if there
-  /// are any: without them the mesh is what was proved before.
+  /// Calls one set at a fine triangle's corners bold: the one with the largest error, among the new ones if there are
+  /// any, for without them the mesh is what was proved before.
   void call_bold(std::uint32_t t) {
     std::array<std::uint32_t, 3> sets;
     int count = 0;
@@ -127,14 +133,16 @@ class MergeProof {
       if (any_new && sets[i] < proved_) continue;
       if (splits_ >= kPatience) std::atomic_ref(bold_[sets[i]]).store(1, std::memory_order_relaxed);
       const float error = forest_.node(sets[i]).error, most = worst == kNone ? 0.0f : forest_.node(worst).error;
+      // Ties by number; the first one if its error is no number. So there always is a worst set, and the proof goes on.
       if (worst == kNone || error > most || (error == most && sets[i] > worst)) worst = sets[i];
     }
     if (worst != kNone) std::atomic_ref(bold_[worst]).store(1, std::memory_order_relaxed);
   }
 
-  /// Every set is a disc: a block's by its Euler characteristic, two that an edge joined by the link condition. Two of them
-  /// share one piece of border at most if no edge goes from one point to another twice. Then the merged mesh is a
-  /// triangulation of the same surface. (Edges of the fine mesh itself may be those of several patches.)
+  /// Calls sets bold where an edge goes from one point to another twice. Every set is a disc: a block's by its Euler
+  /// characteristic, two that an edge joined by the link condition. Two sets share one piece of border at most if there
+  /// is no such edge; then the merged mesh is a triangulation of the same surface. (Edges of the fine mesh itself may
+  /// be those of several patches.)
   void look_at_topology() {
     const FineMesh& mesh = *merged_.mesh;
     const auto is_set = [&](std::uint32_t p) { return forest_.set_of(merged_.leaders[p]) != kNone; };
@@ -151,13 +159,14 @@ class MergeProof {
     });
   }
 
+  /// How near the other mesh has to be to a fine triangle, voxels: the least tolerance of its corners.
   double bound(std::uint32_t fine_triangle) const {
     const Triangle& c = fine_.triangles()[fine_triangle];
     return std::max(kRounding, double(std::min({tolerance_[c[0]], tolerance_[c[1]], tolerance_[c[2]]})));
   }
 
-  /// Merged triangles, near the fine mesh; that does not change, so neither does the proof. Many fine triangles turn out to
-  /// lie right above or below one of them.
+  /// Proves that merged triangles are near the fine mesh. That mesh does not change, so neither does the proof. Many
+  /// fine triangles turn out to lie right above or below a merged one, and are covered by it.
   void look_at_merged() {
     parallel_blocks(merged_.origin.size(), context_, [&](std::size_t i) {
       const std::uint32_t t = merged_.origin[i];
@@ -165,6 +174,7 @@ class MergeProof {
       const auto covered = [&](std::uint32_t f) {
         if (touches(static_cast<std::uint32_t>(i), merged_points(f))) prove(f, kCovered);
       };
+      // A triangle that stays as it was is near itself.
       if (is_single(t) || DistanceCertificate(fine_, overlays_.local())
                               .holds(merged_.mesh->corners(static_cast<std::uint32_t>(i)), t,
                                      [&](std::uint32_t f) { return bound(f); }, covered))
@@ -192,7 +202,7 @@ class MergeProof {
     return false;
   }
 
-  /// Fine triangles, near the merged mesh.
+  /// Proves that fine triangles are near the merged mesh.
   void look_at_fine() {
     const FineMesh& mesh = *merged_.mesh;
     parallel_blocks(open_.size(), context_, [&](std::size_t i) {
@@ -204,6 +214,7 @@ class MergeProof {
       int in_set = 0;
       while (forest_.set_of(fine_.triangles()[t][in_set]) == kNone) ++in_set;
       if (points[in_set] == kNone) return call_bold(t);  // all that hangs together here has vanished
+      // The proof is kept only if it rests on triangles that forget_covered() finds again when one of them changes.
       bool known = true;
       const double within = bound(t);
       bool touched = true;
@@ -230,7 +241,7 @@ class MergeProof {
   std::uint8_t proofs_of(std::uint32_t t) { return std::atomic_ref(proofs_[t]).load(std::memory_order_relaxed); }
   void prove(std::uint32_t t, Proof what) { std::atomic_ref(proofs_[t]).fetch_or(what, std::memory_order_relaxed); }
 
-  /// Pairs of merged triangles of which one has changed.
+  /// Tests pairs of merged triangles of which one has changed.
   void look_at_contacts() {
     const FineMesh& mesh = *merged_.mesh;
     const std::size_t n = mesh.triangles().size();
@@ -250,10 +261,12 @@ class MergeProof {
         call_bold(merged_.origin[u]);
       });
     });
+    // Those that did meet have a bold set, and lose the mark when it is split.
     for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
   }
 
-  /// So few that the other tests can be had in the same round, and not one after a split for every handful.
+  /// Whether so few sets are to be split that the other tests can be had in the same round, and not one after a split
+  /// for every handful.
   bool few_are_bold() const {
     return kFew * static_cast<std::size_t>(std::ranges::count(bold_, 1)) <= merged_.origin.size();
   }
@@ -265,7 +278,8 @@ class MergeProof {
     return sets;
   }
 
-  /// False if there is nothing to split. A merged triangle stays when its sets become smaller, and others come anew.
+  /// Splits the bold sets and makes the mesh anew; false if there is nothing to split. A merged triangle stays when its
+  /// sets become smaller, and others come anew.
   bool split() {
     const std::vector<std::uint32_t> sets = bold_sets();
     if (sets.empty()) return false;
@@ -280,6 +294,8 @@ class MergeProof {
     const std::size_t stayed = merged_.origin.size();
     for (const std::uint32_t p : changed)
       for (const std::uint32_t t : fine_.around(p)) {
+        // A triangle with a corner in a set that was split may have moved: only that it stays, and what
+        // forget_covered() looks after, is kept.
         const bool new_one = !(proofs_[t] & kStays) && stays(t);
         if (new_one) merged_.origin.push_back(t);
         proofs_[t] = (proofs_[t] & (kStays | kCovered | kFar | kOpen)) | (new_one ? kStays : 0);
@@ -292,9 +308,10 @@ class MergeProof {
     return true;
   }
 
-  /// A fine triangle's proof rests on merged triangles that have one of its sets for a corner, or (kFar) a set next to one
-  /// of those. If such a triangle changes, one of its corners was split; its other corners are next to a part of that.
-  /// (What rests on others yet is never marked as proved, and so asked for again each time.)
+  /// Takes back the proofs of fine triangles that may rest on merged triangles that have changed. Such a proof rests on
+  /// merged triangles that have one of the fine triangle's sets for a corner, or (kFar) a set next to one of those. If
+  /// such a triangle changes, one of its corners was split; its other corners are next to a part of that. (A proof that
+  /// rests on others yet is never marked, and so asked for again each time.)
   void forget_covered(const std::vector<std::uint32_t>& changed) {
     const FineMesh& mesh = *merged_.mesh;
     std::vector<std::uint8_t> found(mesh.points().size());
@@ -331,7 +348,7 @@ class MergeProof {
   const std::span<const float> tolerance_;
   RunContext& context_;
   std::vector<std::uint8_t> proofs_;
-  std::vector<std::uint8_t> bold_;   ///< by set: to be split
+  std::vector<std::uint8_t> bold_;   ///< sets to be split
   std::vector<std::uint32_t> open_;  ///< fine triangles that are not proved to be covered
   int splits_ = 0;
   MergedMesh merged_;

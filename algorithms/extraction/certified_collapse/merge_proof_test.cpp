@@ -121,7 +121,8 @@ TEST(MergeProof, TakesBackWhatChangesTheTopology) {
   }
 }
 
-/// All of a closed surface in sets none of whose triangles has three: nothing would be left of it.
+/// A closed surface all of whose points are in two sets: no triangle has three sets at its corners, so nothing would be
+/// left of it.
 TEST(MergeProof, BringsBackWhatHasVanished) {
   const std::vector<Vector3d> points = {{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   const FineMesh fine(points, {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}});

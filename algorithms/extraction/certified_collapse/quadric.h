@@ -9,13 +9,14 @@
 
 namespace hermesh {
 
-/// Relative to an anchor that its owner keeps, so that single precision does.
+/// A quadric relative to an anchor that its owner keeps, so that single precision is enough. Voxels, weights in square
+/// voxels.
 struct PlaneQuadric {
   Eigen::Matrix<float, 6, 1> a = Eigen::Matrix<float, 6, 1>::Zero();  ///< xx xy xz yy yz zz
   Eigen::Vector3f b = Eigen::Vector3f::Zero();
   float c = 0;
 
-  /// A plane through the anchor.
+  /// Adds a plane through the anchor.
   void add_plane(const Eigen::Vector3d& unit_normal, double weight) {
     const Eigen::Vector3f n = unit_normal.cast<float>();
     const float w = static_cast<float>(weight);
@@ -23,7 +24,8 @@ struct PlaneQuadric {
   }
 };
 
-/// Of the triangles around a point of a fine mesh, about that; each gives a third of its area to each of its corners.
+/// The quadric of the triangles around a point of a fine mesh, about that point; each triangle gives a third of its
+/// area to each of its corners.
 inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
   PlaneQuadric quadric;
   for (const std::uint32_t t : fine.around(point)) {
@@ -38,13 +40,14 @@ inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
 /// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to decide on a plane.
 inline constexpr double kPull = 1e-6;
 
-/// The same in double precision about any anchor, for one decision.
+/// A quadric in double precision about any anchor, for one decision. The trace of `a` is the sum of the weights, for
+/// normals are of unit length: the quadric over the trace is a mean squared distance.
 struct WideQuadric {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double c = 0;
 
-  /// Adds q, which is about an anchor that lies `shift` from this one's.
+  /// Adds q, which is about a place that lies `shift` from this one's anchor.
   void add(const PlaneQuadric& q, const Eigen::Vector3d& shift) {
     Eigen::Matrix3d m;
     m << q.a[0], q.a[1], q.a[2], q.a[1], q.a[3], q.a[4], q.a[2], q.a[4], q.a[5];
@@ -54,6 +57,7 @@ struct WideQuadric {
     c += q.c - 2 * v.dot(shift) + shift.dot(moved);
   }
   double operator()(const Eigen::Vector3d& x) const { return std::max(0.0, x.dot(a * x) + 2 * b.dot(x) + c); }
+  /// The quadric about a place, given from the anchor.
   PlaneQuadric about(const Eigen::Vector3d& x) const {
     PlaneQuadric q;
     q.a << float(a(0, 0)), float(a(0, 1)), float(a(0, 2)), float(a(1, 1)), float(a(1, 2)), float(a(2, 2));

@@ -18,7 +18,7 @@
 
 namespace hermesh {
 
-/// A cube of cells, or a cell that is alone.
+/// A cube of cells that share one point, or a cell that is alone.
 struct Region {
   std::int32_t block;
   std::uint16_t cell;   ///< the cube's first cell, whether the surface passes through it or not
@@ -28,18 +28,23 @@ struct Region {
   bool operator==(const Region& other) const = default;
 };
 
-/// Which cells share a point. Begins with all cubes that are proposed (region_proposals.h), and gets finer by
-/// split().
+/// Which cells share a point. At first these are all cubes that are proposed (region_proposals.h); split()
+/// makes them finer.
 class CellRegions {
  public:
   static constexpr int kLevels = kCubeLevels;
 
+  /// Proposes cubes. All arguments by reference but `context` must outlive this.
+  /// @param cells the lattice's cells
   /// @param points of the uniform mesh; only those of cells that are alone are ever looked at
-  /// @param options outlive this
+  /// @param options tolerance and sizes of cubes
+  /// @param file rounds places to the file's precision
+  /// @param context told of progress, and asked whether to stop
+  /// @throws Error if there are more cubes than 32 bits can number; Cancelled
   CellRegions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
           const FilePoints& file, RunContext& context);
 
-  /// Of an active cell.
+  /// The region of an active cell.
   Region at(std::int32_t block, int cell) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(block)];
     for (int level = kLevels; level > 0; --level) {
@@ -48,22 +53,22 @@ class CellRegions {
     }
     return {block, static_cast<std::uint16_t>(cell), 0};
   }
-  /// Its point. A cell that is alone must have one sheet.
+  /// The point of a region. A cell that is alone must have one sheet.
   const Eigen::Vector3d& point(const Region& region) const {
     return region.merged() ? cubes_[number(region)].place
                            : points_[cells_.point(region.block, region.cell, 0)];
   }
-  /// Mean of the normals of its crossings; zero where there are none.
+  /// The mean of the normals of a region's crossings, of unit length; zero where there are none.
   Eigen::Vector3d normal(const Region& region) const;
-  /// The least of its cells.
+  /// The least tolerance of the region's cells, voxels.
   float tolerance(const Region& region) const {
     return options_.tolerance.least(cells_, region.block, region.cell, region.side());
   }
   std::size_t cube_count() const { return cubes_.size(); }
-  /// Of a cube, by its number.
+  /// The point, and the normal, of the cube with that number.
   const Eigen::Vector3d& place(std::uint32_t cube) const { return cubes_[cube].place; }
   const Eigen::Vector3f& normal(std::uint32_t cube) const { return cubes_[cube].normal; }
-  /// Of a cube, from 0; it is the same for good.
+  /// The number of a cube, from 0; it never changes.
   std::uint32_t number(const Region& cube) const {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
     const int number = cube_of(cube.cell, cube.level);
@@ -73,22 +78,24 @@ class CellRegions {
     before &= parts_of(larger, 2);
     return own.first_part[static_cast<std::size_t>(larger)] + static_cast<std::uint32_t>(std::popcount(before));
   }
-  /// Leaves single cells until propose_parts() is called. Safe to call for several blocks at once.
+  /// Splits a cube; its cells are alone until propose_parts() is called. Safe to call for several blocks at
+  /// once.
   void split(const Region& region);
-  /// Within the cubes that were split. There are more cubes then. @throws Cancelled
+  /// Proposes cubes within those that were split. @throws Error if there are more cubes than 32 bits can
+  /// number; Cancelled
   void propose_parts(RunContext& context);
 
   /// Cells of a block that belong to cubes, whether the surface passes through them or not.
   const BlockMask& merged(std::int32_t block) const {
     return blocks_[static_cast<std::size_t>(block)].merged;
   }
-  /// By axis the crossing edges of a block that have three regions or more around them, one of them a cube.
+  /// The crossing edges of a block, by axis, that have three regions or more around them, one of them a cube.
   std::array<BlockMask, 3> merged_edges(std::int32_t block) const {
     return merged_edges(block, lone_edges(block));
   }
-  /// @param lone lone_edges()
+  /// What merged_edges() of the block alone returns, where lone_edges() is at hand as `lone`.
   std::array<BlockMask, 3> merged_edges(std::int32_t block, const std::array<BlockMask, 3>& lone) const;
-  /// By axis the crossing edges of a block that have no cube around them.
+  /// The crossing edges of a block, by axis, that have no cube around them.
   std::array<BlockMask, 3> lone_edges(std::int32_t block) const;
 
   /// Calls f(Region) for the cubes of a block, in ascending order by level.
@@ -110,15 +117,15 @@ class CellRegions {
   const RegionOptions& options() const { return options_; }
 
  private:
-  /// (Without initialisers, so that many can be made without writing them twice.)
+  /// The cubes of one block. (Without initializers, so that many can be made without writing them twice.)
   struct BlockRegions {
-    std::array<std::uint64_t, kLevels> proposed, alive;  ///< by level, less 1: a bit a cube
-    std::array<std::uint32_t, kLevels - 1> first_cube;   ///< number, of 4³ and 8³ cells
-    std::array<std::uint32_t, 8> first_part;             ///< of 2³ cells, within each 4³
+    std::array<std::uint64_t, kLevels> proposed, alive;  ///< at level − 1: a bit a cube
+    std::array<std::uint32_t, kLevels - 1> first_cube;   ///< at level − 2: first number of a cube
+    std::array<std::uint32_t, 8> first_part;             ///< first number of a 2³ in each 4³
     BlockMask merged;
-    std::array<std::uint64_t, kLevels> asked;  ///< as `alive`: where cubes are to be proposed
+    std::array<std::uint64_t, kLevels> asked;  ///< like `alive`: where cubes are to be proposed
   };
-  /// Those of a block that are asked for, and where there are none, finer ones.
+  /// Proposes those cubes of a block that are asked for, and finer ones where they do not pass.
   static void propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
                       std::vector<ProposedCube>& found);
   static void find_merged(BlockRegions& block);
@@ -131,7 +138,7 @@ class CellRegions {
   const RegionOptions& options_;
   const FilePoints& file_;
   LargeArray<BlockRegions> blocks_;
-  LargeArray<ProposedCube> cubes_;  ///< by number
+  LargeArray<ProposedCube> cubes_;  ///< all that were ever proposed, by number
 };
 
 }  // namespace hermesh

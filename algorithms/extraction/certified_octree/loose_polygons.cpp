@@ -13,9 +13,9 @@
 namespace hermesh {
 namespace {
 
-constexpr double kWidth = 8;  ///< of the lattice's cubes, voxels
+constexpr double kWidth = 8;  ///< how wide the cubes of the lattice are, voxels
 
-/// Of the cube that a place is in; two far apart may have the same.
+/// The number of a cube; two far apart may have the same, which costs time alone.
 std::uint64_t number_of(const std::array<std::int64_t, 3>& cube) {
   constexpr int kBits = 21;
   const auto part = [](std::int64_t x) {
@@ -43,7 +43,8 @@ Box3 box_of(const NamedPolygon& polygon) {
   return box;
 }
 
-/// A triangle of a polygon, of its first corner and two that follow.
+/// A triangle of a polygon, of the polygon's first corner and two that follow, with which of its corners are
+/// settled.
 struct Half {
   NamedTriangle triangle;
   std::array<bool, 3> settled;
@@ -61,7 +62,7 @@ struct Half {
 };
 int halves(const NamedPolygon& polygon) { return polygon.corners - 2; }
 
-/// Whether the triangles have a corner in common around which none meet.
+/// Whether two triangles have a corner in common around which none meet.
 bool share_settled(const Half& a, const Half& b) {
   for (std::size_t i = 0; i < 3; ++i)
     if (a.settled[i] && std::ranges::find(b.triangle.names, a.triangle.names[i]) != b.triangle.names.end())
@@ -69,13 +70,15 @@ bool share_settled(const Half& a, const Half& b) {
   return false;
 }
 
-/// The triangles of two quads that have one diagonal would not meet, but be four at an edge.
+/// Whether a triangle has both ends of a quad's diagonal. The triangles of two quads that have one diagonal
+/// would not meet, but be four at an edge.
 bool has_diagonal(const Half& t, const NamedPolygon& polygon) {
   const Triangle& names = t.triangle.names;
   return polygon.corners == 4 &&
          std::ranges::count(names, polygon.names[0]) + std::ranges::count(names, polygon.names[2]) == 2;
 }
 
+// Cheap questions first: the exact test is only for triangles whose boxes overlap.
 bool may_meet(const Half& a, const Half& b) {
   return a.box.overlaps(b.box) && !share_settled(a, b) && !certainly_apart(a.triangle, b.triangle);
 }
@@ -94,6 +97,7 @@ bool may_meet(const NamedPolygon& a, const NamedPolygon& b) {
 }  // namespace
 
 LoosePolygons::ByPlace::ByPlace(std::span<const Box3> boxes, const RunContext& context) {
+  // Count, scan, fill, and a sort that makes one order of them, whoever was first.
   std::vector<std::uint64_t> starts(boxes.size());
   parallel_blocks(boxes.size(), context,
                   [&](std::size_t i) { for_each_place(boxes[i], [&](std::uint64_t) { ++starts[i]; }); });
@@ -107,6 +111,7 @@ LoosePolygons::ByPlace::ByPlace(std::span<const Box3> boxes, const RunContext& c
   std::size_t places = 0;
   for (std::size_t i = 0; i < entries_.size(); ++i)
     places += i == 0 || entries_[i].place != entries_[i - 1].place;
+  // Open addressing, at most a quarter full, so a search ends after a few steps and always at a free slot.
   ranges_.assign(std::bit_ceil(4 * places + 1), Range{0, 0, 0});
   for (std::uint32_t first = 0, end; first < entries_.size(); first = end) {
     for (end = first; end < entries_.size() && entries_[end].place == entries_[first].place;) ++end;
@@ -114,7 +119,7 @@ LoosePolygons::ByPlace::ByPlace(std::span<const Box3> boxes, const RunContext& c
   }
 }
 
-/// Where it is, or would be.
+/// The slot where a place is, or would be.
 std::size_t LoosePolygons::ByPlace::slot_of(std::uint64_t place) const {
   std::uint64_t slot = (place * 0x9e3779b97f4a7c15u) >> 32;
   for (;; ++slot) {
@@ -141,7 +146,9 @@ LoosePolygons::LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& 
       by_place_(boxes_, context),
       meets_(polygons_.size()) {}
 
-/// Tested polygons near a box, with boxes relative to its lower corner: in single precision, and rounded up.
+/// Tested polygons near a box, with boxes relative to its lower corner: in single precision, and widened by
+/// more than that rounds. By coordinates and not by polygons, so that the compiler can compare several at
+/// once.
 struct LoosePolygons::Near {
   std::vector<std::uint32_t> polygons;
   std::array<std::vector<float>, 3> lower, upper;
@@ -171,6 +178,8 @@ struct LoosePolygons::Near {
     const float *x0 = lower[0].data(), *y0 = lower[1].data(), *z0 = lower[2].data(), *x1 = upper[0].data(),
                 *y1 = upper[1].data(), *z1 = upper[2].data();
     std::uint8_t* const out = overlap.data();
+    // Comparisons without branches, and apart from the calls: so the compiler can make vector code of them.
+    // What is done about each comes after.
     for (std::size_t i = 0; i < n; ++i)
       out[i] = (x0[i] <= to[0]) & (x1[i] >= from[0]) & (y0[i] <= to[1]) & (y1[i] >= from[1]) &
                (z0[i] <= to[2]) & (z1[i] >= from[2]);
@@ -183,8 +192,10 @@ struct LoosePolygons::Near {
 };
 
 void LoosePolygons::find_near(const Box3& box, Near& near) const {
+  // Relative to the box: single precision is enough for the few voxels around.
   near.begin(box.lower);
   by_place_.for_each_near(box, [&](std::uint32_t polygon, std::uint64_t place) {
+    // A pair may share several cubes of the lattice.
     // Once: where what they have in common begins.
     if (box.overlaps(boxes_[polygon]) &&
         place == number_of(cube_at(box.lower.cwiseMax(boxes_[polygon].lower))))
@@ -194,6 +205,7 @@ void LoosePolygons::find_near(const Box3& box, Near& near) const {
 
 void LoosePolygons::test_against(std::span<const NamedPolygon> polygons) {
   if (polygons.empty()) return;
+  // All polygons of a lot are near one another, so what is near any of them is looked up once.
   thread_local Near near;
   Box3 all;
   for (const NamedPolygon& polygon : polygons)
@@ -201,9 +213,13 @@ void LoosePolygons::test_against(std::span<const NamedPolygon> polygons) {
   find_near(all, near);
   for (const NamedPolygon& polygon : polygons)
     near.for_each_at(box_of(polygon), [&](std::uint32_t i) {
+      // Several threads may find the same polygon; all that they write is 1, so the order does not matter.
       const std::atomic_ref answer(meets_[i]);
       if (answer.load(std::memory_order_relaxed)) return;
+      // Names tell a polygon among those around from the one that is tested.
       const bool is_itself = polygons_[i].name == polygon.name;
+      // A quad is tested against itself, too: its halves share the diagonal, and may be folded onto one
+      // another.
       if (is_itself ? halves(polygon) == 2 && may_meet(Half(polygon, 0), Half(polygon, 1))
                     : may_meet(polygon, polygons_[i]))
         answer.store(1, std::memory_order_relaxed);

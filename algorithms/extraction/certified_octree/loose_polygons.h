@@ -15,28 +15,29 @@
 
 namespace hermesh {
 
-/// A triangle, or a quad that is cut from its first corner to its third. (Without initialisers, so that many can be made
-/// without writing them twice.)
+/// A triangle, or a quad that is cut from its first corner to its third. (Without initializers, so that many
+/// can be made without writing them twice.)
 struct NamedPolygon {
-  std::uint64_t name;  ///< no other polygon's
+  std::uint64_t name;  ///< no other polygon has it
   int corners;
-  std::array<std::uint32_t, 4> names;  ///< of the corners: those of the same name are the same point
+  std::array<std::uint32_t, 4> names;  ///< corners of the same name are the same point
   std::array<Eigen::Vector3d, 4> points;
   /// Corners around which triangles are known not to meet (polygon_stars.h), a bit each.
   unsigned settled;
 };
 
-/// Which polygons meet another one in more than the corners and the edge that they share, or may do so, or
-/// themselves where they are quads.
+/// A test of which polygons meet another one in more than the corners and the edge that they share, or may do
+/// so, or meet themselves where they are quads.
 class LoosePolygons {
  public:
-  /// @throws Cancelled
+  /// Takes the polygons that are tested. @throws Cancelled
   LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& context);
 
-  /// Of the polygons around, some that are near one another: with those that are tested among them, or
-  /// without. Safe to call for several lots at once.
+  /// Tests against some of the polygons around, best such as are near one another. The polygons that are
+  /// tested may be among them or not. Safe to call for several lots at once.
   void test_against(std::span<const NamedPolygon> polygons);
-  /// The places, in the list given, of those that meet what they were tested against; ascending.
+  /// The numbers, in the list of those tested, of the polygons that meet what they were tested against;
+  /// ascending.
   std::vector<std::size_t> that_meet() const;
 
  private:
@@ -57,19 +58,19 @@ class LoosePolygons {
     LargeArray<Entry> entries_;  ///< ascending
     struct Range {
       std::uint64_t place;
-      std::uint32_t first, end;  ///< none if they are equal
+      std::uint32_t first, end;  ///< a free slot if they are equal
     };
     std::size_t slot_of(std::uint64_t place) const;
-    std::vector<Range> ranges_;  ///< of each place's entries, found by hashing
+    std::vector<Range> ranges_;  ///< where each place's entries are, found by hashing
   };
 
   struct Near;
   void find_near(const Box3& box, Near& near) const;
 
   LargeArray<NamedPolygon> polygons_;
-  std::vector<Box3> boxes_;  ///< theirs
+  std::vector<Box3> boxes_;  ///< one for each polygon
   ByPlace by_place_;
-  std::vector<std::uint8_t> meets_;  ///< by polygon
+  std::vector<std::uint8_t> meets_;  ///< 1 for polygons that meet others
 };
 
 }  // namespace hermesh

@@ -10,7 +10,7 @@ namespace {
 using Eigen::Vector3d;
 using Indices = std::vector<std::size_t>;
 
-/// Which polygon of a mesh: its quads and its triangles are numbered apart.
+/// A polygon of a mesh by its number: quads and triangles are numbered apart.
 struct Which {
   std::size_t number;
   bool is_quad;
@@ -66,7 +66,7 @@ TEST(LoosePolygons, MeetWhatPassesThroughThem) {
   EXPECT_EQ(two_triangles(1.5).that_meet({kFirstTriangle, kSecondTriangle}), Indices{});
 }
 
-/// Whose boxes share no point of the lattice by which they are found but in one cube.
+/// Polygons whose boxes share but one cube of the lattice by which they are found.
 TEST(LoosePolygons, MeetAcrossTheLattice) {
   Mesh mesh{{{-30, 0.5, 0.5}, {30, 0.5, 0.5}, {30, 1, 0.5}, {20.5, -20, 0}, {20.5, 20, 0}, {20.5, 0, 3}},
             {},
@@ -111,7 +111,7 @@ TEST(LoosePolygons, HaveDiagonalsOfTheirOwn) {
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
 }
 
-/// Around a corner that somebody else has looked at nothing is tested, but everywhere else.
+/// Nothing is tested around a corner that somebody else has looked at, but everywhere else.
 TEST(LoosePolygons, NeedNoTestAroundSettledCorners) {
   Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {1, 1, 0}},
             {{0, 1, 3, 2}},

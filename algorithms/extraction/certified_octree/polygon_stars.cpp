@@ -7,8 +7,8 @@
 namespace hermesh {
 namespace {
 
-/// Of a parallelogram seen along a direction, in square voxels: what is certainly not rounding for sides of
-/// some tens of voxels.
+/// What the area of a parallelogram seen along a direction must exceed, in square voxels, to be certainly not
+/// rounding for sides of some tens of voxels.
 constexpr double kTurnedUp = 1e-9;
 
 }  // namespace
@@ -19,6 +19,7 @@ void PolygonStars::ask(std::uint32_t point) {
 
 void PolygonStars::add(std::uint32_t point, const Eigen::Vector3d& up, const Eigen::Vector3d& to_first,
                        const Eigen::Vector3d& to_second) {
+  // A sum and a bit that is only ever set: the same whatever the order of threads.
   const std::atomic_ref mark(marks_[point]);
   if (!(up.dot(to_first.cross(to_second)) > kTurnedUp)) {
     mark.fetch_or(kTurned, std::memory_order_relaxed);

@@ -10,7 +10,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Of triangles from the origin to each two places that follow one another, seen from above.
+/// Whether the star of triangles from the origin to each two places of a ring that follow one another is
+/// plain, seen from above.
 bool is_plain(const std::vector<Vector3d>& ring, const Vector3d& up = Vector3d::UnitZ()) {
   PolygonStars stars(2);
   stars.ask(1);
@@ -19,7 +20,7 @@ bool is_plain(const std::vector<Vector3d>& ring, const Vector3d& up = Vector3d::
   return stars.is_plain(1);
 }
 
-/// So many places, evenly around, that go around so many times.
+/// A ring of places, evenly around the origin, that goes around so many times.
 std::vector<Vector3d> around(int places, int turns) {
   std::vector<Vector3d> ring;
   for (int i = 0; i < places; ++i) {

@@ -14,14 +14,14 @@ constexpr int cube_of(int cell, int level) {
   const int bits = kCubeLevels - level;
   return ((((cell >> 6) >> level) << bits | ((cell >> 3) & 7) >> level) << bits) | (cell & 7) >> level;
 }
-/// Of a cube's cells.
+/// The first cell of a cube: the one with the least coordinates.
 constexpr int first_cell(int cube, int level) {
   const int bits = kCubeLevels - level, mask = (1 << bits) - 1;
   return sample_index((cube >> (2 * bits)) << level, ((cube >> bits) & mask) << level,
                       (cube & mask) << level);
 }
 
-/// Those of the next finer level that a cube of 4³ or 8³ cells is made of, a bit each.
+/// The cubes of the next finer level that a cube of 4³ or 8³ cells is made of, a bit each.
 constexpr std::uint64_t parts_of(int cube, int level) {
   const int bits = kCubeLevels - level, mask = (1 << bits) - 1;
   const int x = 2 * (cube >> (2 * bits)), y = 2 * ((cube >> bits) & mask), z = 2 * (cube & mask);
@@ -32,7 +32,7 @@ constexpr std::uint64_t parts_of(int cube, int level) {
   return parts;
 }
 
-/// Bits of a cube in each of its words of a mask, less its first rows along y or z.
+/// The bits that a cube has in each of its words of a mask, less its first rows along y and columns along z.
 constexpr std::uint64_t rows_of(int first, int side, int skip_y, int skip_z) {
   const std::uint64_t row = (((std::uint64_t{1} << side) - 1) >> skip_z << skip_z) << (first & 7);
   std::uint64_t rows = 0;

@@ -32,8 +32,8 @@ class RegionPolygons {
         made_(cells_.size()),
         untested_(filled(cells_.size(), BlockMask{}, context)) {}
 
-  /// Makes those of blocks anew where any are others than they were.
-  /// @param changed by block the samples whose edges may have others
+  /// Makes the polygons of blocks anew where any are others than they were: `changed` has the samples, by
+  /// block, whose edges may have others.
   void update(std::span<const BlockMask> changed, RunContext& context) {
     Stage stage(context, "connect regions");
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -41,6 +41,8 @@ class RegionPolygons {
       for (std::size_t word = 0; word < 8; ++word) untested_[b][word] |= changed[b][word];
       const auto block = static_cast<std::int32_t>(b);
       const std::array<BlockMask, 3> lone = regions_.lone_edges(block);
+      // Where cubes merge most of the surface few blocks have such edges, and memory is taken for those
+      // alone.
       if (any(lone[0]) || any(lone[1]) || any(lone[2]))
         lone_edges_.at(b) = lone;
       else
@@ -60,7 +62,7 @@ class RegionPolygons {
     return sum;
   }
 
-  /// Edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
+  /// The edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
   std::vector<CellBlocks::Edge> loose_that_meet(std::span<const BlockMask> changed,
                                                 RunContext& context) const {
     Stage stage(context, "test loose polygons");
@@ -72,12 +74,13 @@ class RegionPolygons {
     });
   }
 
-  /// Edges of loose polygons that meet others of the uniform mesh, where any of the two are new since this
-  /// was asked last.
+  /// The edges of loose polygons that meet others of the uniform mesh, where any of the two are new since
+  /// this was asked last.
   std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "test loose polygons");
     const LargeArray<BlockMask> changed = std::exchange(untested_, filled(made_.size(), BlockMask{}, context));
     return that_meet(changed, two_on(changed), nullptr, context, [&](std::size_t b, auto&& test) {
+      // The triangles of a fan have one edge, and are told apart by a count over the block.
       std::uint64_t part = 0;
       for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
         const auto on_polygon = [&](auto corners) {
@@ -91,7 +94,8 @@ class RegionPolygons {
     });
   }
 
-  /// There are no polygons here any more then: what a block has is freed in parallel, too. @param fine has those of lone edges
+  /// Makes the mesh. There are no polygons here any more then: what a block has is freed in parallel, too.
+  /// `fine` has the polygons of lone edges.
   RegionMesh take_mesh(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "connect regions");
     const std::size_t n = cells_.size();
@@ -101,6 +105,8 @@ class RegionPolygons {
       return is_cube(name) ? number_of_cube[name - first_cube_]
                            : number_of_point[points_.slot(point_of(name))];
     };
+    // Count, scan, fill. Points are numbered before any polygon is written, for its corners may be those of
+    // other blocks.
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
     parallel_blocks(n, context, [&](std::size_t b) {
       for_each_point(b, fine, [&](std::uint32_t) { ++points[b]; });
@@ -148,10 +154,10 @@ class RegionPolygons {
       return std::span(names).first(static_cast<std::size_t>(corners));
     }
   };
-  /// Of a block.
+  /// What a block has.
   struct Made {
     std::vector<Polygon> polygons;
-    std::vector<std::uint32_t> loose;  ///< among the polygons
+    std::vector<std::uint32_t> loose;  ///< which of the polygons are loose
   };
 
   template <class F>
@@ -163,15 +169,16 @@ class RegionPolygons {
   }
 
   std::uint32_t first_fan() const { return first_cube_ + static_cast<std::uint32_t>(regions_.cube_count()); }
+  /// The name of a region's point.
   std::uint32_t name_of(const Region& region) const {
     return region.merged() ? first_cube_ + regions_.number(region)
                            : cells_.point(region.block, region.cell, 0);
   }
-  /// Of a point of the uniform mesh.
+  /// The name of a point of the uniform mesh.
   std::uint32_t name_of(std::uint32_t point) const {
     return point < first_cube_ ? point : point - first_cube_ + first_fan();
   }
-  /// Of a polygon. @param part 0 for that of regions
+  /// The name of a polygon; `part` is 0 for that of regions, and counts those of the uniform mesh.
   static std::uint64_t name_of(const CellBlocks::Edge& edge, std::uint64_t part) {
     return (part << 44) + (static_cast<std::uint64_t>(edge.block) << 11 |
                            static_cast<std::uint64_t>(edge.axis << 9 | edge.sample));
@@ -179,12 +186,12 @@ class RegionPolygons {
   const Vector3d& place(std::uint32_t name) const {
     return is_cube(name) ? regions_.place(name - first_cube_) : points_[point_of(name)];
   }
-  /// Of the uniform mesh, from the name of one that is no cube's.
+  /// The point of the uniform mesh that has a name, which must be no cube's.
   std::uint32_t point_of(std::uint32_t name) const {
     return name < first_cube_ ? name : name - first_fan() + first_cube_;
   }
   bool is_cube(std::uint32_t name) const { return name >= first_cube_ && name < first_fan(); }
-  /// @param stars of cubes' points; none if null
+  /// A polygon as LoosePolygons wants it, with the corners that `stars` settles; none if that is null.
   NamedPolygon named(const Polygon& polygon, const PolygonStars* stars) const {
     NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}, 0};
     for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i) {
@@ -195,8 +202,8 @@ class RegionPolygons {
     return result;
   }
 
-  /// Of the cubes that new loose polygons have. A cube's polygons are in blocks next to its own, or there.
-  /// @param near two_on(changed)
+  /// The stars of the cubes that new loose polygons have. A cube's polygons are in blocks next to its own, or
+  /// there, so those of blocks in `near`, which is two_on(changed), are all of them.
   PolygonStars stars_of_loose(std::span<const BlockMask> changed, const std::vector<std::uint8_t>& near,
                               RunContext& context) const {
     PolygonStars stars(regions_.cube_count());
@@ -213,6 +220,7 @@ class RegionPolygons {
         for (std::size_t i = 0; i < names.size(); ++i) {
           const std::uint32_t cube = names[i] - first_cube_;
           if (!is_cube(names[i]) || !stars.is_asked(cube)) continue;
+          // Seen along the cube's mean normal, along which its polygons should face up.
           const Vector3d &point = place(names[i]), up = regions_.normal(cube).cast<double>();
           const auto add = [&](std::size_t first, std::size_t second) {
             stars.add(cube, up, place(names[first]) - point, place(names[second]) - point);
@@ -230,13 +238,14 @@ class RegionPolygons {
     return stars;
   }
 
-  /// Edges of loose polygons that meet others. A loose polygon is within a block of its edge's, so two
+  /// The edges of loose polygons that meet others. A loose polygon is within a block of its edge's, so two
   /// polygons can only meet if these are at most two apart.
   /// @param changed samples whose edges have new polygons, by block
   /// @param near two_on(changed)
   /// @param stars as named() wants them
+  /// @param context asked whether to stop
   /// @param others called with a block and a function, which it calls with samples of edges, and functions
-  /// for their polygons
+  ///   for their polygons
   template <class F>
   std::vector<CellBlocks::Edge> that_meet(std::span<const BlockMask> changed,
                                           const std::vector<std::uint8_t>& near, const PolygonStars* stars,
@@ -249,6 +258,7 @@ class RegionPolygons {
         for (const std::uint32_t number : made_[b].loose)
           if (const Polygon& polygon = made_[b].polygons[number]; test(changed[b], polygon.sample()) == is_new) f(polygon);
       };
+      // Count, scan, fill: the list, and so the result, is in the order of blocks.
       std::vector<std::uint64_t> first(made_.size());
       parallel_blocks(made_.size(), context,
                       [&](std::size_t b) { for_each_asked(b, [&](const Polygon&) { ++first[b]; }); });
@@ -264,6 +274,7 @@ class RegionPolygons {
       LoosePolygons loose(std::move(polygons), context);
       parallel_blocks(made_.size(), context, [&](std::size_t b) {
         if (!near[b]) return;
+        // The polygons of one block are near one another, which is what test_against() is quick for.
         thread_local std::vector<NamedPolygon> beside;
         beside.clear();
         others(b, [&](int sample, auto&& polygon) {
@@ -276,6 +287,8 @@ class RegionPolygons {
     return result;
   }
 
+  /// Makes the polygon of an edge: rotated so that a quad is cut from its first corner to its third, and
+  /// turned about where the outside is below.
   void make(const CellBlocks::Edge& edge, Made& made) const {
     const RegionPolygon polygon = polygon_of(regions_, edge, ring_of(regions_, edge));
     if (polygon.loose) made.loose.push_back(static_cast<std::uint32_t>(made.polygons.size()));
@@ -288,7 +301,7 @@ class RegionPolygons {
     made.polygons.push_back(result);
   }
 
-  /// Calls quad(Quad) or triangle(Triangle), of names.
+  /// Calls quad(Quad) or triangle(Triangle) for the polygons of a block, by names of corners.
   template <class OnQuad, class OnTriangle>
   void for_each_polygon(std::size_t b, const EdgePolygons& fine, OnQuad&& quad, OnTriangle&& triangle) const {
     for (const Polygon& polygon : made_[b].polygons) {
@@ -308,7 +321,8 @@ class RegionPolygons {
     });
   }
 
-  /// Calls f(name) for those of the mesh's points that a block has.
+  /// Calls f(name) for those of the mesh's points that a block has: cubes, cells that are alone, points on
+  /// fans.
   template <class F>
   void for_each_point(std::size_t b, const EdgePolygons& fine, F&& f) const {
     const auto block = static_cast<std::int32_t>(b);
@@ -322,7 +336,7 @@ class RegionPolygons {
     });
   }
 
-  /// Blocks at most two from those that have any.
+  /// The blocks, 1 each, at most two steps from those that have any of the cells.
   std::vector<std::uint8_t> two_on(std::span<const BlockMask> cells) const {
     std::vector<std::uint8_t> result(cells.size());
     std::vector<std::size_t> last, next;
@@ -331,6 +345,7 @@ class RegionPolygons {
         result[b] = 1;
         last.push_back(b);
       }
+    // As in the first round, when everything is new.
     if (last.size() == cells.size()) return result;
     for (int step = 0; step < 2; ++step) {
       for (const std::size_t b : last)
@@ -346,12 +361,13 @@ class RegionPolygons {
   const CellBlocks& cells_;
   const UniformPoints& points_;
   const std::uint32_t first_cube_;  ///< name
-  EdgeMasks lone_edges_;            ///< by block and axis: those whose polygons are of the uniform mesh
-  std::vector<Made> made_;          ///< by block
-  LargeArray<BlockMask> untested_;   ///< by block: as update() has it, against the uniform mesh
+  EdgeMasks lone_edges_;            ///< edges whose polygons are of the uniform mesh
+  std::vector<Made> made_;          ///< one for each block
+  LargeArray<BlockMask> untested_;   ///< changed samples not yet tested against the uniform mesh, by block
 };
 
-/// By point of the uniform mesh, those on fanned edges included.
+/// The tolerance of each point of the uniform mesh, those on fanned edges included, whose tolerance is the
+/// least of the four cells around.
 std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolygons& polygons,
                                         const CellTolerances& tolerance, RunContext& context) {
   std::vector<float> result(polygons.point_count());
@@ -372,7 +388,8 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
   return result;
 }
 
-/// @param connect() the polygons of the uniform mesh, of lone edges at least
+/// Splits cubes until all promises are kept, and makes the mesh. `connect(edges)` returns the polygons of the
+/// uniform mesh, of these edges at least.
 template <class Connect>
 RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
                  RunContext& context) {
@@ -381,6 +398,9 @@ RegionMesh merge(const CellRegions& regions, const UniformPoints& points, Region
     for (const CellBlocks::Edge& edge : meeting) proof.call_bold(edge);
     return !meeting.empty();
   };
+  // What each turn finds it splits, so there are at most as many turns as cubes. Distances are proved first;
+  // contacts are only asked for among polygons that would stay; the uniform mesh, which may have to be made
+  // for it, is last.
   for (std::size_t splits = 0;;) {
     splits += proof.run();
     const LargeArray<BlockMask> changed = proof.take_changed();
@@ -400,6 +420,8 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
                          const FilePoints& file, RunContext& context) {
   const CellBlocks& cells = uniform.cells();
   const UniformPoints& points = uniform.points();
+  // Large tolerances do without the uniform mesh but for what stays of it: beyond the cubes' diagonal nothing
+  // is to be shown of distances, below it slabs show them (region_proof.h).
   if (options.tolerance.least() > RegionSlabs::kLeast) {
     const bool needs_slabs =
         options.tolerance.least() <= RegionProof::kDiagonal * float(options.largest_cube);
@@ -409,6 +431,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
     if (needs_slabs) slabs.emplace(regions, in_hulls ? nullptr : &points, context);
     RegionProof proof =
         slabs ? RegionProof(regions, *slabs, uniform, context) : RegionProof(regions, uniform, context);
+    // Made anew after each split, of the edges that are lone by then.
     std::optional<EdgePolygons> fine;
     return merge(
         regions, points, proof,
@@ -417,6 +440,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
         },
         context);
   }
+  // Up to two voxels a shell proves each polygon by all of the uniform mesh around it, so that is made first.
   uniform.place_all(context);
   const EdgePolygons fine = uniform.connect(nullptr, context);
   CellRegions regions(cells, points, options, file, context);

@@ -66,7 +66,7 @@ TEST(RegionMesh, FlatnessKeepsCubesSmall) {
   EXPECT_LT(farthest_from_sphere(flat, 20.0), farthest_from_sphere(coarse, 20.0) / 2);
 }
 
-/// A tolerance beyond their diagonal, so that nothing is to be shown of distances.
+/// Tolerances beyond the cubes' diagonal, so that nothing is to be shown of distances.
 TEST(RegionMesh, CubesAreAtMostAsLargeAsAsked) {
   const FloatHermite hermite = sphere(20.0);
   RunContext context;

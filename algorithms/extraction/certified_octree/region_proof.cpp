@@ -18,6 +18,7 @@ constexpr BlockMask kAll = [] {
   return mask;
 }();
 
+/// Adds a cube's cells to a mask of its block.
 void add(BlockMask& mask, const Region& region) {
   for (int x = 0; x < region.side(); ++x)
     mask[static_cast<std::size_t>((region.cell >> 6) + x)] |= rows_of(region.cell, region.side(), 0, 0);
@@ -56,6 +57,7 @@ RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionS
       stirred_(filled(cells_.size(), kAll, context)),
       open_(shell ? cells_.size() : 0),
       loose_(slabs ? cells_.size() : 0) {
+  // Nothing is looked at then, so no turns are needed.
   if (!slabs && !shell) return;
   for (std::size_t b = 0; b < cells_.size(); ++b) {
     const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
@@ -68,7 +70,9 @@ RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionS
 std::size_t RegionProof::run() {
   Stage stage(context_, "prove regions");
   std::size_t splits = std::exchange(is_fresh_, false) ? 0 : split();  // what was called bold meanwhile
+  // Each round splits a cube at least, until no polygon fails; at worst all cells are alone and T is S.
   for (;;) {
+    // Cells that are alone have points in polygons of T; they are made as cubes fall apart.
     if (uniform_) place_lone_points();
     if (!slabs_ && !shell_) return splits;
     if (slabs_) begin_slabs();
@@ -87,12 +91,13 @@ LargeArray<BlockMask> RegionProof::take_changed() {
 void RegionProof::place_lone_points() {
   LargeArray<BlockMask> alone(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
+    // Elsewhere no cell has become alone since the last time.
     alone[b] = any(fresh_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
   });
   uniform_->place(alone, context_);
 }
 
-/// Calls f(cube) for those of a block that may have new polygons.
+/// Calls f(cube) for the cubes of a block that may have new polygons.
 template <class F>
 void RegionProof::for_each_touched(std::size_t b, F&& f) const {
   if (!any(stirred_[b])) return;
@@ -101,8 +106,8 @@ void RegionProof::for_each_touched(std::size_t b, F&& f) const {
   });
 }
 
-/// Of new cubes. Those beside them keep theirs, which still tell of polygons that are gone: so less is done
-/// anew.
+/// Begins the slabs of new cubes. The cubes beside them keep theirs, which still tell of polygons that are
+/// gone: they are wider than need be, but less is done anew.
 void RegionProof::begin_slabs() {
   slabs_->make_room();
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
@@ -119,7 +124,8 @@ void RegionProof::look_at_polygons() {
     parallel_blocks(turn.size(), context_, [&](std::size_t i) { look_at_polygons(turn[i]); });
 }
 
-/// New ones, those not shown before, and loose ones that may touch new cubes.
+/// Looks at the polygons of a block: new ones, those not shown before, and loose ones that may touch new
+/// cubes.
 void RegionProof::look_at_polygons(std::size_t b) {
   const auto block = static_cast<std::int32_t>(b);
   const bool is_stirred = any(stirred_[b]);
@@ -134,9 +140,12 @@ void RegionProof::look_at_polygons(std::size_t b) {
     const auto a = static_cast<std::size_t>(axis);
     BlockMask looked_at;
     for (std::size_t word = 0; word < 8; ++word) {
+      // With slabs a polygon is never open: it is the cubes that are asked, once all polygons are in.
       looked_at[word] = edges[a][word] & (stirred_[b][word] | (shell_ ? open_[b][a][word] : 0));
       if (slabs_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
     }
+    // A loose polygon may reach into any cube near it, so it is added again where new ones have been begun; to
+    // widen the slabs of others once more changes nothing.
     if (slabs_)
       for_each_bit(loose_[b][a], [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
@@ -149,7 +158,8 @@ void RegionProof::look_at_polygons(std::size_t b) {
         mask[static_cast<std::size_t>(sample >> 6)] |= std::uint64_t{1} << (sample & 63);
       };
       const RegionRing ring = ring_of(regions_, edge);
-      // Of a cube that is split anyway. Slabs want all polygons, and in any order.
+      // A polygon of a cube that is split anyway is gone in the next round, and stays open. Slabs want all
+      // polygons, and in any order.
       if (shell_ && std::any_of(ring.regions.begin(), ring.regions.begin() + ring.corners,
                                 [&](const Region& region) { return region.merged() && is_bold(region); }))
         return set(open_[b][a]);
@@ -158,6 +168,7 @@ void RegionProof::look_at_polygons(std::size_t b) {
         slabs_->add(polygon);
         if (polygon.loose) set(loose_[b][a]);
       }
+      // Kept to its envelope, a polygon needs nothing with slabs but that its cubes' slabs hold.
       if (shell_ ? shell_->holds(polygon) : !polygon.loose || slabs_->holds(polygon)) return;
       call_bold(ring.largest());
       if (shell_) set(open_[b][a]);
@@ -165,6 +176,7 @@ void RegionProof::look_at_polygons(std::size_t b) {
   }
 }
 
+/// Asks each cube whose polygons may have changed, once all of these have been added.
 void RegionProof::look_at_slabs() {
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     for_each_touched(b, [&](const Region& cube) {
@@ -176,6 +188,7 @@ void RegionProof::look_at_slabs() {
 void RegionProof::call_bold(const CellBlocks::Edge& edge) { call_bold(ring_of(regions_, edge).largest()); }
 
 void RegionProof::call_bold(const Region& cube) {
+  // Bits that are only ever set while others look; split() reads them when all are done.
   std::atomic_ref(any_bold_[static_cast<std::size_t>(cube.block)]).store(1, std::memory_order_relaxed);
   std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
       .fetch_or(std::uint64_t{1} << cube_of(cube.cell, cube.level), std::memory_order_relaxed);
@@ -187,7 +200,8 @@ bool RegionProof::is_bold(const Region& cube) {
   return (bits >> cube_of(cube.cell, cube.level)) & 1;
 }
 
-/// How many cubes were split.
+/// Splits the cubes that were called bold, proposes smaller ones in their place, and marks what has changed.
+/// Returns how many cubes were split.
 std::size_t RegionProof::split() {
   std::vector<std::uint32_t> splits(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
@@ -206,6 +220,7 @@ std::size_t RegionProof::split() {
     }
     splits[b] = static_cast<std::uint32_t>(here.size());
   });
+  // Smaller cubes are proposed for all blocks at once, when no block is splitting any more.
   const std::size_t all = std::reduce(splits.begin(), splits.end(), std::size_t{0});
   if (all == 0) return 0;
   regions_.propose_parts(context_);
@@ -216,6 +231,8 @@ std::size_t RegionProof::split() {
           return there >= 0 && splits[static_cast<std::size_t>(there)] > 0;
         }))
       return;
+    // A polygon has changed if a region around its edge has: its edge starts in one of the split cubes or
+    // next to it.
     stirred_[b] = widened<1>([&](int x, int y, int z) -> const BlockMask* {
       const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(x, y, z))];
       return there < 0 ? nullptr : &fresh_[static_cast<std::size_t>(there)];

@@ -18,9 +18,9 @@
 
 namespace hermesh {
 
-/// Of a merged mesh T beside the uniform mesh S, whose cells' points lie within their cells.
+/// Proves a merged mesh T beside the uniform mesh S, whose cells' points lie within their cells.
 ///
-/// **Topology.** Needs no proof here. The cells of a cube are a disc of S, which T shrinks to a point. That
+/// **Topology** needs no test here. The cells of a cube are a disc of S, which T shrinks to a point. That
 /// keeps the surface as it is if any two regions beside one another have one piece of border in common, and
 /// each edge between regions, crossed, one polygon. So it is, for the common part of two regions' faces is
 /// all of the smaller one's, the common part of several regions' edges all of the smallest one's, and a
@@ -38,33 +38,33 @@ namespace hermesh {
 /// are tested against all others (loose_polygons.h), but for those around a cube's point of which one look
 /// tells (polygon_stars.h).
 ///
-/// **Distance.** Of tolerances that are small, see region_shell.h, for which all of S must be there; of large
-/// ones region_slabs.h. Beyond the largest cubes' diagonal nothing is left to be shown: S passes through each
+/// **Distance.** For small tolerances see region_shell.h, for which all of S must be there; for large ones
+/// region_slabs.h. Beyond the largest cubes' diagonal nothing is left to be shown: S passes through each
 /// edge that has a polygon of T, whose corners are in regions at that edge; and each point of S is in a
 /// region whose point T has.
 class RegionProof {
  public:
-  /// Times the side of the largest cubes: their diagonal, rounded up.
+  /// The diagonal of a cube, in sides of it, rounded up.
   static constexpr float kDiagonal = 1.7321f;
 
-  /// For tolerances beyond the largest cubes' diagonal. @param uniform makes the points of cells that are
-  /// alone
+  /// The proof for tolerances beyond the largest cubes' diagonal. `uniform` makes the points of cells that
+  /// are alone. All arguments must outlive this.
   RegionProof(CellRegions& regions, UniformCells& uniform, RunContext& context);
-  /// With slabs, and such points.
+  /// The proof with slabs. `uniform` makes the points of cells that are alone.
   RegionProof(CellRegions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context);
-  /// With a shell. All points that the uniform mesh has in cells have been made.
+  /// The proof with a shell. All points that the uniform mesh has in cells must have been made.
   RegionProof(CellRegions& regions, const RegionShell& shell, RunContext& context);
 
   /// Splits until all polygons keep the promises, but for whether loose ones meet others. Then all points are
   /// there.
   /// @returns how many cubes were split
-  /// @throws Cancelled
+  /// @throws Error as CellRegions::propose_parts() does; Cancelled
   std::size_t run();
 
-  /// By block the samples whose edges may have other polygons than when this was asked last.
+  /// The samples, by block, whose edges may have other polygons than when this was asked last.
   LargeArray<BlockMask> take_changed();
 
-  /// The largest cube around the edge is to be split when run() is called again.
+  /// Has the largest cube around the edge split when run() is called again.
   void call_bold(const CellBlocks::Edge& edge);
 
  private:
@@ -85,22 +85,23 @@ class RegionProof {
 
   CellRegions& regions_;
   const CellBlocks& cells_;
-  RegionSlabs* const slabs_;        ///< either these
-  const RegionShell* const shell_;  ///< or this, or neither;
-  UniformCells* const uniform_;     ///< null with the second, which wants all points beforehand
+  RegionSlabs* const slabs_;        ///< how distances are proved: by these slabs,
+  const RegionShell* const shell_;  ///< or by this shell, or not at all if both are null
+  /// Makes points as cells become alone; null with a shell, which wants all beforehand.
+  UniformCells* const uniform_;
   RunContext& context_;
   std::vector<std::array<std::uint64_t, CellRegions::kLevels>>
-      bold_;                            ///< by block and level, less 1: cubes to be split
-  std::vector<std::uint8_t> any_bold_;  ///< by block
-  LargeArray<BlockMask> changed_;       ///< by block: stirred since take_changed()
-  // Cells by block:
-  LargeArray<BlockMask> fresh_;     ///< of cubes that were split (all at the beginning),
-  LargeArray<BlockMask> stirred_;   ///< or next to one
+      bold_;                            ///< cubes to be split, for each block at level − 1
+  std::vector<std::uint8_t> any_bold_;  ///< 1 for blocks that have one of these
+  LargeArray<BlockMask> changed_;       ///< cells stirred since take_changed()
+  // Cells of each block:
+  LargeArray<BlockMask> fresh_;     ///< cells of cubes that were split last (all at the beginning)
+  LargeArray<BlockMask> stirred_;   ///< fresh cells and those next to one
   bool is_fresh_ = true;            ///< nothing was looked at yet
   std::vector<std::array<BlockMask, 3>>
-      open_;  ///< by block and axis: edges whose polygons are not shown; with a shell
-  std::vector<std::array<BlockMask, 3>> loose_;  ///< by block and axis: edges of loose polygons; with slabs
-  std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks, by the parity of where they are; with slabs or a shell
+      open_;  ///< edges whose polygons are not shown, for each block and axis; with a shell
+  std::vector<std::array<BlockMask, 3>> loose_;  ///< edges of loose polygons, likewise; with slabs
+  std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks of each parity; with slabs or a shell
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };
 

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 /// asked. Up to two voxels the proof knows distances well (region_shell.h); beyond, it looks at slabs
 /// (region_slabs.h) that are some six times as thick.
 double flatness_for(double tolerance) { return std::max(0.3 * std::min(tolerance, 2.0), 0.15 * tolerance); }
-/// Length of the mean of a cube's unit normals: what bends more than this, the proof would mostly split.
+/// How long the mean of a cube's unit normals must be: what bends more, the proof would mostly split.
 double least_agreement_for(double tolerance) { return tolerance <= 2.0 ? 0.93 : 0.75; }
 /// How strongly the place is drawn to the mean of the crossings, against the planes: it should lie in the
 /// middle of what it stands for, but on the surface.
@@ -34,7 +34,7 @@ constexpr int kStep[3] = {64, 8, 1};  ///< from a cell to the next
 
 int coordinate(int cell, int axis) { return (cell / kStep[axis]) & 7; }
 
-/// Of samples about the block's middle, behind a 1.
+/// The places of samples about the block's middle, behind a 1.
 const std::array<Array4f, 512> kPlaces = [] {
   std::array<Array4f, 512> places;
   for (int sample = 0; sample < 512; ++sample)
@@ -60,7 +60,8 @@ void RegionProposals::Sum::clear() {
   for (Array4f* all : {&products[0], &products[1], &products[2], &normals, &places}) all->setZero();
 }
 
-/// By whole vectors: built from single numbers they would take longer than all the rest.
+/// Adds the plane of a crossing, by whole vectors: built from single numbers they would take longer than all
+/// the rest. An EdgeCrossing is read as four floats, its offset and its normal.
 void RegionProposals::Sum::add(const EdgeCrossing& crossing, const Array4f& place) {
   const Array4f first(1, 0, 0, 0), others(0, 1, 1, 1);
   const Array4f normal = others * Eigen::Map<const Array4f>(&crossing.offset);
@@ -73,6 +74,8 @@ void RegionProposals::Sum::add(const EdgeCrossing& crossing, const Array4f& plac
 
 std::uint64_t RegionProposals::propose(std::int32_t block, int level, std::uint64_t asked,
                                        std::vector<ProposedCube>& found) {
+  // One pass over the block's crossings sums up all cubes of the level. A crossing counts for the cube that
+  // its first sample is in, whose cell has it for an edge.
   read(block);
   std::uint64_t used = 0;
   for_each_crossing([&](int sample, const EdgeCrossing& crossing, const Array4f& place) {
@@ -96,6 +99,7 @@ std::uint64_t RegionProposals::propose(std::int32_t block, int level, std::uint6
 void RegionProposals::read(std::int32_t block) {
   if (std::exchange(block_, block) == block) return;
   const auto& neighbours = cells_.source(block).neighbours;
+  // Most blocks have no special cell near, and all of their cells are free.
   free_.fill(~std::uint64_t{0});
   if (std::ranges::any_of(neighbours,
                           [&](std::int32_t there) { return there >= 0 && any(cells_[there].special); })) {
@@ -107,6 +111,7 @@ void RegionProposals::read(std::int32_t block) {
   }
   const std::array<BlockMask, 8> signs = cells_.corner_signs(block);
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    // The surface passes through a face if its four corners are not all alike.
     const std::size_t u = std::size_t{1} << (axis + 1) % 3, v = std::size_t{1} << (axis + 2) % 3;
     for (std::size_t word = 0; word < 8; ++word) {
       const std::uint64_t a = signs[0][word], b = signs[u][word], c = signs[v][word], d = signs[u | v][word];
@@ -132,6 +137,7 @@ void RegionProposals::for_each_crossing(F&& f) {
 
 bool RegionProposals::try_cube(int level, int cube, const Sum& sum, ProposedCube& result) const {
   const int first = first_cell(cube, level), side = 1 << level;
+  // The tests that cost least come first: those of bits before those of numbers.
   if (!is_disc(first, side)) return false;
   const double tolerance = double(options_.tolerance.least(cells_, block_, first, side));
   const Eigen::Vector3f normal = sum.normals.tail<3>();
@@ -142,7 +148,10 @@ bool RegionProposals::try_cube(int level, int cube, const Sum& sum, ProposedCube
   return true;
 }
 
-/// By its Euler characteristic, and because its cells hang together; and they are two or more, all free.
+/// Whether the surface within a cube is a disc: by its Euler characteristic, and because its cells hang
+/// together; and they are two or more, all free. Counted is the part of the uniform mesh within the cube: a
+/// point for each cell, an edge for each face between two of them that is passed, a polygon for each crossing
+/// edge within.
 bool RegionProposals::is_disc(int first, int side) const {
   const auto lower = static_cast<std::size_t>(first >> 6), n = static_cast<std::size_t>(side);
   const std::uint64_t rows = rows_of(first, side, 0, 0), upper_rows = rows_of(first, side, 1, 0),
@@ -165,6 +174,7 @@ bool RegionProposals::is_disc(int first, int side) const {
     if (i > 0) euler += std::popcount(crossing[1][x] & right) + std::popcount(crossing[2][x] & upper_rows);
   }
   if (count < 2 || euler + count != 1) return false;
+  // From one cell across faces that are passed, forwards and backwards until nothing is new.
   std::array<std::uint64_t, 8> reached{};
   const auto start = static_cast<std::size_t>(
       std::ranges::find_if(cells, [](std::uint64_t word) { return word != 0; }) - cells.begin());
@@ -205,6 +215,7 @@ bool RegionProposals::has_simple_border(int first, int side) const {
       if (here > 1) return false;
       all += crossings[static_cast<std::size_t>(axis)][static_cast<std::size_t>(corner)] = here;
     }
+  // The border passes a face in as many pieces as half its crossings on the face's edges.
   for (std::size_t across = 0; across < 3; ++across)
     for (std::size_t upper = 0; upper < 2; ++upper) {
       const auto &p = crossings[(across + 1) % 3], &q = crossings[(across + 2) % 3];
@@ -215,6 +226,9 @@ bool RegionProposals::has_simple_border(int first, int side) const {
 
 bool RegionProposals::find_place(const Sum& sum, int first, int side, double tolerance,
                                  Vector3d& place) const {
+  // The normal equation of the QEF (thesis, equations 6.3 and 6.4), from the products of the planes. A weak
+  // pull to the mean of the crossings takes the part of the truncated decomposition of §6.2.1: it decides
+  // where planes do not.
   const double count = double(sum.count());
   Eigen::Matrix3d a;
   Vector3d b;
@@ -228,6 +242,7 @@ bool RegionProposals::find_place(const Sum& sum, int first, int side, double tol
   b += a * mean;
   const double weight = kPullToMean * a.trace() + 1e-12;
   Vector3d x = mean + (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b) + Vector3d::Constant(4);
+  // Within the cube, as every proof here wants it, and off its faces when rounded.
   const double margin = cells_.margin();
   for (int axis = 0; axis < 3; ++axis) {
     const int lower = coordinate(first, axis);

@@ -13,14 +13,14 @@
 
 namespace hermesh {
 
-/// In voxels, by the number of an active cell (CellBlocks::cell_number); or one for all.
+/// Tolerances of cells in voxels, by the number of an active cell (CellBlocks::cell_number); or one for all.
 class CellTolerances {
  public:
   explicit CellTolerances(float all) : all_(all) {}
   explicit CellTolerances(std::vector<float> by_cell) : by_cell_(std::move(by_cell)) {}
-  /// Of all cells.
+  /// The least of all cells' tolerances.
   float least() const { return by_cell_.empty() ? all_ : *std::ranges::min_element(by_cell_); }
-  /// The least of the active cells of a cube; `first` and `side` in cells of the block.
+  /// The least tolerance of the active cells of a cube; `first` and `side` in cells of the block.
   float least(const CellBlocks& cells, std::int32_t block, int first, int side) const;
 
  private:
@@ -28,6 +28,7 @@ class CellTolerances {
   std::vector<float> by_cell_;
 };
 
+/// How cells are merged.
 struct RegionOptions {
   CellTolerances tolerance;  ///< where it is 0 or less a cell stays alone
   double flatness = 0;  ///< how far a cube's point may be from the planes of its crossings, voxels, root mean
@@ -35,32 +36,34 @@ struct RegionOptions {
   int largest_cube = 8;  ///< cells a side: 2, 4 or 8
 };
 
+/// What the cells of a cube share.
 struct ProposedCube {
-  Eigen::Vector3d place;   ///< of its point, rounded for the file
-  Eigen::Vector3f normal;  ///< mean of those of its crossings
+  Eigen::Vector3d place;   ///< where its point is, rounded for the file
+  Eigen::Vector3f normal;  ///< mean normal of its crossings, unit length
 };
 
-/// A cube is proposed where the surface within it is one disc with a simple border, none of its cells is near
-/// a special one, and one place within it is near the planes of all its crossings for the tolerance. The
-/// border is simple if each of the cube's edges is crossed once at most, and each of its faces passed at most
-/// once: by a piece of border from edge to edge. One of these for each thread.
+/// Proposes cubes. A cube is proposed where the surface within it is one disc with a simple border, none of
+/// its cells is near a special one, and one place within it is near the planes of all its crossings for the
+/// tolerance. The border is simple if each of the cube's edges is crossed once at most, and each of its faces
+/// passed at most once: by a piece of border from edge to edge. (The thesis, §6.3 and §6.4, tests signs of
+/// corners and middles and goes from small cubes to large ones.) One object for each thread.
 class RegionProposals {
  public:
   RegionProposals(const CellBlocks& cells, const RegionOptions& options, const FilePoints& file)
       : cells_(cells), options_(options), file_(file) {}
 
-  /// Of a block and a level, among the cubes that are asked for. @returns a bit each; the cubes go behind
-  /// those in `found`, ascending
+  /// Proposes cubes of a level among those of a block that are `asked` for, a bit each, and returns which
+  /// pass, a bit each. They are put behind the cubes in `found`, ascending.
   std::uint64_t propose(std::int32_t block, int level, std::uint64_t asked, std::vector<ProposedCube>& found);
 
  private:
-  /// Of planes through crossings, about the middle of the block.
+  /// What the planes through a cube's crossings add up to, about the middle of the block.
   struct Sum {
-    /// Of products of a plane's normal and its four numbers, by row: those are how far the middle is below
-    /// the plane, and the normal.
+    /// Products of each plane's normal and its four numbers, by row: the four numbers are how far the middle
+    /// is below the plane, and the normal.
     std::array<Eigen::Array4f, 3> products;
-    Eigen::Array4f normals;  ///< behind the distances' squares
-    Eigen::Array4f places;   ///< behind how many they are
+    Eigen::Array4f normals;  ///< sum of squared distances from the middle, and of normals
+    Eigen::Array4f places;   ///< number of crossings, and sum of their places
 
     void clear();
     void add(const EdgeCrossing& crossing, const Eigen::Array4f& place);
@@ -78,11 +81,11 @@ class RegionProposals {
   const CellBlocks& cells_;
   const RegionOptions& options_;
   const FilePoints& file_;
-  std::int32_t block_ = -1;                 ///< what follows is of this one
+  std::int32_t block_ = -1;                 ///< the block that what follows belongs to
   BlockMask free_{};                        ///< cells that may be part of a cube, active or not
-  std::array<BlockMask, 3> lower_faces_{};  ///< by axis: cells whose lower face the surface passes through
+  std::array<BlockMask, 3> lower_faces_{};  ///< for each axis the cells whose lower face is passed by the surface
   std::array<EdgeCrossing, 3 * 512> crossings_;
-  std::array<Sum, 64> sums_;  ///< of a level's cubes
+  std::array<Sum, 64> sums_;  ///< one for each cube of a level
 };
 
 }  // namespace hermesh

@@ -23,14 +23,16 @@ using shell_kernels::Planes;
 /// between them each line meets S once in either.
 constexpr double kFirst = 0.5, kLow = 0.125;
 
-/// What keeps within this cosine of one direction keeps within a right angle of each other.
+/// What keeps within this cosine, of a little less than 45 degrees, of one direction keeps within a right
+/// angle of each other.
 constexpr double kUpright = 0.7072;
 
-/// Of places a few blocks away from the one that they are relative to, far above what single precision makes
-/// of them.
+/// What single precision may make of places a few blocks away from the one that they are relative to, in
+/// voxels, and far more.
 constexpr float kSingleRounding = 1e-4f;
 
-/// Relative to a place.
+/// The planes of a prism for the kernels, relative to a place. A wall is ruled between two pillars that may
+/// lean differently: its plane leans as their mean, and `spread` is how far the wall is off that at most.
 Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
   Planes planes;
   const auto set = [&](int plane, const Vector3d& normal, double offset) {
@@ -55,14 +57,14 @@ Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
 
 /// What a thread keeps from one polygon to the next, so that little is allocated.
 struct RegionShell::Buffers {
-  std::vector<shell_kernels::Window> windows;  ///< with what of S may reach into the prisms,
-  std::vector<Triangle> fans;                  ///< and its fans there
+  std::vector<shell_kernels::Window> windows;  ///< parts of blocks that may reach into the prisms
+  std::vector<Triangle> fans;                  ///< triangles of fanned edges in the windows
   std::vector<ShellPrism> prisms;
   std::vector<shell_kernels::Candidate> candidates;
-  std::vector<std::uint16_t> certain;  ///< by point of S
+  std::vector<std::uint16_t> certain;  ///< one for each point of S
 };
 
-/// Whether one polygon holds.
+/// The question whether one polygon holds.
 class RegionShell::Search {
  public:
   Search(const RegionShell& shell, const RegionPolygon& polygon, Buffers& buffers);
@@ -70,8 +72,8 @@ class RegionShell::Search {
 
  private:
   using Found = shell_kernels::Found;
-  static constexpr std::size_t kMostTriangles = shell_kernels::kMostPrisms;  ///< of a polygon
-  /// About the triangles of the polygon that are open.
+  static constexpr std::size_t kMostTriangles = shell_kernels::kMostPrisms;  ///< one or two a polygon
+  /// What is found about the triangles of the polygon that are open.
   struct Answer {
     unsigned shown;  ///< a bit each; nothing is, unless S is there
     bool is_there;   ///< S has been found in the prism of one of them
@@ -110,9 +112,9 @@ class RegionShell::Search {
   const RegionPolygon& polygon_;
   Buffers& buffers_;
   Vector3d base_;                            ///< near the polygon: what single precision is relative to
-  std::array<Vector3d, 4> pillars_;          ///< by the polygon's corners
+  std::array<Vector3d, 4> pillars_;          ///< one for each of the polygon's corners
   std::array<shell_kernels::Box, 4> cubes_;  ///< the polygon's regions
-  double highest_;                           ///< of any prism
+  double highest_;                           ///< height of the highest prism
   std::array<std::array<int, 3>, kMostTriangles>
       open_;  ///< triangles that are not shown yet, by their corners
   std::size_t open_count_ = 0;
@@ -135,9 +137,12 @@ RegionShell::RegionShell(const CellRegions& regions, const EdgePolygons& polygon
       up_(cells_.size()),
       buffers_([&polygons] {
         auto buffers = std::make_unique<Buffers>();
+        // As large as S has points. A search writes it for the points of its windows; what it reads of others
+        // is left over from before, and of no matter (find_candidates()).
         buffers->certain.resize(polygons.point_count() + shell_kernels::kLargestVector);
         return buffers;
       }) {
+  // Count, scan, fill: S is laid out for the kernels once, in single precision and by blocks.
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b)
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -173,6 +178,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
     described.without_quad[axis] = polygons_.fanned(block, static_cast<int>(axis)).data();
   }
   described.first_quad = first_quad;
+  // Relative to the block's corner, so that single precision does anywhere in the lattice.
   const Vector3d corner = cells_.corner(block, 0);
   for (std::uint32_t point = own.first_point; point < own.first_point + points; ++point)
     for (std::size_t a = 0; a < 3; ++a)
@@ -185,6 +191,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   for (std::size_t x = 0; x < 8; ++x) {
     described.quads_before[x] = static_cast<std::uint16_t>(number - first_quad);
     const std::uint64_t of_axis[3] = {quads_in(b, 0, x), quads_in(b, 1, x), quads_in(b, 2, x)};
+    // By sample and then by axis, so that the quads of a row of samples follow one another.
     for (std::uint64_t bits = of_axis[0] | of_axis[1] | of_axis[2]; bits != 0; bits &= bits - 1)
       for (int axis = 0; axis < 3; ++axis)
         if (of_axis[axis] & bits & -bits)
@@ -195,6 +202,8 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   find_upright(b, first_quad, number);
 }
 
+/// Marks the quads whose triangles lie within kUpright of their block's mean normal. Where a prism's pillars
+/// do, too, such a quad faces up in the prism without being looked at.
 void RegionShell::find_upright(std::size_t block, std::uint32_t first, std::uint32_t end) {
   std::vector<Vector3d> normals;  // of both triangles of each
   normals.reserve(2 * (end - first));
@@ -227,6 +236,7 @@ RegionShell::Search::Search(const RegionShell& shell, const RegionPolygon& polyg
       highest_(kFarthest) {
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
+    // The least tolerance of the polygon's regions: a prism higher than that would show too little.
     highest_ = std::min(highest_, double(shell_.regions_.tolerance(region)));
     pillars_[static_cast<std::size_t>(i)] = shell_.regions_.normal(region);
     const Vector3d lower = shell_.cells_.corner(region.block, region.cell) - base_;
@@ -239,12 +249,16 @@ RegionShell::Search::Search(const RegionShell& shell, const RegionPolygon& polyg
   polygon.for_each_triangle([&](int a, int b, int c) { open_[open_count_++] = {a, b, c}; });
 }
 
+/// Tries prisms of a middle height, then as high as allowed, then the lowest: each time over those triangles
+/// that are not shown yet. What fails at one height may hold at another: low prisms reach what is near alone,
+/// high ones reach S where it is far.
 bool RegionShell::Search::run() {
   if (!starts_at_borders()) return false;
   // S is in a prism, and by their common wall in the other triangle's, if that is no lower.
   double found_at = std::numeric_limits<double>::infinity(), before = 0;
   const double lowest = std::min(kLow, highest_);
   for (const double height : {std::min(kFirst, highest_), highest_, lowest}) {
+    // Where the tolerance is small, two of the heights are the same.
     if (std::exchange(before, height) == height) continue;
     height_ = height;
     is_lowest_ = height == lowest;
@@ -262,8 +276,9 @@ bool RegionShell::Search::run() {
   return false;
 }
 
-/// The triangles of S beside these sides, at the polygon's own crossing edge, face up along the pillars at
-/// their ends; so they are on the polygon's side of the wall there.
+/// Whether S goes on into the prisms at sides between two cells that are alone (the last point of the
+/// header): the triangles of S beside these sides, at the polygon's own crossing edge, face up along the
+/// pillars at their ends; so they are on the polygon's side of the wall there.
 bool RegionShell::Search::starts_at_borders() const {
   for (int i = 0; i < polygon_.corners; ++i) {
     const int j = polygon_.next(i);
@@ -292,7 +307,8 @@ void RegionShell::Search::for_each_triangle_of_edge(F&& f) const {
   shell_.polygons_.polygons_of(polygon_.crossing, halves, f);
 }
 
-/// The parts of blocks that the prisms may reach into.
+/// Gathers the parts of blocks that the prisms may reach into. Points of S lie in their cells, so a triangle
+/// that reaches there belongs to an edge of one of the cells there.
 void RegionShell::Search::gather() {
   buffers_.windows.clear();
   buffers_.fans.clear();
@@ -331,10 +347,12 @@ void RegionShell::Search::gather() {
           break;
         }
       }
+  // The kernels want windows ascending (tell_points()).
   std::ranges::sort(buffers_.windows, {},
                     [](const shell_kernels::Window& window) { return window.block->first_point; });
 }
 
+/// Adds the part of a block whose corner is at `corner` from the base, and its fans, which the kernels do not know.
 void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3],
                                  const int (&to)[3]) {
   const auto part_from = [&](int below) {
@@ -363,11 +381,13 @@ void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& c
             [&](const Triangle& t) { buffers_.fans.push_back(t); });
 }
 
+/// Stands prisms over the open triangles and looks at S in them. `is_there` says that S is known to be there.
 RegionShell::Search::Answer RegionShell::Search::look(bool is_there) {
   constexpr Answer kNever{.shown = 0, .is_there = false, .never = true};
   if (!stand_prisms()) return kNever;
   const std::size_t prisms = buffers_.prisms.size();
   if (prisms == 0) return {.shown = 0, .is_there = is_there, .never = false};
+  // Then no triangle of S need be asked for its own tolerance.
   const bool tolerated = double(shell_.least_tolerance_) >= height_;
   note_what_faces_up(tolerated);
   const Found found = scan();
@@ -387,7 +407,7 @@ RegionShell::Search::Answer RegionShell::Search::look(bool is_there) {
   return answer;
 }
 
-/// Over the open triangles; false if one cannot stand at any height.
+/// Stands prisms over the open triangles; false if one cannot stand at any height, for the lowest stand best.
 bool RegionShell::Search::stand_prisms() {
   std::vector<ShellPrism>& prisms = buffers_.prisms;
   prisms.clear();
@@ -407,7 +427,8 @@ bool RegionShell::Search::stand_prisms() {
   return true;
 }
 
-/// @param tolerated every triangle of S may be as far away as the prisms are high
+/// Notes for each window in which prisms its upright quads face up. `tolerated`: every triangle of S may be
+/// as far away as the prisms are high; if not, none is left out.
 void RegionShell::Search::note_what_faces_up(bool tolerated) {
   for (shell_kernels::Window& window : buffers_.windows) {
     const Vector3d& up = shell_.up_[static_cast<std::size_t>(window.block - shell_.blocks_.data())];
@@ -419,7 +440,8 @@ void RegionShell::Search::note_what_faces_up(bool tolerated) {
   }
 }
 
-/// No exact number is needed where points keep off the prisms' planes: these are told by kernels.
+/// Lets the kernels tell which triangles of S may be in a prism. No exact number is needed where points keep
+/// off the prisms' planes: single precision tells these, and what is uncertain is looked at in double.
 shell_kernels::Found RegionShell::Search::scan() {
   buffers_.candidates.resize(std::max(buffers_.candidates.size(), 3 * 512 * buffers_.windows.size()));
   const shell_kernels::Surface surface{
@@ -452,6 +474,8 @@ void RegionShell::Search::for_each_near(const Found& found, F&& f) const {
 /// The prisms, a bit each, that S does not pass through as it should; of the lowest ones, some of them.
 unsigned RegionShell::Search::find_bad(const Found& found, bool tolerated) const {
   const auto is_good = [&](const Triangle& t, const ShellPrism& prism, bool between) {
+    // Between lid and bottom and facing up along all pillars is good wherever it lies; meet() would say so,
+    // too, but takes longer.
     if (between && (tolerated || tolerance_of(t) >= height_)) {
       const Vector3d normal = normal_of(t);
       if (std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; }))
@@ -461,6 +485,7 @@ unsigned RegionShell::Search::find_bad(const Found& found, bool tolerated) const
   };
   unsigned bad = 0;
   for_each_near(found, [&](const Triangle& t, std::size_t p, bool between) {
+    // Which prisms fail matters only if the others may still be shown; of the lowest ones one is enough.
     const bool is_known = ((bad >> p) & 1) || (bad != 0 && is_lowest_);
     if (!is_known && !is_good(t, buffers_.prisms[p], between)) bad |= 1u << p;
   });

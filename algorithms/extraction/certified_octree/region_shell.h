@@ -23,8 +23,8 @@
 
 namespace hermesh {
 
-/// For tolerances of up to kFarthest: of merged polygons T beside the uniform mesh S, a shell about T (Jiang
-/// et al. 2020).
+/// A shell about merged polygons T, which proves for tolerances of up to kFarthest that they are near the
+/// uniform mesh S and that S is near them (after Jiang et al. 2020).
 ///
 /// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between
 /// the corners of a triangle directions are interpolated; over each triangle stands a prism, as far up and
@@ -43,22 +43,29 @@ namespace hermesh {
 /// away. Where no cell is merged T is S, and the point that a line meets is its own.
 class RegionShell {
  public:
-  /// Farther than this nothing is shown, whatever the tolerance, in voxels.
+  /// The largest distance that can be shown, whatever the tolerance, in voxels.
   static constexpr double kFarthest = 2.0;
 
+  /// Describes the uniform mesh for the search. All arguments by reference but `context` must outlive this,
+  /// as must what `tolerance` refers to.
+  /// @param regions the cubes as they are when holds() is called
+  /// @param polygons of the uniform mesh
+  /// @param points of the uniform mesh
   /// @param tolerance by point, those on fanned edges included; voxels
+  /// @param context asked whether to stop
+  /// @throws Cancelled
   RegionShell(const CellRegions& regions, const EdgePolygons& polygons, const UniformPoints& points,
               std::span<const float> tolerance, RunContext& context);
   ~RegionShell();
 
-  /// Safe to call for several polygons at once.
+  /// Whether a merged polygon is proved. Safe to call for several polygons at once.
   bool holds(const RegionPolygon& polygon) const;
 
  private:
   class Search;
   struct Buffers;
 
-  /// Crossing edges with a quad.
+  /// The crossing edges with a quad, a bit each, of an axis in a layer of a block.
   std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t layer) const;
   void describe(std::size_t block, std::uint32_t first_quad);
   void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
@@ -70,11 +77,11 @@ class RegionShell {
   const std::span<const float> tolerance_;
   float least_tolerance_;
   std::vector<shell_kernels::Block> blocks_;
-  std::vector<Eigen::Vector3d> up_;  ///< by block: mean normal of its quads
-  LargeArray<Quad> quads_;  ///< by block, sample and axis, without fanned edges; as EdgePolygons cuts them
-  LargeArray<std::uint8_t> upright_;  ///< by quad: both triangles face up along their block's direction
+  std::vector<Eigen::Vector3d> up_;  ///< mean normal of each block's quads
+  LargeArray<Quad> quads_;  ///< in the order of block, sample and axis; as EdgePolygons cuts them
+  LargeArray<std::uint8_t> upright_;  ///< 1 for quads that face up along their block's direction
   std::array<LargeArray<float>, 3>
-      in_blocks_;  ///< the cells' points by axis, relative to the corners of their blocks
+      in_blocks_;  ///< coordinates of the cells' points, relative to the corners of their blocks
   shell_kernels::Look* const look_ = shell_kernels::chosen();
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Buffers>> buffers_;
 };

@@ -18,14 +18,16 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-/// Of places, far above what single precision makes of them within a block and in the file, and beyond what
-/// kUnit does, in voxels.
+/// What slabs are widened by, in voxels: far above what single precision makes of places within a block and
+/// in the file, and beyond what kUnit does.
 constexpr float kRounding = 1e-3f;
-/// Places in a block are kept in parts of a voxel, for there are as many as crossings.
+/// Places in a block are kept in 16 bits, in this many parts of a voxel, for there are as many as crossings.
 constexpr float kUnit = 4096;
 
 std::array<int, 3> coordinates(int cell) { return {cell >> 6, (cell >> 3) & 7, cell & 7}; }
 
+/// Replaces a value by a better one while other threads do the same. The least or the greatest of several is the
+/// same in any order.
 template <class Compare>
 void replace_if(float& value, float by, Compare better) {
   const std::atomic_ref<float> shared(value);
@@ -49,10 +51,12 @@ struct RegionSlabs::Part {
   Vector3d lower, upper, up;
   double least;
 
-  /// Of the place that is found by going up, along the box's faces where these are in the way: it may be too
-  /// large, for that is not always the nearest one.
+  /// The squared distance to the place that is found by going up, along the box's faces where these are in
+  /// the way: it may be too large, for that is not always the nearest one, and so the proof may fail, but
+  /// never wrongly hold.
   double squared_distance(const Vector3d& from) const {
     Vector3d place = from;
+    // Each turn gets high enough or runs into a further face of the box; after three there is no way on.
     for (int turn = 0; turn < 4; ++turn) {
       const double missing = least - up.dot(place);
       if (missing <= 0) return (place - from).squaredNorm();
@@ -67,7 +71,8 @@ struct RegionSlabs::Part {
   }
 };
 
-/// Of what a slab has of a box: a convex body.
+/// The corners of what a slab has of a box, which is a convex body: corners of the box within the slab, and
+/// where its edges pass the slab's planes.
 struct RegionSlabs::Corners {
   Corners(const Box& box, const Vector3d& up, const Slab& slab) {
     for (int c = 0; c < 8; ++c) {
@@ -98,6 +103,7 @@ struct RegionSlabs::Corners {
 RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points, RunContext& context)
     : regions_(regions), cells_(regions.cells()), bins_(cells_.size()), first_(cells_.size()) {
   Stage stage(context, "list crossings");
+  // Count, scan, fill; within a block places are sorted by cubes of 2³ samples, by counting.
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b) {
     const auto block = static_cast<std::int32_t>(b);
@@ -109,6 +115,7 @@ RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     first_[b] = static_cast<std::uint32_t>(first[b]);
+    // A cell has four points at most.
     constexpr std::size_t kMost = 3 * 512 + 4 * 512;
     std::array<EdgeCrossing, 3 * 512> crossings;
     std::array<Place, kMost> places;
@@ -129,6 +136,7 @@ RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points
     cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
       const auto [x, y, z] = coordinates(edge.sample);
       Vector3f place(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+      // Where the uniform mesh has it (CellBlocks::crossing_point()).
       place[edge.axis] += std::clamp((crossing++)->offset, margin, 1 - margin);
       add(edge.sample, place);
     });
@@ -139,6 +147,7 @@ RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points
           add(cell, ((*points)[cells_.point(block, cell, sheet)] - corner).cast<float>());
       });
     }
+    // Sums: where each bin begins. Then each place goes to the next free one of its bin.
     for (std::size_t i = 0; i < 64; ++i) next[i + 1] = static_cast<std::uint16_t>(next[i + 1] + next[i]);
     bins_[b] = next;
     for (std::size_t i = 0; i < found; ++i) places_[first_[b] + next[bin[i]]++] = places[i];
@@ -147,7 +156,7 @@ RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points
 
 void RegionSlabs::make_room() { slabs_.resize(regions_.cube_count()); }
 
-/// Calls f(place, in the block's coordinates) for the crossings and points in a box, its faces included. It
+/// Calls f(place), in the block's coordinates, for the crossings and points in a box, its faces included. The box
 /// may reach eight samples below the block and, less its faces, as many above.
 template <class F>
 void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const {
@@ -178,6 +187,7 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
         for (int x = first[0]; x <= last[0]; ++x)
           for (int y = first[1]; y <= last[1]; ++y) {
             const int row = x << 4 | y << 2;
+            // Bins along z follow one another, so a row of them is one range.
             for (std::size_t i = bins[static_cast<std::size_t>(row | first[2])],
                              end = bins[static_cast<std::size_t>(row | last[2]) + 1];
                  i < end; ++i) {
@@ -193,6 +203,7 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
 }
 
 void RegionSlabs::begin(const Region& cube) {
+  // With the cells around the cube: polygons of S within it may have corners in these.
   const std::array<int, 3> at = coordinates(cube.cell);
   Box box;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -201,6 +212,7 @@ void RegionSlabs::begin(const Region& cube) {
   }
   const Vector3f up = regions_.normal(cube).cast<float>(),
                  point = (regions_.point(cube) - cells_.corner(cube.block, 0)).cast<float>();
+  // From zero, so the cube's own point is in the slab.
   Slab slab{0, 0};
   for_each_near(cube.block, box, [&](const Vector3f& place) {
     const float height = up.dot(place - point);
@@ -210,6 +222,7 @@ void RegionSlabs::begin(const Region& cube) {
   slabs_[regions_.number(cube)] = {slab.low - kRounding, slab.high + kRounding};
 }
 
+/// Widens a cube's slab to contain these places.
 void RegionSlabs::widen(const Region& cube, std::span<const Vector3d> places) {
   const Vector3d up = regions_.normal(cube), point = regions_.point(cube);
   double low = std::numeric_limits<double>::max(), high = -low;
@@ -223,7 +236,8 @@ void RegionSlabs::widen(const Region& cube, std::span<const Vector3d> places) {
   replace_if(slab.high, static_cast<float>(high) + kRounding, std::greater<>());
 }
 
-/// A loose polygon's corners, and those of a fan in its envelope; with lattice cubes about them.
+/// A loose polygon's corners, and the places of a fan in its envelope: the crossing and a place on each face;
+/// with lattice cubes about them all.
 struct RegionSlabs::Fan {
   std::array<Vector3d, 9> places;
   std::size_t count = 0;
@@ -251,6 +265,7 @@ RegionSlabs::Fan RegionSlabs::fan_of(const RegionPolygon& loose) const {
 }
 
 void RegionSlabs::add(const RegionPolygon& polygon) {
+  // A loose polygon may be anywhere in its box, so all of it counts for every cube there.
   if (polygon.loose) {
     const Fan fan = fan_of(polygon);
     for_each_cube(polygon.crossing.block, fan.box, [&](const Region& cube) { widen(cube, fan.all()); });
@@ -263,6 +278,8 @@ void RegionSlabs::add(const RegionPolygon& polygon) {
     return p + (polygon.start[axis] - p[axis]) / (q[axis] - p[axis]) * (q - p);
   };
   std::array<Vector3d, 4> sides, places;
+  // In each region the polygon is in the hull of the region's point, where its two sides there leave, and
+  // where the diagonal passes the two planes through the edge.
   for (std::size_t i = 0; i < n; ++i) sides[i] = pass(i, i + 1 < n ? i + 1 : 0, polygon.across[i]);
   std::size_t count = 2;
   if (n == 4)
@@ -297,6 +314,7 @@ void RegionSlabs::for_each_cube(std::int32_t block, const Box& box, F&& f) const
         const std::uint64_t row = ((std::uint64_t{1} << end[2]) - (std::uint64_t{1} << first[2]));
         std::uint64_t rows = 0;
         for (int y = first[1]; y < end[1]; ++y) rows |= row << (8 * y);
+        // Each cube once: its cells are taken out when it is found.
         const BlockMask& merged = regions_.merged(there);
         BlockMask left{};
         for (auto x = static_cast<std::size_t>(first[0]); x < static_cast<std::size_t>(end[0]); ++x)
@@ -319,6 +337,8 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
   const auto n = static_cast<std::size_t>(loose.corners);
   const auto& p = loose.points;
   const Vector3d origin = cells_.corner(block, 0);
+  // Up is where the outside is. The cross product of a quad's diagonals faces the side that its corners are
+  // counter-clockwise from; for three corners it is taken the other way round.
   const bool turns_over = loose.outwards == (n == 4);
   const Vector3d up =
       (p[2] - p[0]).cross(n == 4 ? p[3] - p[1] : p[1] - p[0]).normalized() * (turns_over ? 1 : -1);
@@ -348,6 +368,7 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
       slab.high = std::max(slab.high, height);
     };
     for (std::size_t i = 0; i < n; ++i) add(corners[i].cast<float>());
+    // Polygons of S in the box may have corners in the cells around it.
     for_each_near(block, around, add);
     slab = {slab.low - kRounding, slab.high + kRounding};
     const auto polygon = std::span(corners).first(n);
@@ -362,6 +383,8 @@ bool RegionSlabs::holds(const Region& cube) const {
   const Vector3d up = regions_.normal(cube), point = regions_.point(cube) - cells_.corner(cube.block, 0);
   const std::array<int, 3> at = coordinates(cube.cell);
   const double tolerance = double(regions_.tolerance(cube));
+  // The slab is kept relative to the cube's point, where single precision is best; here it is wanted in the
+  // block.
   const auto level = static_cast<float>(up.dot(point));
   const Slab& relative = slabs_[regions_.number(cube)];
   const Slab slab{relative.low + level, relative.high + level};
@@ -372,8 +395,8 @@ bool RegionSlabs::holds(const Region& cube) const {
          all_within(corners.all(), corners.all(), tolerance);
 }
 
-/// Whether a sample is inside, by the crossings on the way from one of the block whose bit is known: a sample
-/// may be where there is no block.
+/// Whether sample `to` is inside: by the crossings on the way from `from`, a sample of the block, whose bit
+/// is known. The other may be where there is no block.
 bool RegionSlabs::is_inside(std::int32_t block, std::array<int, 3> from, const std::array<int, 3>& to) const {
   bool inside = test(cells_[block].inside, sample_index(from[0], from[1], from[2]));
   for (int axis = 0; axis < 3; ++axis) {
@@ -392,14 +415,15 @@ bool RegionSlabs::is_inside(std::int32_t block, std::array<int, 3> from, const s
 }
 
 /// Whether what is above a slab in a box is outside, what is below it inside, and a convex body with these
-/// corners near both: the distance to either is a convex function. All relative to the block.
-/// @param known a sample of the block
+/// corners near both: the distance to either is a convex function, so the corners tell. All is relative to
+/// the block; `known` is a sample of it.
 bool RegionSlabs::are_near_parts(std::int32_t block, const Box& box, const std::array<int, 3>& known,
                                  const Vector3d& up, const Slab& slab, std::span<const Vector3d> corners,
                                  double tolerance) const {
   std::array<int, 3> highest = box.upper, lowest = box.lower;
   Part above{{}, {}, up, double(slab.high)};
   double high = 0, low = 0;
+  // The corners A and B of the header: farthest up and farthest down.
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     if (up[axis] < 0) std::swap(highest[a], lowest[a]);
@@ -413,6 +437,7 @@ bool RegionSlabs::are_near_parts(std::int32_t block, const Box& box, const std::
   for (const Vector3d& corner : corners)
     for (const Part* part : {&std::as_const(above), &below})
       if (part->squared_distance(corner) > tolerance * tolerance) return false;
+  // Last, for it walks over edges; one sample tells of all of a part, which nothing passes through.
   return is_inside(block, known, lowest) && !is_inside(block, known, highest);
 }
 

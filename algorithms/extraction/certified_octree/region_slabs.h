@@ -14,8 +14,8 @@
 
 namespace hermesh {
 
-/// For tolerances beyond kLeast, as long as there are larger cubes: of the merged mesh T beside the uniform
-/// mesh S, of which nothing need be made for it but the points that T has in common with it.
+/// Proves for tolerances beyond kLeast, as long as there are larger cubes, that the merged mesh T and the uniform
+/// mesh S are near each other. Nothing of S need be made for it but the points that T has in common with it.
 ///
 /// A cube X has a *slab*: its places between two planes at right angles to the mean of its crossings'
 /// normals. They are as far apart as it takes for the slab to contain
@@ -43,13 +43,15 @@ namespace hermesh {
 /// polygon's edge there.
 class RegionSlabs {
  public:
-  /// Above the diagonal of a cell, in voxels.
+  /// Slabs are for tolerances beyond this, in voxels: it is above the diagonal of a cell.
   static constexpr float kLeast = 2.0f;
 
-  /// @param points of S, if they may be out of the hull of their cells' crossings; else null
+  /// Lists the crossings. `points` are those of S, if they may be out of the hull of their cells' crossings;
+  /// else null. `regions` and `points` must outlive this. @throws Error if there are more places than 32 bits
+  /// can number; Cancelled
   RegionSlabs(const CellRegions& regions, const UniformPoints* points, RunContext& context);
 
-  /// For cubes that were proposed meanwhile. Before the next begin().
+  /// Makes room for cubes that were proposed meanwhile; before the next begin().
   void make_room();
   /// Begins the slab of a cube with what S has there. Safe to call for several at once.
   void begin(const Region& cube);
@@ -58,14 +60,15 @@ class RegionSlabs {
   void add(const RegionPolygon& polygon);
   /// Whether both meshes are near all of a cube's slab, to which all polygons were added.
   bool holds(const Region& cube) const;
-  /// Whether S is near a loose polygon, wherever that is.
+  /// Whether S is near a loose polygon, wherever that is. Safe to call for several at once.
   bool holds(const RegionPolygon& loose) const;
 
  private:
+  /// The planes of a slab, by their heights along its direction.
   struct Slab {
     float low, high;
   };
-  /// Of lattice cubes, in the coordinates of a block.
+  /// A box of lattice cubes, in the coordinates of a block.
   struct Box {
     std::array<int, 3> lower, upper;
   };
@@ -87,11 +90,11 @@ class RegionSlabs {
   const CellRegions& regions_;
   const CellBlocks& cells_;
   std::vector<std::array<std::uint16_t, 65>>
-      bins_;                                 ///< by block and cube of 2³ samples: where its places begin
-  std::vector<std::uint32_t> first_;         ///< by block
+      bins_;                                 ///< where the places of each 2³ samples of a block begin
+  std::vector<std::uint32_t> first_;         ///< first place of each block
   using Place = std::array<std::uint16_t, 3>;
-  LargeArray<Place> places_;                 ///< of crossings and points, in their block
-  std::vector<Slab> slabs_;                  ///< by cube, over its point
+  LargeArray<Place> places_;                 ///< crossings and points in their block, in parts of a voxel
+  std::vector<Slab> slabs_;                  ///< one for each cube, heights over its point
 };
 
 }  // namespace hermesh

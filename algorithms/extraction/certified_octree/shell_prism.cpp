@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Of the angle between a pillar and the normal of a triangle at its foot.
+/// The least cosine of the angle between a pillar and the normal of a triangle at its foot.
 constexpr double kLeastCosine = 0.3;
 
 constexpr double kRounding = ShellPrism::kRounding;
@@ -23,9 +23,9 @@ struct Extent {
   bool empty() const { return lowest > highest; }
 };
 
-/// Of the prism that is as wide, or as narrow, as the leans of a side's two pillars allow at each height:
-/// above the triangle's plane that is one plane, below it another. What reaches less than kRounding into it
-/// is not there.
+/// Where a triangle lies in the prism that is as wide, or as narrow, as the leans of a side's two pillars
+/// allow at each height: above the triangle's plane that is one plane, below it another. What reaches less
+/// than kRounding into it is not there.
 Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
   Extent extent;
   for (const double up : {1.0, -1.0}) {
@@ -33,6 +33,7 @@ Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
     for (std::size_t side = 0; side < 3; ++side) {
       const auto [least, most] = std::minmax(prism.leans()[side][0], prism.leans()[side][1]);
       const double lean = (walls == Walls::outer) == (up > 0) ? most : least;
+      // Skewed by the lean, the wall stands upright and the triangle can be clipped as over a flat one.
       for (auto& place : places) place[static_cast<int>(side)] += kRounding - lean * place[3];
     }
     const ClippedTriangle part(places);
@@ -80,9 +81,9 @@ double ShellPrism::lean(const Vector3d& pillar, std::size_t side) const {
   return over_.frame().axes.row(static_cast<int>(side)).dot(pillar) / pillar.dot(over_.normal());
 }
 
-/// The map from a point of the triangle and a height to a place turns nothing over: the triangle that the
-/// pillars make at any height faces up along each of them. A quadratic function of the height, bounded by its
-/// coefficients.
+/// Whether the map from a point of the triangle and a height to a place turns nothing over: the triangle that
+/// the pillars make at any height faces up along each of them. This is a quadratic function of the height,
+/// bounded by its coefficients.
 bool ShellPrism::is_unfolded(const Corners& corners) const {
   const Vector3d e = corners[1] - corners[0], f = corners[2] - corners[0];
   const Vector3d de = pillars_[1] - pillars_[0], df = pillars_[2] - pillars_[0];
@@ -94,7 +95,7 @@ bool ShellPrism::is_unfolded(const Corners& corners) const {
   });
 }
 
-/// No pillar leans over the wall opposite.
+/// Whether no pillar leans over the wall opposite.
 bool ShellPrism::keeps_its_corners(const Corners& corners) const {
   for (std::size_t i = 0; i < 3; ++i)
     for (const double up : {height_, -height_})
@@ -109,6 +110,7 @@ ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
 }
 
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
+  // Boxes rule out most triangles, planes most others; only the rest is clipped.
   const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
   const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
   if ((lowest.array() > prism.box().max().array() + kRounding).any() ||
@@ -141,6 +143,8 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
     }
   const Extent extent = extent_in(prism, places, Walls::outer);
   if (extent.empty()) return Meeting::none;
+  // Heights are measured along the normal: the lid is least_lid() of the height up at its lowest, and what is
+  // no higher than that share of the tolerance is no farther than the tolerance along any line.
   const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kRounding;
   return faces && extent.lowest >= -most && extent.highest <= most ? Meeting::good : Meeting::bad;
 }

@@ -109,7 +109,7 @@ class KernelBlock {
   }
   void call_steep(std::size_t quad) { upright_[quad] = 0; }
 
-  /// All of it is in the window, and points between 0 and 4 along x are own ones.
+  /// Looks at the whole block; points between 0 and 4 along x are own ones.
   shell_kernels::Found look(const std::vector<shell_kernels::Planes>& prisms, unsigned facing = 0) {
     using namespace shell_kernels;
     const Surface surface{axes_[0].data(), axes_[1].data(),
@@ -123,7 +123,7 @@ class KernelBlock {
     candidates_.resize(static_cast<std::size_t>(found.candidates));
     return found;
   }
-  /// As bits by Certain.
+  /// What is certain of a point and a prism, a bit for each Certain.
   unsigned certain(std::size_t point, int prism) const {
     unsigned bits = 0;
     for (int what = 0; what < shell_kernels::kAllCertain; ++what)

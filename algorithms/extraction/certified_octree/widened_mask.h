@@ -8,8 +8,8 @@
 
 namespace hermesh {
 
-/// Bits of cells at most kSteps, up to 8, from a bit of the mask along each axis. `mask_at(ax, ay, az)`, each −1 to 1, gives a
-/// pointer to the mask of the block there, or null.
+/// The cells of a block at most kSteps, up to 8, along each axis from a cell of a mask. `mask_at(ax, ay,
+/// az)`, each −1 to 1, gives a pointer to the mask of the block there, or null.
 template <int kSteps, class MaskAt>
 BlockMask widened(MaskAt&& mask_at) {
   constexpr int kSide = 8 + 2 * kSteps;

@@ -8,7 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Of a value divided by the lengths that it is made of: rounding is some 1e-13 for coordinates of thousands of voxels.
+/// What a value, divided by the lengths that it is made of, must exceed to be certain: rounding is some 1e-13 for
+/// coordinates of thousands of voxels.
 constexpr double kCertain = 1e-10;
 
 struct Range {
@@ -34,6 +35,8 @@ bool disjoint_apart(const Corners& a, const Corners& b) {
   const std::array<Vector3d, 3> es = {s[1] - s[0], s[2] - s[1], s[0] - s[2]};
   const std::array<Vector3d, 3> et = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
   const Vector3d ns = es[0].cross(es[1]), nt = et[0].cross(et[1]);
+  // The candidates for two triangles: both normals, and the products of a side of each. Any axis along which the ranges
+  // are apart is a proof, however it was found, so an axis that is mostly rounding does no harm.
   if (separates(ns) || separates(nt)) return true;
   for (const Vector3d& e : es)
     for (const Vector3d& f : et)
@@ -44,7 +47,7 @@ bool disjoint_apart(const Corners& a, const Corners& b) {
   return false;
 }
 
-/// Both start at the origin: the wedge of a, a' and that of b, b'.
+/// Whether two wedges at the origin, that of a[0] and a[1] and that of b[0] and b[1], meet in the origin alone.
 bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2>& b) {
   const double size = std::max({a[0].cwiseAbs().maxCoeff(), a[1].cwiseAbs().maxCoeff(), b[0].cwiseAbs().maxCoeff(),
                                 b[1].cwiseAbs().maxCoeff()});
@@ -82,11 +85,13 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
   return beyond(a, na, b) || beyond(b, nb, a);
 }
 
-/// Halves of planes that end in the line along `edge`: apart unless they lie on one another.
+/// Whether the halves of planes that end in the line along `edge`, and hold a and b, are apart but for the line: they
+/// are unless they lie on one another.
 bool half_planes_apart(const Vector3d& edge, const Vector3d& a, const Vector3d& b) {
   const double size = std::max({edge.cwiseAbs().maxCoeff(), a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
   const Vector3d na = edge.cross(a), nb = edge.cross(b);
   const double noise = kCertain * size * na.cwiseAbs().maxCoeff();
+  // At an angle they share the line alone; in one plane they are apart if they lie on opposite sides of it.
   if (std::abs(na.dot(b)) > noise) return true;
   const double across = na.dot(nb);  // negative: on opposite sides of the line
   return across < -kCertain * na.cwiseAbs().maxCoeff() * nb.cwiseAbs().maxCoeff() - 1e-300;

@@ -8,6 +8,7 @@
 
 namespace hermesh {
 
+/// The corners of a triangle.
 using Corners = std::array<Eigen::Vector3d, 3>;
 
 /// True if it is certain that the triangles are apart, or meet only in their shared corners or their shared edge. The
@@ -16,15 +17,17 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 /// planes (Gottschalk et al. 1996, with the planes through a shared corner or edge as closed ones).
 bool certainly_apart(const Corners& a, const Corners& b, int shared);
 
-/// Corners of the same name are the same point. False if all are.
+/// A triangle whose corners have names: corners of the same name are the same point.
 struct NamedTriangle {
   Triangle names;
   Corners corners;
 };
+/// Whether two triangles are certainly apart, but for what their names say that they share; false if all corners are
+/// shared.
 bool certainly_apart(NamedTriangle a, NamedTriangle b);
 
-/// The same of two triangles of a mesh, by numbers of its points; false if they have all corners in common.
-/// @param points[i] the place of point i
+/// Whether two triangles of a mesh are certainly apart, but for the points that they share; false if they share all
+/// three. `points[i]` is the place of point i.
 template <class Points>
 bool certainly_apart(Triangle a, Triangle b, const Points& points) {
   const auto named = [&](const Triangle& t) {

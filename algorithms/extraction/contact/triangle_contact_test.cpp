@@ -55,7 +55,7 @@ TEST(TriangleContact, SharedEdge) {
   EXPECT_TRUE(certainly_apart(flat, {o, x, y + 0.001 * z}, 2));
 }
 
-/// Whatever it calls apart has no common point among many samples of both, turned and moved at random.
+/// Triangles that are called apart have no common point among many samples of both, turned and moved at random.
 TEST(TriangleContact, NeverWronglySaysApart) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);

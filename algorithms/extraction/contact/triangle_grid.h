@@ -10,6 +10,7 @@
 
 namespace hermesh {
 
+/// A box along the axes, empty until something is added; faces belong to it.
 struct Box3 {
   Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e300), upper = Eigen::Vector3d::Constant(-1e300);
   void add(const Eigen::Vector3d& p) {
@@ -21,11 +22,12 @@ struct Box3 {
   }
 };
 
-/// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing, that holds the
-/// triangles which are about as wide as a cell. So none is in more than eight cells, however their sizes differ.
+/// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing, that holds
+/// the triangles which are about as wide as a cell. So no triangle is in more than eight cells, however their sizes
+/// differ.
 class TriangleGrid {
  public:
-  /// @param boxes of the triangles, which have to outlive it
+  /// Sorts triangles into lattices. `boxes` are those of the triangles, and must outlive this.
   explicit TriangleGrid(const std::vector<Box3>& boxes) : boxes_(boxes), level_(boxes.size()) {
     double widths = 0.0;
     for (const Box3& box : boxes) widths += width(box);
@@ -42,8 +44,8 @@ class TriangleGrid {
 
   int level(std::uint32_t triangle) const { return level_[triangle]; }
 
-  /// Calls visit(other) for the triangles from a level on whose cells the triangle's box touches: some of them more than
-  /// once, others besides, and itself. Each level from its own on has at most eight such cells.
+  /// Calls visit(other) for the triangles from a level on whose cells the triangle's box touches: some of them more
+  /// than once, others besides, and itself. Each level from the triangle's own on has at most eight such cells.
   template <class Visit>
   void visit(std::uint32_t triangle, int from_level, Visit&& visit) const {
     for (auto k = static_cast<std::size_t>(from_level); k < levels_.size(); ++k)
@@ -89,7 +91,7 @@ class TriangleGrid {
         for (std::int64_t y = first[1]; y <= last[1]; ++y)
           for (std::int64_t z = first[2]; z <= last[2]; ++z) f(slot(x, y, z));
     }
-    /// Two cells may share a list.
+    /// The slot of a cell's list. Two cells may share one.
     std::size_t slot(std::int64_t x, std::int64_t y, std::int64_t z) const {
       std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15u;
       h ^= static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu + (h >> 29);
@@ -99,12 +101,12 @@ class TriangleGrid {
     }
 
     double scale_;
-    std::vector<std::uint32_t> first_;  ///< by cell: head of its list among the entries
+    std::vector<std::uint32_t> first_;  ///< head of each list among the entries, by slot
     std::vector<Entry> entries_;
   };
 
   const std::vector<Box3>& boxes_;
-  std::vector<std::uint8_t> level_;  ///< by triangle
+  std::vector<std::uint8_t> level_;  ///< level of each triangle
   std::vector<Level> levels_;
 };
 

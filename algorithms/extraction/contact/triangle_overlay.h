@@ -13,8 +13,8 @@
 
 namespace hermesh {
 
-/// Coordinates of places seen from a triangle, all of them affine: how far they lie beyond each of its three sides, along
-/// its plane, and how high above the plane.
+/// Coordinates of places seen from a triangle, all of them affine: how far a place lies beyond each of the three sides,
+/// along the triangle's plane, and how high above the plane. Lengths are those of the corners' coordinates.
 class OverTriangle {
  public:
   using Place = Eigen::Vector4d;  ///< beyond sides 0, 1, 2 (positive outside), height
@@ -37,7 +37,7 @@ class OverTriangle {
   const Eigen::Vector3d& normal() const { return normal_; }
   Place operator()(const Eigen::Vector3d& p) const { return axes_ * (p - origin_) - offsets_; }
 
-  /// What that is computed from.
+  /// What the coordinates are computed from: they are axes * (p − origin) − offsets.
   struct Frame {
     const Eigen::Matrix<double, 4, 3>& axes;
     const Eigen::Vector3d& origin;
@@ -52,7 +52,8 @@ class OverTriangle {
   bool degenerate_;
 };
 
-/// Part of a polygon over a triangle, by its corners: six at most, or more where rounding makes it not quite convex.
+/// The part of a triangle over another one, by its corners: six at most, or more where rounding makes it not quite
+/// convex.
 struct ClippedTriangle {
   std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles them
   int size = 0;
@@ -62,7 +63,8 @@ struct ClippedTriangle {
 /// Whether some of the segment lies above or below the inside of the triangle.
 bool passes_over(const OverTriangle::Place& from, const OverTriangle::Place& to);
 
-/// For one triangle after another that is laid over the same mesh.
+/// Lays a mesh over one triangle after another. An object remembers which faces it has seen, so each thread needs its
+/// own.
 class TriangleOverlay {
  public:
   explicit TriangleOverlay(std::size_t faces) : seen_(faces) {}
@@ -75,8 +77,8 @@ class TriangleOverlay {
   /// is closed, too, for no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are
   /// largest at the part's corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
   ///
-  /// `Mesh` has corners(face), normal(face) and across(face, side). `covered(face)` is told of faces that lie over t as a whole, no
-  /// farther away than within(face), whatever the answer is.
+  /// `Mesh` has corners(face), normal(face) and across(face, side). `covered(face)` is called for faces that lie over t
+  /// as a whole, no farther away than within(face), whatever the answer is.
   template <class Mesh, class Within, class Covered>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Covered&& covered) {
     const OverTriangle over(t);
@@ -106,6 +108,7 @@ class TriangleOverlay {
     return true;
   }
 
+  /// is_near() for those who need not know which faces t is covered by.
   template <class Mesh, class Within>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
     return is_near(t, mesh, start, within, [](std::uint32_t) {});

@@ -11,8 +11,8 @@
 
 namespace hermesh {
 
-/// The triangle's plane and the three planes through its sides at right angles to it. Most points are decided by these;
-/// only those beside the triangle need the exact distance.
+/// Tells whether points are near a triangle, by the triangle's plane and the three planes through its sides at right
+/// angles to it. Most points are decided by these; only those beside the triangle need the exact distance.
 class TriangleReach {
  public:
   TriangleReach() = default;
@@ -30,6 +30,7 @@ class TriangleReach {
   /// How far p lies beyond the three sides, along the plane: negative inside.
   Eigen::Vector3d beyond(const Eigen::Vector3d& p) const { return sides_ * p - offsets_; }
 
+  /// Whether p is no farther than `within` from the triangle.
   bool near(const Eigen::Vector3d& p, double within) const {
     const double height = normal_.dot(p - corners_[0]);
     if (std::abs(height) > within) return false;

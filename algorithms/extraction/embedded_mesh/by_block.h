@@ -1,4 +1,4 @@
-// What few blocks have, by block.
+// Values that few of a lattice's blocks have, by number of the block.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,9 @@
 
 namespace hermesh {
 
-/// Memory only for the blocks that have one; reading another's gives an empty one. Blocks may be written side by
-/// side, but none may be read meanwhile that another thread may write.
+/// Values of type T for the blocks of a lattice. Memory is taken only for blocks that have a value; reading any other
+/// block gives an empty value. Different threads may write different blocks at once, but no block may be read while
+/// another thread may write it.
 template <class T>
 class ByBlock {
  public:
@@ -16,7 +17,7 @@ class ByBlock {
   std::size_t size() const { return made_.size(); }
   bool has(std::size_t block) const { return made_[block] != nullptr; }
   const T& operator[](std::size_t block) const { return made_[block] ? *made_[block] : kEmpty; }
-  /// Made where there was none.
+  /// The value of a block, for writing; an empty one is made where there was none.
   T& at(std::size_t block) {
     if (!made_[block]) made_[block] = std::make_unique<T>();
     return *made_[block];

@@ -11,13 +11,14 @@
 namespace hermesh {
 namespace {
 
-/// Whether all crossings of a face belong to one sheet.
+/// Whether all crossings of an ambiguous face belong to one sheet.
 bool has_one_sheet(const CellSheets& sheets, int face) {
   const std::array<int, 4> edges = face_edges(face);
   return std::ranges::all_of(edges, [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
 }
 
-/// Every other corner is inside: joining several faces could leave loops that no plane separates (cell_sheets.h).
+/// Whether every other corner is inside: to join several faces of such a cell could leave loops that no plane separates
+/// (cell_sheets.h).
 bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 
 }  // namespace
@@ -37,12 +38,15 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     is_plain[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
+  // A block that was added for its cells alone stores no signs: all of them are that of the nearest owner above.
   parallel_blocks(n, context, [&](std::size_t b) {
     const HermiteView::Block& source = grid.blocks()[b];
     blocks_[b] = {};
     blocks_[b].inside = source.inside;
     if (source.leaf < 0 && sign_of_added(source)) blocks_[b].inside.fill(~std::uint64_t{0});
   });
+  // Count, scan, fill (core/parallel.h): each block finds its active cells by itself, and a prefix sum numbers them, so
+  // that numbers do not depend on threads.
   std::vector<std::vector<std::uint8_t>> found(n);
   parallel_blocks(n, context, [&](std::size_t b) {
     Block& block = blocks_[b];
@@ -51,6 +55,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     std::uint32_t before = 0;
     for (int word = 0; word < 8; ++word) {
       std::uint64_t all = ~std::uint64_t{0}, some = 0;
+      // Active are cells whose corners differ, eight words at a time, and joints: the ends of a cut may both be inside.
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
       block.rank[word] = before;
@@ -73,7 +78,10 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     const std::vector<std::uint8_t> own = std::move(found[b]);  // freed here, in parallel
     std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
+  // How faces are cut decides how many sheets a cell has, so it comes before points are numbered.
   cut_ambiguous_faces(context);
+  // A first sheet's point has its cell's number within the block, which plain_points() relies on; the points of further
+  // sheets come behind. Only special cells can have such.
   parallel_blocks(n, context, [&](std::size_t b) {
     std::uint16_t later = 0;
     for_each_bit(blocks_[b].special, [&](int cell) {
@@ -88,18 +96,22 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
 }
 
-/// First as the normals say, then those that are pinched the other way. One face after the other, for what is done to
-/// one may help the next one of its cells; and once is enough, for it parts sheets and joins none.
+/// Cuts ambiguous faces first as the normals say, and then those that are pinched the other way. The second pass takes
+/// one face after the other, for what is done to one may help the next one of its cells; and one such pass is enough,
+/// for it parts sheets and joins none.
 void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   struct Face {
     std::int32_t block;
     int cell, face;
-    bool joined;  ///< by the normals
+    bool joined;  ///< the normals say so
   };
   std::vector<std::vector<Face>> faces(blocks_.size());
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(blocks_[b].special, [&](int cell) {
+      // Each face once, as an upper face of the cell below it. Nothing is marked as joined yet, so sheets() is that of
+      // kCellSheets for all cells without a cut. Faces of joints stay as they are: the lattice draws both of their
+      // sides (fracture/label_repair.h).
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
@@ -111,10 +123,12 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   std::vector<std::uint8_t> joined(codes_.size());  // faces, by active cell
   const auto joined_faces = [&](const Cell& at) -> std::uint8_t& { return joined[code_at(at.block, at.cell)]; };
   const auto code = [&](const Cell& at) { return codes_[code_at(at.block, at.cell)]; };
+  // Both cells beside a face note how it is cut, so their segments on it agree and the surface stays closed.
   const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
     joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
     joined_faces(upper) ^= static_cast<std::uint8_t>(1 << (face ^ 1));
   };
+  // Both passes run in one thread, in the order of blocks, cells and faces: the second one's outcome depends on it.
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
@@ -123,10 +137,12 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
+      // The sheets as all faces are cut by now, those that this pass has turned included.
       const auto sheets_of = [&](const Cell& at) { return cell_sheets(code(at), joined_faces(at)); };
       if (has_one_sheet(sheets_of(lower), face) && has_one_sheet(sheets_of(upper), face ^ 1))
         cut_the_other_way(lower, upper, face);
     }
+  // Only cells that differ from kCellSheets keep sheets of their own: few cells, except in noise.
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     for_each_bit(blocks_[b].special, [&](int cell) {
       const std::size_t at = code_at(static_cast<std::int32_t>(b), cell);
@@ -137,8 +153,9 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   });
 }
 
-/// Which of the two pairs of segments lies better in the planes through its ends: that of an edge or of a thin wall runs
-/// along it, whatever the distances along the lattice's edges are.
+/// Whether the normals say that the inside corners of an ambiguous face are joined: whether the pair of segments that
+/// cuts off the outside corners lies better in the tangent planes through its ends. The segments of an edge or of a
+/// thin wall run along it, whatever the distances along the lattice's edges are.
 bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
   const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
   std::array<Eigen::Vector3d, 4> points, normals;
@@ -148,14 +165,17 @@ bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
     points[i] = crossing_point(edge, crossing);
     normals[i] = {crossing.normal[0], crossing.normal[1], crossing.normal[2]};
   }
+  // How far a segment between two crossings leaves the planes there: the sum of two sines.
   const auto slant = [&](int i, int j) {
     const Eigen::Vector3d along = (points[j] - points[i]).normalized();
     return std::abs(normals[i].dot(along)) + std::abs(normals[j].dot(along));
   };
   const int inside = (codes_[code_at(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
+  // The two edges that meet in a corner are the one before it and its own; the corner opposite is two on.
   const auto cut_off = [&](int corner) {
     return slant((corner + 3) % 4, corner % 4) + slant((corner + 1) % 4, (corner + 2) % 4);
   };
+  // Strictly: without normals both are zero, and the inside corners are cut off.
   return cut_off(inside + 1) < cut_off(inside);
 }
 
@@ -172,8 +192,8 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
   return locate(block, at[0], at[1], at[2]);
 }
 
-/// A block that owns no crossing edge has one sign, and so have the blocks that are not there, up to the nearest owner
-/// above: no edge on the way is crossed.
+/// The sign of a block that owns no crossing edge. All of its samples have one sign, and so have the blocks that are
+/// not there, up to the nearest owner above: no edge on the way is crossed.
 bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
   for (int d = 1; d < 8; ++d) {
     const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
@@ -182,7 +202,8 @@ bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
   return false;
 }
 
-/// A cell has the cuts along an axis that start from its corners of offset 0 there.
+/// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any of the four
+/// corners of offset 0 along it.
 BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
   static constexpr BlockMask kNone{};
   BlockMask cells{};
@@ -201,7 +222,8 @@ BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
   return cells;
 }
 
-/// Signs of every cell's corners, from its first corner's and the crossings on the way that are no cuts.
+/// Signs of the corners of every cell of a block, from the first corner's and the crossings on the way that are no
+/// cuts. So no block is asked for its signs but this one, and the upper samples may be where there is no block.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   static constexpr BlockMask kNone{};
   const HermiteView::Block& block = source_[b];
@@ -222,6 +244,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
     BlockMask& to = signs[from | 1 << axis];
     for (int word = 0; word < 8; ++word) to[word] = signs[from][word] ^ edges[word];
   };
+  // Seven steps from corner to corner reach all of them; each starts from one whose signs are known.
   step(0, 0), step(0, 1), step(0, 2), step(1, 1), step(1, 2), step(2, 2), step(3, 2);
   return signs;
 }
@@ -229,6 +252,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
 double CellBlocks::margin_for_rounding() const {
   const IndexToWorld& placement = grid_.placement();
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
+  // The farthest corner along each axis of the world, for rounding grows with the coordinate.
   const auto include = [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
     for (int corner = 0; corner < 8; ++corner) {
       Eigen::Vector3d index = lower;
@@ -251,6 +275,7 @@ double CellBlocks::margin_for_rounding() const {
   }
   // Of single precision about the origin, and of double precision where the file's coordinates lie (FilePoints).
   const Eigen::Vector3d in_world = farthest * 0x1p-24 + (placement.origin.cwiseAbs() + farthest) * 0x1p-53;
+  // Back to voxels: no place moves farther along an axis of the lattice than its row of magnitudes allows.
   const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * in_world;
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
   static_assert(kLargestMargin == 0.25);  // eight times what the error names
@@ -261,6 +286,7 @@ double CellBlocks::margin_for_rounding() const {
   return margin;
 }
 
+/// The entry of a cell that is in the list.
 const CellSheets& CellBlocks::find(const SheetsOfBlock& list, int cell) {
   return std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); })->second;
 }
@@ -276,6 +302,7 @@ std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const 
   const Block& block = blocks_[number];
   if (sheet == 0)
     return block.first_point + static_cast<std::uint32_t>(code_at(number, cell) - block.first_code);
+  // Behind the points of all first sheets come those of further sheets, in the order of cells and sheets.
   const auto& several = several_[number];
   const auto at = std::lower_bound(several.begin(), several.end(), cell,
                                    [](const auto& entry, int wanted) { return entry.first < wanted; });
@@ -299,6 +326,8 @@ int CellBlocks::crossings_on(const Edge& first, int length) const {
   if (first.block < 0) return 0;
   const BlockMask& crossing = source(first.block).crossing[static_cast<std::size_t>(first.axis)];
   const int word = first.sample >> 6, bit = first.sample & 63;
+  // A mask has a word for each x, in it a row of eight bits for each y: edges along x are 64 bits apart, along y eight,
+  // and along z they follow one another.
   if (first.axis == 0) {
     int found = 0;
     for (int k = 0; k < length; ++k) found += test(crossing, first.sample + 64 * k);
@@ -311,6 +340,7 @@ int CellBlocks::crossings_on(const Edge& first, int length) const {
 
 Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge, const EdgeCrossing& crossing) const {
   Eigen::Vector3d point = corner(edge.block, edge.sample);
+  // Off the ends of the edge, so that the crossing stays on it when it is rounded for the file.
   point[edge.axis] += std::clamp(double(crossing.offset), margin_, 1.0 - margin_);
   return point;
 }
@@ -322,6 +352,7 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
     const Cell cell = cell_around(edge, i);
     result.cells[i] = cell;
     result.sheets[i] = &sheets(cell.block, cell.cell);
+    // A cell of one sheet has one point, whatever edge asks.
     const CellSheets& loops = *result.sheets[i];  // of a joint of one point they do not tell of its cuts
     result.points[i] =
         point(cell.block, cell.cell, loops.sheets > 1 ? loops.sheet_of[edge_in(edge.axis, i)] : 0);
@@ -330,6 +361,7 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
 }
 
 CellBlocks::Edge CellBlocks::other_end(const Around& around, int i) const {
+  // The cells i and i + 1 draw the same segments on the face between them, so either may be asked.
   const int other = around.sheets[i]->partner[face_after(around.axis, i)][edge_in(around.axis, i)];
   return edge_of_cell(around.cells[i].block, around.cells[i].cell, other);
 }
@@ -347,6 +379,7 @@ bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
 }
 
 bool CellBlocks::comes_first(const Edge& a, const Edge& b) const {
+  // By coordinates and not by block numbers: the order is then one of the lattice itself.
   const auto place = [&](const Edge& edge) {
     const auto& lower = source_[edge.block].lower;
     return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7), lower[2] + (edge.sample & 7),

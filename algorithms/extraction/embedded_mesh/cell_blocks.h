@@ -22,42 +22,47 @@
 
 namespace hermesh {
 
-/// Cells of a block whose sheets are not those of kCellSheets, ascending.
+/// Cells of one block whose sheets are not those of kCellSheets, with their sheets; ascending by cell.
 using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 
-/// What the cells are made from.
+/// The lattice that cells are made from: blocks with the signs of their samples, crossings, and cuts if it has any. The
+/// object and all that it gives out must outlive the CellBlocks made from it.
 class CellGrid {
  public:
   virtual ~CellGrid() = default;
-  /// Of a block whose `leaf` is −1 the signs are unknown, but one and the same.
+  /// The blocks. The signs of a block whose `leaf` is −1 are not stored, but are all the same (it owns no crossing
+  /// edge).
   virtual const HermiteView::Blocks& blocks() const = 0;
   virtual const IndexToWorld& placement() const = 0;
-  /// Of an edge that is crossed.
+  /// The crossing of an edge that is crossed; its offset is in voxels from the edge's first sample.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
-  /// Of all of a block, by axis and then by sample. @param out room for as many, 1536 at most
+  /// All crossings of a block, by axis and then by sample. `out` has room for as many, 1536 at most.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const {
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(blocks()[static_cast<std::size_t>(block)].crossing[static_cast<std::size_t>(axis)],
                    [&](int sample) { *out++ = crossing(block, sample, axis); });
   }
-  /// By block and axis those crossing edges that are cuts; empty where there are none.
+  /// The crossing edges that are cuts, by block and axis; empty where the lattice has none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
-  /// By block the joints that have several sheets or an ambiguous face; empty where there are none.
+  /// The joints of each block that have several sheets or an ambiguous face; empty where the lattice has none.
   virtual std::span<const SheetsOfBlock> joint_sheets() const { return {}; }
-  /// Whether the two inside corners of an ambiguous face without a cut are of one piece. If not, the face is
-  /// never cut so that they are joined across it.
+  /// Whether the two inside corners of an ambiguous face without a cut are of one piece. Where they are not, the face
+  /// is never cut so that they are joined across it.
   virtual bool is_of_one_piece(std::int32_t /*block*/, int /*cell*/, int /*face*/) const { return true; }
 };
 
+/// Signs, sheets, points and edges of all active cells of a CellGrid. Lengths are in voxels, places in index space
+/// relative to the placement's base. Constant once it is made, so any number of threads may read it.
 class CellBlocks {
  public:
-  /// (Without initialisers, so that many can be made without writing them twice.)
+  /// What is known of the cells of one block. (Without initializers, so that many can be made without writing them
+  /// twice.)
   struct Block {
     BlockMask inside;
     BlockMask active;   ///< cells with a crossing edge, by their first corner
-    BlockMask joints;   ///< of these, those with a cut
-    BlockMask special;  ///< of these, joints and those of several sheets or with an ambiguous face
-    BlockMask joined;   ///< of the active ones, those with an ambiguous face whose inside is joined
+    BlockMask joints;   ///< active cells with a cut
+    BlockMask special;  ///< active cells that are joints, or have several sheets or an ambiguous face
+    BlockMask joined;   ///< active cells with an ambiguous face whose inside is joined
     std::uint32_t first_point, first_code;
     std::array<std::uint32_t, 8> rank;  ///< active cells before each word
   };
@@ -69,21 +74,24 @@ class CellBlocks {
     std::int32_t block;
     int cell;
   };
-  /// The four cells around an edge, counter-clockwise seen against its axis: a quad's corners.
+  /// The four cells around an edge, counter-clockwise seen against its axis: the corners of a quad.
   struct Around {
     std::array<Cell, 4> cells;
-    std::array<std::uint32_t, 4> points;  ///< of the sheet that the edge belongs to
+    std::array<std::uint32_t, 4> points;  ///< each cell's point for the sheet that the edge belongs to
     std::array<const CellSheets*, 4> sheets;
     int axis;
   };
 
-  /// @throws Error if margin() would leave crossings and points no room.
+  /// Finds the active cells of a lattice, cuts their ambiguous faces and numbers their points. `grid` must outlive
+  /// this.
+  /// @throws Error if margin() would leave crossings and points no room, or if there are more cells or points than 32
+  ///   bits can number; Cancelled.
   CellBlocks(const CellGrid& grid, RunContext& context);
 
   /// How far points stay off the faces of their cells, and crossings off the ends of their edges, in voxels, so that
-  /// rounding to the file's precision moves none across. The mean of a loop's crossings may be as near as a third of it, and
-  /// a crossing is rounded off its edge, too; so it is eight times what rounding may do at the lattice's farthest corner, but
-  /// at least 1/1024, which is that up to 2048 voxels from the base.
+  /// rounding to the file's precision moves none across. The mean of a loop's crossings may come as near as a third of
+  /// the margin, and a crossing is rounded off its edge, too; so the margin is eight times what rounding may do at the
+  /// lattice's farthest corner, and at least 1/1024, which is eight times that up to 2048 voxels from the base.
   double margin() const { return margin_; }
 
   std::size_t size() const { return blocks_.size(); }
@@ -92,35 +100,38 @@ class CellBlocks {
   const HermiteView::Block& source(std::int32_t block) const { return source_[static_cast<std::size_t>(block)]; }
   std::size_t point_count() const { return points_; }
   std::size_t cell_count() const { return codes_.size(); }
-  /// Of an active cell, from 0, ascending by block and cell.
+  /// The number of an active cell, from 0, ascending by block and cell.
   std::uint32_t cell_number(std::int32_t block, int cell) const {
     return static_cast<std::uint32_t>(code_at(block, cell));
   }
-  /// By corner the inside bits of all cells of a block.
+  /// The inside bits of all cells of a block, a mask for each of the eight corners.
   std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
-  /// Inside bits of the corners of the cell of that number.
+  /// The inside bits of the corners of the active cell with that number, a bit a corner.
   int corner_signs(std::uint32_t number) const { return codes_[number]; }
 
-  /// By the inside bits of the corners, but for those joints of which the lattice tells them. Of other joints
-  /// it tells the segments on faces without a cut, and that no face is explicit for the joint's own sake, for
-  /// it has one sheet (or none, all corners being inside) and no ambiguous face.
+  /// The sheets of an active cell. They follow from the inside bits of its corners and from how its ambiguous faces are
+  /// cut, but for joints of which the lattice tells them (CellGrid::joint_sheets()). For any other joint the segments
+  /// on faces without a cut are given, and no face is explicit for the joint's own sake: such a joint has one sheet (or
+  /// none, all corners being inside) and no ambiguous face.
   ///
-  /// On an ambiguous face the corners of one kind are cut off one by one and those of the other kind are joined. Which is
-  /// which the normals of its four crossings tell, so that edges and thin walls of either kind stay whole; without
-  /// normals, at joints, between two pieces and beside cells of which every other corner is inside it is the inside corners
-  /// that are cut off. So each sheet of a cell without a cut bounds one piece.
-  /// A face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons would meet
-  /// in the edge between the two cells' points. It is cut the other way, which parts each of the two sheets into two, and
-  /// closes a tunnel of less than a voxel or opens a wall of less than one.
+  /// On an ambiguous face the corners of one kind are cut off one by one and those of the other kind are joined. The
+  /// normals of its four crossings tell which is which, so that edges and thin walls of either kind stay whole; without
+  /// normals, at joints, between two pieces and beside cells of which every other corner is inside it is the inside
+  /// corners that are cut off. So each sheet of a cell without a cut bounds one piece.
+  /// A face is *pinched* if both its segments belong to one sheet in either cell beside it: then four polygons would
+  /// meet in the edge between the two cells' points. A pinched face is cut the other way, which parts each of the two
+  /// sheets into two, and closes a tunnel of less than a voxel or opens a wall of less than one.
   const CellSheets& sheets(std::int32_t block, int cell) const {
     if (const CellSheets* told = told_sheets(block, cell)) return *told;
     if (test(blocks_[block].joined, cell)) return find(joined_sheets_[block], cell);
     return kCellSheets[codes_[code_at(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
-  /// Of an active cell's face. Only faces of joints are.
+  /// Whether a face of an active cell is pinched, see sheets(). Only faces of joints are: all others that were pinched
+  /// have been cut the other way.
   bool is_pinched(std::int32_t block, int cell, int face) const;
-  /// Points of an active cell.
+  /// How many points an active cell has: one for each sheet, and one for a joint whose sheets the lattice does not
+  /// tell.
   int point_count(std::int32_t block, int cell) const {
     return is_joint(block, cell) ? joint_points(block, cell) : sheets(block, cell).sheets;
   }
@@ -131,19 +142,20 @@ class CellBlocks {
     const std::size_t end = next < blocks_.size() ? blocks_[next].first_code : codes_.size();
     return static_cast<std::uint32_t>(end) - blocks_[block].first_code;
   }
-  /// How many points a block's cells have: those of its active cells' first sheets, ascending, and then those of all others.
+  /// How many points the cells of a block have. The points of its active cells' first sheets are numbered first,
+  /// ascending by cell, and then those of all further sheets.
   std::uint32_t points_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
     const std::size_t end = next < blocks_.size() ? blocks_[next].first_point : points_;
     return static_cast<std::uint32_t>(end) - blocks_[block].first_point;
   }
-  /// A sample's place, which is that of its cell's first corner, relative to the placement's base.
+  /// The place of a sample, which is the first corner of the cell of that number; relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;
   Cell locate(std::int32_t block, int x, int y, int z) const {
     return {source_[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
             sample_index(x & 7, y & 7, z & 7)};
   }
-  /// Calls f(Cell) for the active cells at most so many steps from one along each axis, that one included.
+  /// Calls f(Cell) for the active cells at most `steps` cells away from `cell` along each axis, that one included.
   template <class F>
   void for_each_about(const Cell& cell, int steps, F&& f) const {
     for (int x = -steps; x <= steps; ++x)
@@ -157,14 +169,14 @@ class CellBlocks {
   bool is_crossed(const Edge& edge) const {
     return edge.block >= 0 && test(source_[edge.block].crossing[edge.axis], edge.sample);
   }
-  /// How many are crossed of so many edges of a block, up to 8, that follow one another in a line.
+  /// How many edges are crossed among `length`, up to 8, that follow one another in a line of a block, from `first` on.
   int crossings_on(const Edge& first, int length) const;
   Eigen::Vector3d crossing_point(const Edge& edge) const {
     return crossing_point(edge, grid_.crossing(edge.block, edge.sample, edge.axis));
   }
   Eigen::Vector3d crossing_point(const Edge& edge, const EdgeCrossing& crossing) const;
   Around around(const Edge& edge) const;
-  /// One of the four cells around a crossing edge, in the order of around().
+  /// Cell i of the four around a crossing edge, in the order of around().
   Cell cell_around(const Edge& edge, int i) const {
     int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
     at[(edge.axis + 1) % 3] += kAround[i][0];
@@ -172,8 +184,8 @@ class CellBlocks {
     return locate(edge.block, at[0], at[1], at[2]);
   }
 
-  /// The points of the four cells around an edge, in the order of around(); false if one of them is a joint,
-  /// has several sheets or an ambiguous face.
+  /// Sets `points` to the points of the four cells around an edge, in the order of around(). False if one of the cells
+  /// is a joint, has several sheets or an ambiguous face.
   bool plain_points(const Edge& edge, std::array<std::uint32_t, 4>& points) const {
     for (int i = 0; i < 4; ++i) {
       const Cell cell = cell_around(edge, i);
@@ -192,11 +204,12 @@ class CellBlocks {
     return around.sheets[i]->sheets > 1 || around.sheets[(i + 1) % 4]->sheets > 1 ||
            ((around.sheets[i]->ambiguous_faces >> face_after(around.axis, i)) & 1);
   }
-  /// Of the segment that starts at the edge in that face.
+  /// The other end of the segment that starts at the edge in the face between cells i and i + 1 around it.
   Edge other_end(const Around& around, int i) const;
-  /// Whether any of the cell's faces is explicit.
+  /// Whether any face of the cell is explicit, see is_explicit().
   bool has_explicit_face(std::int32_t block, int cell) const;
-  /// An order of edges that does not depend on blocks, so that of a segment's two ends one speaks for both.
+  /// A strict order of edges by place and axis. It does not depend on how blocks are numbered, so that one of a
+  /// segment's two ends speaks for both, whichever cell asks.
   bool comes_first(const Edge& a, const Edge& b) const;
 
   template <class F>
@@ -206,9 +219,9 @@ class CellBlocks {
   }
 
  private:
-  /// Cells around an edge, as steps along the two other axes.
+  /// The four cells around an edge, as steps along the two other axes.
   static constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
-  /// The face of cell i that leads to cell i+1.
+  /// The face of cell i that leads to cell i + 1.
   static constexpr int face_after(int axis, int i) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     return i == 0 ? 2 * u + 1 : i == 1 ? 2 * v + 1 : i == 2 ? 2 * u : 2 * v;
@@ -239,15 +252,15 @@ class CellBlocks {
   double margin_for_rounding() const;
 
   const CellGrid& grid_;
-  const HermiteView::Blocks& source_;  ///< the grid's blocks
+  const HermiteView::Blocks& source_;  ///< the blocks of `grid_`
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;
   LargeArray<Block> blocks_;
-  ByBlock<SheetsOfBlock> joined_sheets_;  ///< of the cells that are `joined`
-  /// Cells with several sheets, ascending, and the number of points that the later sheets of those before them have.
+  ByBlock<SheetsOfBlock> joined_sheets_;  ///< sheets of the cells that are `joined`
+  /// Cells with several sheets, ascending, each with how many further points the cells before it in the block have.
   ByBlock<std::vector<std::pair<std::uint16_t, std::uint16_t>>> several_;
-  std::vector<std::uint8_t> codes_;  ///< signs of the corners, by active cell
+  std::vector<std::uint8_t> codes_;  ///< signs of the corners of each active cell
   std::size_t points_ = 0;
 };
 

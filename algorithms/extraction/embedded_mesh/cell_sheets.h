@@ -10,28 +10,30 @@
 
 namespace hermesh {
 
-/// The surface cuts straight segments between the crossings of a face's edges. A face whose corners differ along both
-/// diagonals is ambiguous and gets two: its inside corners are cut off one by one, which both cells beside the face do
-/// alike. So the segments of a cell close to loops, and each loop bounds one sheet of the surface.
+/// The loops that the surface cuts on the boundary of one cell, and the sheets that they bound. On each face the
+/// surface cuts straight segments between the crossings of the face's edges. A face whose corners differ along both
+/// diagonals is ambiguous and gets two segments: its inside corners are cut off one by one, which both cells beside the
+/// face do alike. So the segments of a cell close to loops, and each loop bounds one sheet of the surface.
 struct CellSheets {
   static constexpr std::uint8_t kNone = 255;
 
-  std::uint8_t sheets = 0;                 ///< 0 to 4
-  std::array<std::uint8_t, 12> sheet_of{};  ///< by edge; kNone where it is not crossed
-  /// By face and edge: the other end of the segment that starts on this edge in that face; kNone where there is none.
+  std::uint8_t sheets = 0;                 ///< how many, 0 to 4
+  std::array<std::uint8_t, 12> sheet_of{};  ///< sheet of each edge; kNone where the edge is not crossed
+  /// For each face and edge the other end of the segment that starts on this edge in that face; kNone where there is
+  /// none.
   std::array<std::array<std::uint8_t, 12>, 6> partner{};
   std::uint8_t ambiguous_faces = 0;  ///< a bit a face
 };
 
-/// By the inside bits of the corners.
+/// The sheets of a cell for each pattern of its corners' inside bits.
 ///
-/// **Guarantee.** The crossings of two loops of one cell are strictly separated by a plane, wherever on their edges they
-/// lie (but not at the corners): so the convex hulls of two loops never meet. The test tries all patterns.
+/// **Guarantee.** The crossings of two loops of one cell are strictly separated by a plane, wherever on their edges
+/// they lie (but not at the corners): so the convex hulls of two loops never meet. The test tries all patterns.
 extern const std::array<CellSheets, 256> kCellSheets;
 
-/// The same, but on the ambiguous faces among `joined_faces`, a bit a face, the outside corners are cut off one by one and
-/// the inside is joined. The guarantee holds for these, too, unless every other corner is inside and several faces are
-/// joined. (CellBlocks joins none of theirs.)
+/// The sheets of a cell as in kCellSheets, except that on the ambiguous faces among `joined_faces`, a bit a face, the
+/// outside corners are cut off one by one and the inside is joined. The guarantee of kCellSheets holds for these, too,
+/// unless every other corner is inside and several faces are joined. (CellBlocks joins no face of such cells.)
 CellSheets cell_sheets(int signs, unsigned joined_faces);
 
 constexpr int edge_axis(int edge) { return edge >> 2; }
@@ -48,7 +50,7 @@ constexpr int edge_number(int axis, const std::array<int, 3>& offset) {
 constexpr int corner_number(const std::array<int, 3>& offset) {
   return offset[0] + 2 * offset[1] + 4 * offset[2];
 }
-/// By the inside bits of the corners the edges that are crossed, a bit an edge.
+/// The crossed edges of a cell, a bit an edge, for each pattern of its corners' inside bits.
 inline constexpr std::array<std::uint16_t, 256> kCrossedEdges = [] {
   std::array<std::uint16_t, 256> result{};
   for (int signs = 0; signs < 256; ++signs)

@@ -88,12 +88,12 @@ TEST(CellSheets, JoiningAFaceOfOneSheetPartsThatAndNoOther) {
   EXPECT_EQ(faces, 36);
 }
 
-/// Twice the plane's coefficients: normal and offset.
+/// A plane by its normal and twice its offset.
 struct Plane {
   int normal[3], offset;
 };
 
-/// The edge's open interval lies strictly on one side, +1 or −1; 0 if not.
+/// The side of a plane that the open interval of an edge lies strictly on, +1 or −1; 0 if it lies on neither.
 int side(int edge, const Plane& plane) {
   std::array<int, 3> first = edge_offset(edge), second = first;
   second[edge_axis(edge)] = 1;
@@ -121,7 +121,7 @@ bool are_separated(const CellSheets& cell, int a, int b) {
   return false;
 }
 
-/// The guarantee of the header.
+/// The guarantee of kCellSheets and of cell_sheets().
 TEST(CellSheets, APlaneSeparatesEveryTwoLoops) {
   int pairs = 0, patterns = 0;
   for (int signs = 0; signs < 256; ++signs)

@@ -15,9 +15,13 @@ void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} <<
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                            RunContext& context)
     : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()) {
+  // Each block decides for its own edges and writes nothing else, by points of cells that are all there: so the result
+  // does not depend on threads.
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (only_ && !only_->has(b)) return;
+    // Nearly all edges lie among plain cells. Their points are looked up once for the block, and crossings are read in
+    // one go: both are asked for by the order of edges.
     PlainPoints near;
     near.read(cells_, block);
     std::array<EdgeCrossing, 3 * 512> crossings;
@@ -45,6 +49,8 @@ bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
 
 void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                         RunContext& context) {
+  // All are marked before any edge decides: an edge looks at all four cells around it. Edges of one cell may be in
+  // several blocks, so this runs in one thread; there are few such cells.
   for (const CellBlocks::Cell& cell : cells) set(held_.at(static_cast<std::size_t>(cell.block)), cell.cell);
   for (const CellBlocks::Cell& cell : cells)
     for (int edge = 0; edge < 12; ++edge)
@@ -61,6 +67,7 @@ std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const {
 }
 
 void EdgePolygons::number_all(RunContext& context) {
+  // Count, scan: each block's first numbers follow from how many the blocks before it have.
   const std::size_t blocks = cells_.size();
   std::vector<std::uint64_t> crossing_points(blocks), quads(blocks), triangles(blocks);
   parallel_blocks(blocks, context, [&](std::size_t b) {
@@ -70,6 +77,7 @@ void EdgePolygons::number_all(RunContext& context) {
       const int fans = count(fanned), all = count(edges(block, axis));
       crossing_points[b] += static_cast<std::uint64_t>(fans);
       quads[b] += static_cast<std::uint64_t>(all - fans);
+      // An edge without explicit faces has four triangles, one that speaks for its segments more, others fewer.
       for_each_bit(fanned, [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
         triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
@@ -90,7 +98,8 @@ void EdgePolygons::number_all(RunContext& context) {
   }
 }
 
-/// Triangles of a fanned edge: 0 where the other ends of its segments speak for all of them.
+/// How many triangles polygons_of() makes of a fanned edge: 0 where the other ends of its segments speak for all of
+/// them.
 int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const {
   int made = 0;
   for (int i = 0; i < 4; ++i) {
@@ -107,22 +116,26 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const Unifor
   BlockEdges& edges = of(edge.block);
   std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
+  // Explicit faces are only found beside cells that are not plain.
   if (!(near ? near->around(edge, corners) : cells_.plain_points(edge, corners))) {
     const CellBlocks::Around around = cells_.around(edge);
     for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
     corners = around.points;
   }
   const int diagonal = any_explicit ? -1 : safe_diagonal(edge, hit, corners, points);
+  // Bits are set and never taken back: a cell that is held later turns quads into fans, no fan into a quad, and leaves
+  // all other answers as they were.
   if (diagonal < 0)
     set(edges.fanned[edge.axis], edge.sample);
   else if (diagonal == 1)
     set(edges.second_diagonal[edge.axis], edge.sample);
 }
 
-/// 0 or 1 for the diagonal to cut along; −1 if neither keeps the triangles in the envelope.
+/// The diagonal to cut a quad along, 0 or 1; −1 if neither keeps the triangles in the envelope.
 int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
                                 const std::array<std::uint32_t, 4>& corners,
                                 const UniformPoints& points) const {
+  // The edge is one voxel long, so its own frame needs no scaling.
   const Vector3d start = cells_.corner(edge.block, edge.sample);
   std::array<EnvelopeCorner, 4> r;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -135,6 +148,7 @@ int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
 
 std::uint32_t EdgePolygons::crossing_point(const CellBlocks::Edge& edge) const {
   const BlockEdges& edges = of(edge.block);
+  // Points on fanned edges are numbered by block, axis and sample.
   std::uint32_t number = edges.first_crossing_point;
   for (int axis = 0; axis < edge.axis; ++axis) number += static_cast<std::uint32_t>(count(edges.fanned[axis]));
   return number + rank_in(edges.fanned[edge.axis], edge.sample);

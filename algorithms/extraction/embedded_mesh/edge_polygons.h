@@ -15,15 +15,19 @@
 
 namespace hermesh {
 
-/// By block and axis.
+/// Edges of a lattice as bits: for each block and axis a bit for each first sample.
 using EdgeMasks = ByBlock<std::array<BlockMask, 3>>;
 
+/// What each crossing edge becomes, a quad or a fan, and the numbers of points and polygons that follow from it. Points
+/// are those of CellBlocks, and behind them one for each fanned edge, at its crossing.
 class EdgePolygons {
  public:
-  /// Decides for each edge what it becomes, by the places of the cells' points (index space relative to the
-  /// placement's base). Points on fanned edges get the numbers from cells.point_count() on. No cell is held
-  /// yet.
-  /// @param only the crossing edges that have polygons here, all if null; outlives this
+  /// Decides for each edge what it becomes, by the places of the cells' points. Points on fanned edges get the numbers
+  /// from cells.point_count() on. No cell is held yet.
+  /// @param cells must outlive this
+  /// @param points places of the cells' points, in index space relative to the placement's base
+  /// @param only the crossing edges that have polygons here, all if null; must outlive this
+  /// @param context told of progress, and asked whether to stop
   /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
   EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                RunContext& context);
@@ -35,19 +39,19 @@ class EdgePolygons {
 
   /// Whether the cell would have explicit faces of its own if it were held to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
-  /// Whether more than four such cells are among the 27 about this one. There, as nearly everywhere in noise, a point finds no
-  /// room to move.
+  /// Whether more than four cells that can be held are among the 27 about this one. There, as nearly everywhere in
+  /// noise, a point finds no room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
   bool is_held(const CellBlocks::Cell& cell) const { return test(held_[static_cast<std::size_t>(cell.block)], cell.cell); }
-  /// Holds cells to their segments, and decides anew for the edges around them. @throws as the constructor does.
+  /// Holds cells to their segments, and decides anew for the edges around them. Throws as the constructor does.
   void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
 
-  std::uint64_t point_count() const { return points_; }  ///< those on fanned edges included
+  std::uint64_t point_count() const { return points_; }  ///< points of cells and points on fanned edges
   std::uint64_t fanned_edges() const { return fanned_edges_; }
   std::uint64_t quad_count() const { return quads_; }
   std::uint64_t triangle_count() const { return triangles_; }
-  /// Polygons of the blocks before.
+  /// How many quads, and how many triangles, the blocks before this one have.
   std::uint32_t first_quad(std::int32_t block) const { return of(block).first_quad; }
   std::uint32_t first_triangle(std::int32_t block) const { return of(block).first_triangle; }
 
@@ -55,12 +59,13 @@ class EdgePolygons {
     return test(of(edge.block).fanned[edge.axis], edge.sample);
   }
   const BlockMask& fanned(std::int32_t block, int axis) const { return of(block).fanned[axis]; }
-  /// Of a fanned edge.
+  /// The number of the point on a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
-  /// Calls quad(Quad) or triangle(Triangle), counter-clockwise seen from outside (at a cut from the edge's second sample).
-  /// Of a segment that two fanned edges share, one of them has the two triangles.
-  /// @param near of the edge's block, where they are at hand
+  /// Calls quad(Quad) or triangle(Triangle) for the polygons of an edge, counter-clockwise seen from outside (at a cut
+  /// from the edge's second sample). Where two fanned edges share a segment, only the one that comes first
+  /// (CellBlocks::comes_first()) has the two triangles beside it. `near` has the points about the edge's block, or is
+  /// null where they are not at hand.
   template <class OnQuad, class OnTriangle>
   void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle, const PlainPoints* near = nullptr) const {
     const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
@@ -105,7 +110,7 @@ class EdgePolygons {
   BlockEdges& of(std::int32_t block) { return edges_.at(static_cast<std::size_t>(block)); }
   void number_all(RunContext& context);
   int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
-  /// @param hit offset of the crossing
+  /// Notes what an edge becomes. `hit` is the offset of its crossing, in voxels.
   void decide(const CellBlocks::Edge& edge, double hit, const UniformPoints& points,
               const PlainPoints* near = nullptr);
   int safe_diagonal(const CellBlocks::Edge& edge, double hit, const std::array<std::uint32_t, 4>& corners,
@@ -114,7 +119,7 @@ class EdgePolygons {
   const CellBlocks& cells_;
   const EdgeMasks* const only_;
   ByBlock<BlockEdges> edges_;
-  ByBlock<BlockMask> held_;  ///< cells; apart from edges, for it is read across blocks while these are made
+  ByBlock<BlockMask> held_;  ///< held cells; apart from `edges_`, for this is read across blocks while those are made
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
 };
 

@@ -8,9 +8,9 @@ namespace {
 
 using Corner = EnvelopeCorner;
 
-/// Of an area whose terms are of the order of one, far above rounding: what is called positive.
+/// What an area whose terms are of the order of one must exceed to be called positive: far above rounding.
 constexpr double kPositive = 1e-5;
-/// What heights keep from the ends of the edge, in its length.
+/// How far heights keep from the ends of the edge, in lengths of the edge.
 constexpr double kMargin = 1e-4;
 
 double cross(const Corner& a, const Corner& b) { return a.u * b.v - a.v * b.u; }
@@ -40,6 +40,7 @@ std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
 }  // namespace
 
 EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
+  // The corners must go around the edge, each less than half a turn on, or there is no envelope to be in.
   for (int i = 0; i < 4; ++i)
     if (cross(r[i], r[(i + 1) % 4]) < kPositive) return {.height = hit};
   std::array<std::optional<double>, 2> heights;
@@ -62,6 +63,7 @@ EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
 EnvelopeCut cut_triangle(const std::array<Corner, 3>& r, double hit) {
   const double wa = cross(r[1], r[2]), wb = cross(r[2], r[0]), wc = cross(r[0], r[1]);
   if (wa < kPositive || wb < kPositive || wc < kPositive) return {.height = hit};
+  // Barycentric weights: the edge stands at the origin of (u, v).
   const double height = (wa * r[0].h + wb * r[1].h + wc * r[2].h) / (wa + wb + wc);
   if (!(height > kMargin && height < 1 - kMargin)) return {.height = hit};
   return {false, 0, height};

@@ -5,7 +5,7 @@
 namespace hermesh {
 namespace {
 
-/// Around the edge in the order of its four cells.
+/// The corners of a quad at these heights, in the middles of the four cells around the edge, in their order.
 std::array<EnvelopeCorner, 4> around(double a, double b, double c, double d) {
   return {{{-0.5, -0.5, a}, {0.5, -0.5, b}, {0.5, 0.5, c}, {-0.5, 0.5, d}}};
 }

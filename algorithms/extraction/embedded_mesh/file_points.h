@@ -10,13 +10,15 @@
 
 namespace hermesh {
 
-/// Every test of geometry in this folder looks at rounded() points, so that what it proves holds of the mesh as
-/// written. (An affine map changes no orientation; its own rounding, some 1e-13 voxels, is far below the margins.)
+/// Rounds places of index space to what the mesh file will hold. Every test of geometry in this folder looks at
+/// rounded() points, so that what it proves holds for the mesh as written. (An affine map changes no orientation; its
+/// own rounding, some 1e-13 voxels, is far below the margins.)
 class FilePoints {
  public:
   explicit FilePoints(const IndexToWorld& placement)
       : placement_(placement), to_index_(placement.linear.inverse()) {}
 
+  /// The coordinates that the file holds for a place of index space: world units, relative to the placement's origin.
   Eigen::Vector3f in_file(const Eigen::Vector3d& index) const { return placement_.local(index).cast<float>(); }
   /// The index coordinates, relative to the placement's base, of the nearest point that the file can hold.
   Eigen::Vector3d rounded(const Eigen::Vector3d& index) const {

@@ -15,32 +15,34 @@ using Eigen::Vector3d;
 /// Twice the area, in squared voxels, that a triangle must keep.
 constexpr double kLeastArea = 1e-4;
 
-/// Voxels from where it would rather be that are not worth a move.
+/// A point this near to where it would rather be, in voxels, is not worth a move.
 constexpr double kFulfilled = 1e-3;
 
-/// More than rounding to the file's precision may move a place, in voxels.
+/// More than rounding to the file's precision may move a place, in voxels: a place is tried as the file will hold it.
 constexpr double kRounding = 0.05;
 
-/// One move makes room for another.
+/// How often all points are tried: one move makes room for another.
 constexpr int kSweeps = 2;
 
-/// The point of one cell with the triangles around it and those nearby.
+/// The triangles around the point of one cell, and those nearby that they might meet.
 class Star {
  public:
   Star(const CellBlocks& cells, const PolygonNeighbourhood& mesh, UniformPoints& points)
       : cells_(cells), mesh_(mesh), points_(points) {}
 
-  /// With the box of all places that it might move to.
+  /// Takes up the point of a cell, with its triangles and the box of all places that it might move to.
   void gather(std::int32_t block, int cell, std::initializer_list<Vector3d> places) {
     block_ = block;
     point_ = cells_.point(block, cell, 0);
     star_.clear();
     nearby_.reset();
+    // All polygons that have the point belong to crossing edges of its cell.
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge); cells_.is_crossed(at))
         mesh_.for_each_triangle(at, [&](const Triangle& t) {
           if (has_point(t)) star_.push_back(t);
         });
+    // The places tried later lie between these and the point as it is, so all of them are in the box.
     box_ = {};
     for (const Vector3d& place : places) box_.add(place);
     for (const Triangle& t : star_)
@@ -49,7 +51,8 @@ class Star {
     box_.upper.array() += kRounding;
   }
 
-  /// Moves the point, if the mesh stays embedded.
+  /// Moves the point, if the mesh stays embedded. The mesh itself is changed for the trial, and changed back: no other
+  /// thread looks at this part of it meanwhile (move_points()).
   bool moves_to(const Vector3d& place) {
     const Vector3d before = points_[point_];
     points_[point_] = place;
@@ -72,7 +75,7 @@ class Star {
     return true;
   }
 
-  /// The triangles nearby are only looked for where a place has got so far.
+  /// Whether the star meets no triangle around it. Those nearby are only looked for where a place has got so far.
   bool meets_nothing() {
     if (!nearby_) {
       nearby_.emplace();
@@ -120,6 +123,8 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
           if ((wish.place - from).norm() < kFulfilled || polygons.is_crowded({block, wish.cell})) continue;
           star.gather(block, wish.cell, {wish.place, wish.nearer});
           const Vector3d between = 0.5 * (wish.place + wish.nearer), halfway = 0.5 * (from + wish.nearer);
+          // From the best place to the least move: the wish, half way from it to the nearer place, that, and the way
+          // there by halves.
           for (const Vector3d& place :
                {wish.place, between, wish.nearer, halfway, Vector3d(0.5 * (from + halfway))}) {
             if ((place - from).norm() < kFulfilled) break;

@@ -12,17 +12,19 @@
 
 namespace hermesh {
 
-/// Where the point of a cell of one sheet, or of a joint, would rather be; index space relative to the placement's base.
+/// Where the point of a cell of one sheet, or of a joint, would rather be, outside of its cell; index space relative to
+/// the placement's base.
 struct PointWish {
   int cell;
   Eigen::Vector3d place;
-  Eigen::Vector3d nearer;  ///< as good, but nearer to where the point is within its cell
+  Eigen::Vector3d nearer;  ///< as near to the planes, but nearer to where the point is within its cell
 };
 
-/// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but is
-/// not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one another
-/// (triangle_contact.h), so a mesh free of self-intersection stays so. Wishes by block; places that are fulfilled already, and
-/// those of crowded cells, are passed over. The same result at any number of threads. @throws Cancelled
+/// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but
+/// is not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one
+/// another (triangle_contact.h), so a mesh free of self-intersection stays so. `wishes` are by block; places that are
+/// fulfilled already, and wishes in crowded cells (EdgePolygons::is_crowded()), are passed over. The result is the same
+/// for every number of threads. @throws Cancelled
 void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
                  UniformPoints& points, RunContext& context);

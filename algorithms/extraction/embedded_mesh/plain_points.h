@@ -9,9 +9,11 @@
 
 namespace hermesh {
 
-/// One for many blocks. Of cells that are plain only: one sheet, no ambiguous face and no cut.
+/// The points of the plain cells in and just below a block: cells with one sheet, no ambiguous face and no cut. One
+/// object serves many blocks, one after another.
 class PlainPoints {
  public:
+  /// Looks up the points for the edges of a block.
   void read(const CellBlocks& cells, std::int32_t block) {
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};  // downwards
@@ -32,7 +34,8 @@ class PlainPoints {
         }
     }
   }
-  /// As CellBlocks::plain_points(), of a crossing edge of the block.
+  /// Sets `points` as CellBlocks::plain_points() does, for a crossing edge of the block that was read; false where one
+  /// of the four cells is not plain.
   bool around(const CellBlocks::Edge& edge, std::array<std::uint32_t, 4>& points) const {
     constexpr std::size_t kStep[3] = {81, 9, 1};
     const std::size_t first = at(edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7);
@@ -47,7 +50,7 @@ class PlainPoints {
     return static_cast<std::size_t>(81 * (x + 1) + 9 * (y + 1) + z + 1);
   }
   std::array<std::uint32_t, 729>
-      point_;  ///< by cell, from −1 to 7 along each axis; only those about crossing edges mean something
+      point_;  ///< points of cells from −1 to 7 along each axis; only those about crossing edges mean something
 };
 
 }  // namespace hermesh

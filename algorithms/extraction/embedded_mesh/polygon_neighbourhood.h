@@ -18,14 +18,19 @@
 
 namespace hermesh {
 
-/// How far any point may be from its cell along an axis, in voxels: so the polygons near a place are known.
+/// How far any point may be from its cell along an axis, in voxels. It bounds where the polygons near a place may
+/// start, so that they are found through the lattice.
 inline constexpr double kFarthestFromCell = 1.0;
 
-/// The triangles of a block are listed when somebody first asks for one of them, from any thread.
+/// The triangles of the finest mesh by the block of their edge. A block's triangles are listed when somebody first asks
+/// for one of them, from any thread.
 class PolygonNeighbourhood {
  public:
+  /// All arguments by reference must outlive this.
+  /// @param cells cells of the lattice
+  /// @param polygons what the edges have become; call forget() when that changes
   /// @param points by number, those on fanned edges included; they may move
-  /// @param farthest from its cell along an axis that any of them is or may be then
+  /// @param farthest from its cell along an axis that any point is or will be, voxels
   PolygonNeighbourhood(const CellBlocks& cells, const EdgePolygons& polygons, const UniformPoints& points,
                        double farthest)
       : cells_(cells),
@@ -37,7 +42,7 @@ class PolygonNeighbourhood {
   PolygonNeighbourhood(const PolygonNeighbourhood&) = delete;
   PolygonNeighbourhood& operator=(const PolygonNeighbourhood&) = delete;
 
-  /// The polygons have changed.
+  /// Forgets the triangles listed so far, for the polygons have changed. No other thread may ask meanwhile.
   void forget() {
     for (auto& list : lists_) delete list.exchange(nullptr, std::memory_order_relaxed);
   }
@@ -47,9 +52,9 @@ class PolygonNeighbourhood {
     for (const Triangle& t : list_of(edge.block).triangles_of(number_of(edge))) f(t);
   }
 
-  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than three voxels out
-  /// of the block. The triangles of an edge lie in the box of its four cells and `farthest` around it, so their edges
-  /// begin at most five samples outside the block.
+  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than three
+  /// voxels out of the block. The triangles of an edge lie in the box of its four cells and `farthest` around it, so
+  /// their edges begin at most five samples below the block or six above its last.
   template <class F>
   void for_each_near(std::int32_t block, const Box3& box, F&& f) const {
     const Eigen::Vector3d origin = cells_.corner(block, 0);
@@ -85,7 +90,7 @@ class PolygonNeighbourhood {
     }
   };
 
-  /// Of those of its block, in the order of CellBlocks::for_each_crossing_edge().
+  /// The number of a crossing edge in its block, in the order of CellBlocks::for_each_crossing_edge().
   std::uint32_t number_of(const CellBlocks::Edge& edge) const {
     const auto& crossing = cells_.grid().blocks()[edge.block].crossing;
     std::uint32_t before = 0;
@@ -115,7 +120,8 @@ class PolygonNeighbourhood {
     return *before;  // another thread has made the same meanwhile
   }
 
-  /// Of crossing edges that begin at samples from z to `end` of one row of a block; a mask has eight bits of it.
+  /// Calls f(edge, triangle) for the crossing edges that begin at samples from z to `end` of one row of a block: eight
+  /// bits of a mask.
   template <class F>
   void for_each_in_row(std::int32_t block, int x, int y, int z, int end, const Box3& box, F&& f) const {
     const CellBlocks::Cell row = cells_.locate(block, x, y, z & ~7);
@@ -136,8 +142,8 @@ class PolygonNeighbourhood {
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
   const UniformPoints& points_;
-  const double reach_;  ///< of an edge's triangles along an axis, from its first sample
-  mutable std::vector<std::atomic<const List*>> lists_;  ///< by block
+  const double reach_;  ///< how far the triangles of an edge may be from its first sample along an axis, voxels
+  mutable std::vector<std::atomic<const List*>> lists_;  ///< one per block; null until it is asked for
 };
 
 }  // namespace hermesh

@@ -24,26 +24,32 @@ using Eigen::Vector3d;
 /// square: next to a feature that passes outside.
 constexpr double kWorthLeaving = 0.03;
 
-/// As near to the planes any place within the cell will do.
+/// A place within the cell that is as near to the planes as this will do, in voxels and root mean square.
 constexpr double kGoodEnough = 0.005;
 
-/// Of a determinant whose terms are of the order of one, far above rounding: what is called positive.
+/// What a determinant whose terms are of the order of one must exceed to be called positive: far above rounding.
 constexpr double kPositive = 1e-5;
 
+/// Six times the signed volume of a tetrahedron, voxels cubed.
 double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   return (b - a).cross(c - a).dot(d - a);
 }
 
-/// The crossings about a block's cells as the vector code wants them. One for many blocks.
+/// The crossings of all edges that a block's cells have, laid out as the vector code wants them
+/// (leaf_kernels::RecordCube). One object serves many blocks, one after another.
 class CellRecords {
  public:
-  /// False where a normal is none.
+  /// Reads the crossings of a block and of the lower layers of those above. False where a normal is none, as in data
+  /// without normals.
   bool read(const CellBlocks& cells, std::int32_t block) {
+    // The cube is large and mostly empty: only what the block before has written is cleared.
     for (const int number : written_) std::fill_n(records_[static_cast<std::size_t>(number)].data(), 4, 0.0f);
     written_.clear();
     bool all_unit = true;
     cells.grid().crossings(block, own_.data());
     const EdgeCrossing* next = own_.data();
+    // Slot 0 is the block itself. From a block above, its cells have edges that start in the layer next to it, and none
+    // along an axis by which that block lies above: those begin beyond the cells.
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
       const std::int32_t there =
@@ -57,6 +63,7 @@ class CellRecords {
           for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0;
                word &= word - 1) {
             const int bit = std::countr_zero(word);
+            // The block's own ones come in this very order, by axis and then by sample.
             const EdgeCrossing crossing =
                 slot == 0 ? *next++ : cells.grid().crossing(there, 64 * x + bit, axis);
             const auto& n = crossing.normal;
@@ -81,6 +88,7 @@ class CellRecords {
   std::vector<EdgeCrossing> own_ = std::vector<EdgeCrossing>(3 * 512);  ///< the block's
 };
 
+/// Makes the uniform mesh step by step: cells, points, moves by the rule of tetrahedra, polygons, late moves.
 class Contourer {
  public:
   Contourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
@@ -103,6 +111,8 @@ class Contourer {
   const UniformCounts& counts() const { return counts_; }
 
   UniformMesh run(RunContext& context) {
+    // The proof of the header speaks of points that lie within their cells or whose tetrahedra stay positive: those of
+    // the first two steps. Polygons are made by these. Late moves keep the polygons and change places alone.
     place_all_points(context);
     let_points_leave(context);
     const EdgePolygons polygons = connect(nullptr, context);
@@ -110,19 +120,20 @@ class Contourer {
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
     move_points(cells_, polygons, wishes_, file_, points_, context);
+    // Only points that wished to leave can have left.
     for_each_wisher([&](double outside) { counts_.escaped += outside > 0; });
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
     return mesh;
   }
 
-  /// Of all active cells, in place of whatever points there are.
+  /// Places the points of all active cells, in place of whatever points there are.
   void place_all_points(RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
     place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
   }
 
-  /// @param wanted active cells, by block, whose points are not there yet
+  /// Places the points of the cells in `wanted`: active ones, a mask per block, whose points are not there yet.
   void place_points(std::span<const BlockMask> wanted, RunContext& context) {
     parallel_blocks(wanted.size(), context, [&](std::size_t b) {
       for_each_bit(wanted[b], [&](int cell) {
@@ -135,17 +146,19 @@ class Contourer {
     place_points_of([&](std::size_t b) { return wanted[b]; }, context);
   }
 
-  /// The points of fanned edges come behind those of cells.
-  /// @param edges those that are wanted, all crossing ones if null
+  /// Makes the polygons of `edges`, all crossing ones if null. The points of fanned edges come behind those of cells.
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, points_, edges, context);
     }();
+    // A later call is for more edges of the same cells: to hold others than the first time would make other polygons
+    // where there are some already.
     if (held_) {
       if (!held_->empty()) polygons.hold(*held_, points_, context);
       place_crossings(cells_, polygons, file_, points_, context);
     } else {
+      // How far any point is out of its cell bounds where the polygons near another have their edges.
       double farthest = 0;
       for_each_wisher([&](double outside) { farthest = std::max(farthest, outside); });
       for (const CellBlocks::Cell& cell :
@@ -159,11 +172,12 @@ class Contourer {
   }
 
  private:
-  /// @param wanted(b) active cells of a block. There is room for their points.
+  /// Places the points of the active cells wanted(b) of each block b. There is room for their points.
   template <class Wanted>
   void place_points_of(Wanted&& wanted, RunContext& context) {
     Stage stage(context, "place points");
     std::vector<std::uint32_t> several(cells_.size());
+    // A block writes the points and wishes of its own cells alone; wishes end up in the order of cells.
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       const BlockMask asked = wanted(b);
@@ -184,8 +198,8 @@ class Contourer {
     for (const std::uint32_t found : several) counts_.several_sheets += found;
   }
 
-  /// Most of these cells by vector code: plain ones, if they are placed optimally only those whose planes are
-  /// nearly parallel. Returns which.
+  /// Places most of a block's wanted cells by vector code: plain ones, and in optimal placement only those whose planes
+  /// are nearly parallel. Returns which; all others are left to the code for single cells.
   BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted) {
     BlockMask placed{};
     const bool average = options_.placement == DualContouringOptions::Placement::average;
@@ -203,6 +217,7 @@ class Contourer {
       point[found] = cells_.point(block, at, 0);
       cell[found++] = static_cast<std::uint16_t>(at);
     });
+    // The last vector reads on: what it finds there must be cells, and what it makes of them is not looked at.
     for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
     float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
     const leaf_kernels::PlainCells plain{records.data(), cell.data(), static_cast<int>(found)};
@@ -210,6 +225,8 @@ class Contourer {
       kernels_.place_mean(plain, out);
       is_placed.fill(1);
     } else {
+      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the wish. Where
+      // they may not, any error will do.
       kernels_.place_flat(plain,
                           {.truncation = static_cast<float>(options_.truncation),
                            .margin = static_cast<float>(cells_.margin()),
@@ -226,6 +243,7 @@ class Contourer {
     return placed;
   }
 
+  /// The place of a plain cell that the vector code has left over: its crossed edges follow from the signs.
   Vector3d place_plain(std::int32_t block, int cell) {
     const int signs = cells_.corner_signs(cells_.cell_number(block, cell));
     const Vector3d corner = cells_.corner(block, cell);
@@ -240,8 +258,8 @@ class Contourer {
     return best_place(block, cell, qef, corner);
   }
 
-  /// Within the cell, and noted if it would be better off outside. With several sheets the mean of the loop's crossings:
-  /// in their hull.
+  /// The place of a sheet's point, within the cell, and noted if it would be better off outside. With several sheets it
+  /// is the mean of the loop's crossings: in their hull, which no other loop's hull meets (cell_sheets.h).
   Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
     const CellSheets& loops = cells_.sheets(block, cell);
     const Vector3d corner = cells_.corner(block, cell);
@@ -251,6 +269,7 @@ class Contourer {
     for (int edge = 0; edge < 12; ++edge) {
       if (sheets > 1 && loops.sheet_of[edge] != sheet) continue;
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
+      // A joint of one point has all crossing edges of its cell, its cuts included, of which sheet_of does not tell.
       if (sheets == 1 && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
       const Vector3d point = cells_.crossing_point(at, crossing);
@@ -263,9 +282,12 @@ class Contourer {
     return best_place(block, cell, qef, corner);
   }
 
+  /// The place within the cell, margin() off its faces, with the least error. If even that is far from the planes, as
+  /// beside a sharp feature that passes outside, the free minimiser is wished for.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
+    // To clamp the minimiser is cheap, and mostly good enough; the search over faces, edges and corners is not.
     const Vector3d nearest = qef.minimiser(options_.truncation).cwiseMax(lower).cwiseMin(upper);
     if (qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return nearest;
     const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
@@ -273,14 +295,15 @@ class Contourer {
       const auto is_near = [&](const Vector3d& p) {
         return (p - corner - Vector3d::Constant(0.5)).cwiseAbs().maxCoeff() <= 0.5 + reach_;
       };
+      // Where minima form a line or a plane, the one next to the place in the cell needs the shorter move.
       const Vector3d free = qef.minimiser(options_.truncation), nearer = qef.minimiser_near(held, options_.truncation);
       if (is_near(free)) wishes_[block].push_back({cell, free, is_near(nearer) ? nearer : free});
     }
     return held;
   }
 
-  /// Cells of one parity share no face, so their points move independently of one another: eight rounds, the same result
-  /// whatever the order within each.
+  /// Lets points leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their points move
+  /// independently of one another: eight rounds, with the same result whatever the order within each.
   void let_points_leave(RunContext& context) {
     Stage stage(context, "let points leave");
     for (int parity = 0; parity < 8; ++parity)
@@ -304,6 +327,8 @@ class Contourer {
       }
   }
 
+  /// Moves the point of one cell as far towards its wish as its 24 tetrahedra stay positive. Cells with explicit faces,
+  /// and those beside such, keep to their cells: the cones over their segments need it (uniform_mesh.h).
   void leave(std::int32_t block, const PointWish& wish) {
     if (cells_.has_explicit_face(block, wish.cell)) return;
     Vector3d& point = points_[cells_.point(block, wish.cell, 0)];
@@ -315,6 +340,7 @@ class Contourer {
       beside[face] = *there;
     }
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
+      // Tested as the file will hold it. Shares of the way, because the wish may be just out of reach.
       const Vector3d candidate = file_.rounded(point + share * (wish.place - point));
       if (!tetrahedra_are_positive(corner, candidate, beside)) continue;
       point = candidate;
@@ -322,7 +348,8 @@ class Contourer {
     }
   }
 
-  /// The middle of a cell that the surface does not pass through: no polygon uses it, but the tetrahedra do.
+  /// The point of the cell beyond a face, the middle of one that the surface does not pass through (no polygon uses it,
+  /// but the tetrahedra do), or none if that cell has an explicit face.
   std::optional<Vector3d> point_beside(std::int32_t block, int cell, int face) const {
     int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
     const int step = face & 1 ? 1 : -1;
@@ -337,6 +364,8 @@ class Contourer {
     return points_[cells_.point(there.block, there.cell, 0)];
   }
 
+  /// Whether all tetrahedra of a lattice edge of the cell, its point and that of a cell beside it are positively
+  /// oriented.
   static bool tetrahedra_are_positive(const Vector3d& corner, const Vector3d& point,
                                       const std::array<Vector3d, 6>& beside) {
     for (int face = 0; face < 6; ++face) {
@@ -354,6 +383,7 @@ class Contourer {
     return true;
   }
 
+  /// Writes the polygons of each block to where EdgePolygons has counted them to be.
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
     Stage stage(context, "connect");
     mesh.quads.resize(polygons.quad_count());
@@ -371,7 +401,8 @@ class Contourer {
     });
   }
 
-  /// Blocks count their crossing edges in the order in which fill() makes the polygons.
+  /// Writes the number of each polygon's edge. Blocks count their crossing edges in the order in which fill() makes the
+  /// polygons.
   void number_polygons(const EdgePolygons& polygons, const UniformMesh& mesh, RunContext& context) {
     std::vector<std::uint64_t> first(cells_.size());
     for (std::size_t b = 0; b < cells_.size(); ++b)
@@ -395,17 +426,18 @@ class Contourer {
   PolygonEdges* const numbers_;
   CellBlocks cells_;
   const DualContouringOptions options_;
-  const double reach_;  ///< of points, from their cells
+  const double reach_;  ///< how far points may be from their cells, voxels
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
-  std::vector<std::vector<PointWish>> wishes_;  ///< by block
+  std::vector<std::vector<PointWish>> wishes_;  ///< one list per block, ascending by cell
   UniformPoints points_;
   UniformCounts counts_;
-  /// Found where polygons are made first: all that these depend on are wanted then, and ever after.
+  /// The cells held, found when polygons are made first: all edges that the answer depends on are among those asked for
+  /// then, and ever after.
   std::optional<std::vector<CellBlocks::Cell>> held_;
 };
 
-/// Hermite data have no cuts.
+/// The lattice of Hermite data, which have no cuts.
 class HermiteCells : public CellGrid {
  public:
   explicit HermiteCells(const HermiteView& view) : view_(view) {}
@@ -434,9 +466,10 @@ struct UniformCells::Made {
         contourer(grid, options, file, context, nullptr),
         placed(filled(contourer.cells().size(), BlockMask{}, context)) {}
 
+  // Before the contourer, which refers to it.
   const HermiteCells grid;
   Contourer contourer;
-  LargeArray<BlockMask> placed;  ///< cells by block whose points are there
+  LargeArray<BlockMask> placed;  ///< cells of each block whose points are there
 };
 
 UniformCells::UniformCells(const HermiteView& grid, const DualContouringOptions& options,
@@ -449,6 +482,7 @@ const UniformPoints& UniformCells::points() const { return made_->contourer.poin
 const UniformCounts& UniformCells::counts() const { return made_->contourer.counts(); }
 
 void UniformCells::place(std::span<const BlockMask> wanted, RunContext& context) {
+  // What is there already stays where it is: places that polygons were made by must not change.
   LargeArray<BlockMask> missing(wanted.size());
   parallel_blocks(missing.size(), context, [&](std::size_t b) {
     for (std::size_t word = 0; word < missing[b].size(); ++word) {

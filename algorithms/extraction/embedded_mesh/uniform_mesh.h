@@ -49,30 +49,33 @@
 
 namespace hermesh {
 
-/// What was met on the way to it.
+/// What was met on the way to a uniform mesh.
 struct UniformCounts {
-  std::uint64_t cells = 0;           ///< that the surface passes through
-  std::uint64_t joints = 0;          ///< of these: with a cut (cell_blocks.h)
-  std::uint64_t several_sheets = 0;  ///< of these
-  std::uint64_t held = 0;            ///< of all: coned over explicit segments, the last resort
+  std::uint64_t cells = 0;           ///< cells that the surface passes through
+  std::uint64_t joints = 0;          ///< cells with a cut (cell_blocks.h)
+  std::uint64_t several_sheets = 0;  ///< cells with several sheets
+  std::uint64_t held = 0;            ///< cells coned over explicit segments, the last resort
   std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
   std::uint64_t escaped = 0;         ///< points outside their cells
-  /// Joints of several sheets, by block and cell, whose polygons may meet others: no promise of the above holds
-  /// unless there are none.
+  /// Joints of several sheets, by block and cell, whose polygons may meet others: that no two polygons meet is promised
+  /// only if there are none.
   std::vector<std::pair<std::int32_t, int>> meeting_joints;
 };
 
+/// The finest mesh. Polygons are counter-clockwise seen from outside, in index space.
 struct UniformMesh {
   std::vector<Eigen::Vector3d>
       points;              ///< index space relative to the placement's base; FilePoints::rounded()
-  LargeArray<Quad> quads;  ///< abc and acd, counter-clockwise seen from outside, in index space
+  LargeArray<Quad> quads;  ///< abc and acd are the triangles of a quad abcd
   std::vector<Triangle> triangles;
   UniformCounts counts;
 };
 
-/// One point for each sheet of a cell. Creases and corners are kept as far as the QEF sees them and a point may leave its
-/// cell: by kFarthestFromCell at most, whatever the options' reach.
-/// @throws Cancelled
+/// The uniform mesh of Hermite data: one point for each sheet of a cell. Creases and corners are kept as far as the QEF
+/// sees them and a point may leave its cell: by kFarthestFromCell at most, whatever the options' reach. The same bytes
+/// for every number of threads.
+/// @throws Error if there are more points or polygons than 32 bits can number, or if a file cannot hold the points
+///   (CellBlocks); Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context);
 
@@ -84,20 +87,21 @@ class UniformCells {
   ~UniformCells();
 
   const CellBlocks& cells() const;
-  /// Those that were asked for; references to single ones last until more are.
+  /// The points that were asked for. References to single ones last until more are asked for.
   const UniformPoints& points() const;
-  /// Of what was made so far.
+  /// Counts of what was made so far.
   const UniformCounts& counts() const;
-  /// The points of active cells, by block. @throws Cancelled
+  /// Places the points of the active cells in `wanted`, a mask per block, that are not there yet. @throws Cancelled
   void place(std::span<const BlockMask> wanted, RunContext& context);
-  /// Those of all cells, which takes less time than if they were asked for one by one. Nothing has been
-  /// placed before. @throws Cancelled
+  /// Places the points of all cells, which takes less time than if they were asked for one by one. Nothing may have
+  /// been placed before. @throws Cancelled
   void place_all(RunContext& context);
-  /// The polygons of crossing edges all of whose cells have their points, and the points on those that are
+  /// Makes the polygons of crossing edges all of whose cells have their points, and the points on the edges that are
   /// fanned.
-  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must
-  /// be among them, and those within two cells of one: else nothing is promised. They outlive the result.
-  /// @throws Cancelled
+  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must be among
+  ///   them, and those within two cells of one: else nothing is promised. They must outlive the result.
+  /// @param context told of progress, and asked whether to stop
+  /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context);
 
  private:
@@ -105,12 +109,14 @@ class UniformCells {
   std::unique_ptr<Made> made_;
 };
 
-/// The edge that each polygon belongs to, numbered by block, axis and sample among the crossing edges.
+/// The edge that each polygon belongs to, by its number among the crossing edges: ascending by block, axis and sample.
 struct PolygonEdges {
   std::vector<std::uint32_t> quads, triangles;
 };
 
-/// The same of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the edge's second sample.
+/// The uniform mesh of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the edge's
+/// second sample. `edges`, where it is not null, is told of the edge that each polygon belongs to. Throws as the
+/// function for Hermite data does.
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context, PolygonEdges* edges = nullptr);
 

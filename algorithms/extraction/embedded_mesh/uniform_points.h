@@ -11,12 +11,12 @@
 
 namespace hermesh {
 
-/// By number, those of cells first and then those on fanned edges (uniform_mesh.h); index space relative to
-/// the placement's base. Where few are wanted there is memory only for these, a run of numbers at a time:
-/// what merges needs no point, but what does not lies scattered among it.
+/// Places of points by number, those of cells first and then those on fanned edges (uniform_mesh.h); index space
+/// relative to the placement's base. Where few are wanted there is memory only for these, a run of eight numbers at a
+/// time: what merges needs no point, but what does not lies scattered among it.
 class UniformPoints {
  public:
-  /// All in one piece.
+  /// Room for all of `count` points, in one piece.
   static UniformPoints of_all(std::size_t count) {
     UniformPoints result;
     // With room for the few points that come to lie on edges, without which all would move then.
@@ -24,7 +24,7 @@ class UniformPoints {
     result.places_.resize(count);
     return result;
   }
-  /// None as yet.
+  /// Numbers for `count` points, with room for none as yet.
   static UniformPoints of_few(std::size_t count) {
     UniformPoints result;
     result.is_whole_ = false;
@@ -32,11 +32,11 @@ class UniformPoints {
     return result;
   }
 
-  /// Of a point that there is room for. Not safe while room is made.
+  /// The place of a point that there is room for. Not safe to call while room is made.
   Eigen::Vector3d& operator[](std::uint32_t point) { return places_[slot(point)]; }
   const Eigen::Vector3d& operator[](std::uint32_t point) const { return places_[slot(point)]; }
 
-  /// That make_room() makes room for it. Safe to call for several at once.
+  /// Asks that make_room() make room for a point. Safe to call from several threads at once.
   void ask(std::uint32_t point) {
     if (is_whole_) return;
     const std::uint32_t run = point / kRun;
@@ -45,7 +45,8 @@ class UniformPoints {
     const std::atomic_ref asked(asked_[run / 64]);
     if (!(asked.load(std::memory_order_relaxed) & bit)) asked.fetch_or(bit, std::memory_order_relaxed);
   }
-  /// For all that were asked for, in ascending order. What is there stays, but elsewhere in memory.
+  /// Makes room for all points that were asked for, in ascending order of their numbers, so that the outcome does not
+  /// depend on who asked first. Places that are there keep their values, but move in memory.
   void make_room() {
     std::size_t runs = 0, slot = places_.size();
     for (const std::uint64_t asked : asked_) runs += static_cast<std::size_t>(std::popcount(asked));
@@ -57,7 +58,7 @@ class UniformPoints {
       for (std::uint64_t left = std::exchange(asked_[i], 0); left != 0; left &= left - 1, slot += kRun)
         runs_[64 * i + static_cast<std::size_t>(std::countr_zero(left))] = static_cast<std::uint32_t>(slot);
   }
-  /// There are `count` points then, with room for those from `first` on.
+  /// Changes the number of points to `count`, with room for those from `first` on.
   void extend(std::size_t first, std::size_t count) {
     if (is_whole_) {
       places_.resize(count);
@@ -74,7 +75,7 @@ class UniformPoints {
   }
   std::size_t slots() const { return places_.size(); }
 
-  /// Of of_all().
+  /// Moves the places out, by number. Only for objects made by of_all().
   std::vector<Eigen::Vector3d> take() { return std::move(places_); }
 
  private:
@@ -86,8 +87,8 @@ class UniformPoints {
   }
 
   std::vector<Eigen::Vector3d> places_;
-  std::vector<std::uint32_t> runs_;   ///< slots of the first points of runs
-  std::vector<std::uint64_t> asked_;  ///< a bit a run
+  std::vector<std::uint32_t> runs_;   ///< slot of each run's first point; kNone where there is no room for it
+  std::vector<std::uint64_t> asked_;  ///< a bit a run: room is asked for
   bool is_whole_ = true;
 };
 

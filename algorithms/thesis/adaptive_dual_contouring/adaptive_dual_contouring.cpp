@@ -12,11 +12,11 @@
 namespace hermesh {
 namespace {
 
-/// The point of each active cell. Numbers within blocks are half as many bytes to touch as those of the mesh, and touching
-/// fresh memory is what the grid costs.
+/// The mask grid of §6.4 in its last state: the point of each active cell. Numbers within blocks are half as many
+/// bytes to touch as those of the mesh, and touching fresh memory is what the grid costs.
 struct MaskGrid {
   LargeArray<std::uint16_t> numbers;  ///< by block and cell; of cells that are not active whatever the memory held
-  std::vector<std::uint64_t> first;   ///< by block: its first point
+  std::vector<std::uint64_t> first;   ///< first point of each block
 };
 
 /// The points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
@@ -37,6 +37,7 @@ class CellsAround {
 
   /// @return false if one of the cells has no point.
   bool find(int sample, Quad& points) const {
+    // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
     const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
     const std::uint16_t n[4] = {numbers_[cell_[low_u + low_v] + sample - u_ - v_], numbers_[cell_[low_v] + sample - v_],
                                 numbers_[cell_[0] + sample], numbers_[cell_[low_u] + sample - u_]};
@@ -52,7 +53,7 @@ class CellsAround {
   std::uint32_t first_[4];
 };
 
-/// One run, stage by stage.
+/// One run of adaptive_dual_contouring(), stage by stage.
 class Contourer {
  public:
   Contourer(const FloatHermite& hermite, const AdaptiveOptions& options, const AdaptivityField* field,
@@ -78,21 +79,25 @@ class Contourer {
   }
 
  private:
+  /// Blocks of a task. Groups depend on the data alone, and so does the order of points and polygons.
   static constexpr std::size_t kGroup = 64;
   using View = decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>()));
 
+  /// Blocks and their neighbours; every cell with a crossing edge has one.
   static View make_view(const FloatHermite& hermite, RunContext& context) {
     Stage stage(context, "blocks");
     return view_of(hermite, context);
   }
 
-  /// Groups of blocks keep their points until it is known how many there are before them: far fewer than active cells.
+  /// Merges the cells of every block by itself, as §6.4 does. Groups of blocks keep their points until it is known
+  /// how many there are before them: far fewer than active cells.
   void merge() {
     Stage stage(context_, "merge cells");
     mask_.numbers.resize(512 * blocks_);
     results_.resize(blocks_);
     places_.resize(groups_);
     parallel_blocks(groups_, context_, [&](std::size_t g) {
+      // A task writes to its own blocks' part of the mask and to its own group.
       std::array<Eigen::Vector3f, 512> points;
       for_each_block(g, [&](std::size_t b) {
         std::uint16_t* mask = mask_.numbers.data() + 512 * b;
@@ -103,6 +108,8 @@ class Contourer {
     });
   }
 
+  /// Gives every block its range of the shared array of points (§6.4), and moves the points from voxels to the mesh's
+  /// space.
   void number_points(PolygonMesh& mesh) {
     Stage stage(context_, "number points");
     mask_.first.resize(blocks_);
@@ -110,6 +117,7 @@ class Contourer {
     mesh.points.resize(exclusive_scan(mask_.first, "points"));
     const IndexToWorld& placement = hermite_.placement;
     parallel_blocks(groups_, context_, [&](std::size_t g) {
+      // A group's points are in the order of its blocks, so that one pointer walks over all of them.
       const Eigen::Vector3f* place = places_[g].data();
       for_each_block(g, [&](std::size_t b) {
         Eigen::Vector3d lower;
@@ -121,7 +129,8 @@ class Contourer {
     places_ = {};
   }
 
-  /// And their polygons: far fewer than crossing edges.
+  /// Connects points to polygons. Groups of blocks keep them until it is known how many come before: far fewer than
+  /// crossing edges.
   void connect(PolygonMesh& mesh) {
     Stage stage(context_, "connect");
     std::vector<std::vector<Quad>> quads(groups_);
@@ -130,6 +139,7 @@ class Contourer {
     parallel_blocks(groups_, context_, [&](std::size_t g) {
       for_each_block(g, [&](std::size_t b) {
         for_each_polygon(b, [&](const Quad& polygon, int corners) {
+          // Triangles are where an edge lies on the border between regions of different size (fig. 6.4).
           if (corners == 4)
             quads[g].push_back(polygon);
           else
@@ -139,6 +149,7 @@ class Contourer {
       first_quad[g] = quads[g].size();
       first_triangle[g] = triangles[g].size();
     });
+    // Quads and triangles have arrays of their own, and each group a range in either.
     mesh.quads.resize(exclusive_scan(first_quad, "quads"));
     mesh.triangles.resize(exclusive_scan(first_triangle, "triangles"));
     parallel_blocks(groups_, context_, [&](std::size_t g) {
@@ -148,7 +159,7 @@ class Contourer {
     });
   }
 
-  /// Calls f(points, 3 or 4) for each polygon (§6.5).
+  /// Calls f(points, 3 or 4) for each polygon of the block's crossing edges (§6.5).
   template <class F>
   void for_each_polygon(std::size_t b, F&& f) const {
     const HermiteView::Block& block = view_.blocks()[b];
@@ -160,10 +171,12 @@ class Contourer {
         Quad polygon;
         if (!around.find(sample, polygon)) return;
         int corners = 0;
-        // Cells of one region follow one another: it is a cube.
+        // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
+        // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
         for (int i = 0; i < 4; ++i)
           if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
         if (corners < 3) return;
+        // The sign at the edge's first sample orients the polygon; a placement that mirrors turns all of them about.
         if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
         f(polygon, corners);
       });
@@ -175,6 +188,7 @@ class Contourer {
     for (std::size_t b = group * kGroup; b < std::min(blocks_, (group + 1) * kGroup); ++b) f(b);
   }
 
+  /// Figures of the run, added up in the order of the blocks.
   void report() const {
     const auto sum = [&](auto&& of) {
       return std::accumulate(results_.begin(), results_.end(), 0.0,
@@ -196,7 +210,7 @@ class Contourer {
   const View view_;
   const RegionInput input_;
   const std::size_t blocks_, groups_;
-  /// By group, of its blocks one after another: voxels from the block's first sample.
+  /// Points of each group, those of its blocks one after another: voxels from the block's first sample.
   std::vector<std::vector<Eigen::Vector3f>> places_;
   MaskGrid mask_;
   std::vector<BlockResult> results_;
@@ -214,6 +228,7 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
   if (input.options.is("placement", "average")) options.placement = AdaptiveOptions::Placement::average;
   options.threshold = input.options.number("threshold");
   options.truncation = input.options.number("truncation");
+  // Means of crossings that are never merged need no planes.
   const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
   const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
   return adaptive_dual_contouring(hermite, options, input.field, input.context);
@@ -239,6 +254,8 @@ std::vector<OptionSpec> adaptive_dual_contouring_options() {
        {},
        0.001,
        1.0}};
+  // The Hermite data has options of its own: where the crossings come from, and how they are stored
+  // (hermite_input.h).
   const std::vector<OptionSpec> of_hermite = hermite_options();
   options.insert(options.end(), of_hermite.begin(), of_hermite.end());
   return options;

@@ -8,8 +8,8 @@
 //          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5).
 //   6.4    steps 1 to 4: level by level, a region is tried only if all its active cells are mergeable, and its cells
 //          are no longer mergeable once it fails; every block by itself; a mask grid of integers, which hold the
-//          number of the cell's point in the end: 16 bits that count within the block, where the thesis has 32. (While a
-//          block is at work its levels and flags are one bit a region: nobody else reads them.)
+//          number of the cell's point in the end: 16 bits that count within the block, where the thesis has 32.
+//          (While a block is at work its levels and flags are one bit a region: nobody else reads them.)
 //   6.5    for every crossing edge the four cells around it give a quad, a triangle where they have three points, and
 //          nothing where they have fewer. The sign at the edge's first sample orients it.
 //
@@ -40,29 +40,33 @@
 
 namespace hermesh {
 
+/// What decides about merging and about the places of points.
 struct AdaptiveOptions {
+  /// Where the point of a cell or region goes.
   enum class Placement {
     optimal,  ///< minimiser of the QEF
     average   ///< mean of the crossings, each as often as it counts in the QEF
   };
   Placement placement = Placement::optimal;
-  /// Square voxels: a region is merged if its E is less. Larger merges more; 0 nothing.
+  /// Bound of E in square voxels: a region is merged if its E is less. Larger merges more; 0 nothing.
   double threshold = 0.1;
-  /// Singular values below this share of the largest are dropped; at least 0.001. Larger is smoother.
+  /// Share of the largest singular value below which others are dropped; at least 0.001. Larger is smoother.
   double truncation = 0.1;
 };
 
-/// Closed and oriented, in the sense that as many polygons pass along an edge in one direction as in the other, except
-/// where `field` leaves polygons out; not manifold. The same bytes at any number of threads.
+/// Meshes Hermite data adaptively. The mesh is closed and oriented, in the sense that as many polygons pass along an
+/// edge in one direction as in the other, except where `field` leaves polygons out; it is not manifold. `field` may
+/// be null. The bytes are the same at any number of threads.
 ///
 /// Figures of the run: `regions_1`, `regions_2` and `regions_3` (of 2³, 4³, 8³ cells), `largest_plane_distance`
 /// (voxels, from the point of a merged region to a plane of it), and `escaped` (points outside their cell or region).
-/// @throws Error for a mesh of more than 2³² points or polygons, and as FieldEvaluator does.
+/// @throws Error for a mesh of more than 2³² points or polygons, and as FieldEvaluator does; Cancelled.
 PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
-/// The table's entry.
+/// The variant: meshes a level set by way of Hermite data, with the input's options.
 PolygonMesh adaptive_dual_contouring(const ExtractionInput& input);
+/// Options that the variant declares: those of AdaptiveOptions, and those of the Hermite data.
 std::vector<OptionSpec> adaptive_dual_contouring_options();
 
 }  // namespace hermesh

@@ -51,7 +51,7 @@ Result contour(const LevelSet& level_set, const AdaptiveOptions& options, const 
   return result;
 }
 
-/// Each polygon's corners, from the least on.
+/// The corners of each polygon, from the least on.
 std::multiset<std::vector<std::uint32_t>> polygons(const PolygonMesh& mesh) {
   std::multiset<std::vector<std::uint32_t>> result;
   const auto add = [&](const auto& polygon) {
@@ -64,7 +64,7 @@ std::multiset<std::vector<std::uint32_t>> polygons(const PolygonMesh& mesh) {
   return result;
 }
 
-/// As many polygons along each edge in one direction as in the other.
+/// Whether as many polygons run along each edge in one direction as in the other.
 bool is_closed_and_oriented(const PolygonMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sum;
   for (const auto& polygon : polygons(mesh))

@@ -10,14 +10,16 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr float kNoLimit = std::numeric_limits<float>::infinity();
+/// The sum, behind those of the 512 cells, to which goes what lies in cells without a point.
 constexpr std::uint16_t kNoSlot = 512;
 constexpr int kAlone = -1;  ///< level of a cell that was not merged
+/// Entry of a cell that is in no merged region.
 constexpr std::uint8_t kNoRegion = 255;
 constexpr float kMiddle =
     4.0f;  ///< planes and points are relative to the block's middle, for the sake of their squares
 
-/// The block and its upper neighbours, with the signs of those that own no crossing edge: none of their edges changes
-/// the sign, so all their samples have that of the sample before them.
+/// Finds the signs of the block and its upper neighbours, also of those that own no crossing edge: none of their
+/// edges changes the sign, so all their samples have that of the sample before them.
 std::array<SignLattice::Part, 8> parts_of(const RegionInput& input, const HermiteView::Block& block) {
   std::array<SignLattice::Part, 8> parts;
   std::array<std::int32_t, 8> leaf;
@@ -29,6 +31,7 @@ std::array<SignLattice::Part, 8> parts_of(const RegionInput& input, const Hermit
     } else if (part == 0) {
       parts[part].uniform = input.hermite.sign_without_leaf(block.lower);
     } else {
+      // One step down from the part, along the lowest of its axes; that part has been looked at already.
       const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
       parts[part].uniform =
           leaf[before] >= 0 ? input.hermite.leaves[leaf[before]].beyond[axis] & 1 : parts[before].uniform;
@@ -37,12 +40,13 @@ std::array<SignLattice::Part, 8> parts_of(const RegionInput& input, const Hermit
   return parts;
 }
 
-/// A crossing as the QEF takes it.
+/// A crossing as the QEF takes it, relative to the block's middle, in voxels.
 struct Plane {
   float point[3], normal[3];
   std::int8_t at[3], axis;  ///< first sample of the edge, 0 to 8
 };
 
+/// The plane of a crossing on the edge along `axis` from sample `at` of the block.
 Plane plane_of(const EdgeCrossing& crossing, int axis, const int (&at)[3]) {
   Plane plane;
   for (int a = 0; a < 3; ++a) {
@@ -54,8 +58,8 @@ Plane plane_of(const EdgeCrossing& crossing, int axis, const int (&at)[3]) {
   return plane;
 }
 
-/// The crossing edges along an axis that the block at (d[0], d[1], d[2]), each 0 or 1, owns and shares; returns the
-/// end.
+/// Collects the crossing edges along an axis that the block at (d[0], d[1], d[2]), each 0 or 1, owns and the cells of
+/// the merged block share; returns the end.
 Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, int axis, const int (&d)[3],
                     Plane* plane) {
   // Of an upper neighbour the first layers count.
@@ -63,6 +67,7 @@ Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, i
   std::uint64_t wanted = 0;
   for (int x = 0; x < (d[0] ? 1 : 8); ++x) wanted |= owner.crossing[axis][x];
   if (!(wanted & layer)) return plane;
+  // Crossings are stored by axis and then by sample, so that those of a layer are found by counting bits.
   const EdgeCrossing* next = input.hermite.crossings.data() + input.hermite.leaves[owner.leaf].first;
   for (int a = 0; a < axis; ++a) next += count(owner.crossing[a]);
   for (int x = 0; x < (d[0] ? 1 : 8); ++x) {
@@ -80,13 +85,14 @@ Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, i
   return plane;
 }
 
-/// Every crossing edge of the block's cells; returns their number.
+/// Collects every crossing edge of the block's cells; returns their number.
 int gather_planes(const RegionInput& input, const HermiteView::Block& block, Plane* planes) {
   Plane* end = planes;
   for (int axis = 0; axis < 3; ++axis)
     for (int part = 0; part < 8; ++part) {
       const int d[3] = {part >> 2, (part >> 1) & 1, part & 1};
       const std::int32_t number = block.neighbours[neighbour_slot(d[0], d[1], d[2])];
+      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells.
       if (d[axis] || number < 0 || input.view.blocks()[number].leaf < 0) continue;
       end = gather_owned(input, input.view.blocks()[number], axis, d, end);
     }
@@ -103,7 +109,8 @@ void for_each_cell_around(const Plane& plane, F&& f) {
     for (int j = plane.at[v] == 8; j < (plane.at[v] == 0 ? 1 : 2); ++j) f(cell - i * kStep[u] - j * kStep[v]);
 }
 
-/// Region (i, j, k) of n³ has the number n²i + nj + k. By level (regions of 2³, 4³ and 8³ cells) and cell.
+/// Numbers of the regions by level (regions of 2³, 4³ and 8³ cells) and cell: region (i, j, k) of n³ has the number
+/// n²i + nj + k.
 constexpr std::array<std::array<std::uint8_t, 512>, 3> region_numbers() {
   std::array<std::array<std::uint8_t, 512>, 3> table{};
   for (int level = 0; level < 3; ++level)
@@ -116,7 +123,7 @@ constexpr std::array<std::array<std::uint8_t, 512>, 3> region_numbers() {
 }
 constexpr std::array<std::array<std::uint8_t, 512>, 3> kRegion = region_numbers();
 
-/// First cell of each region.
+/// The first cell of each region; the others are overwritten, as the loop goes down.
 constexpr std::array<std::array<std::uint16_t, 64>, 3> first_cells() {
   std::array<std::array<std::uint16_t, 64>, 3> table{};
   for (int level = 0; level < 3; ++level)
@@ -125,9 +132,10 @@ constexpr std::array<std::array<std::uint16_t, 64>, 3> first_cells() {
 }
 constexpr std::array<std::array<std::uint16_t, 64>, 3> kFirstCell = first_cells();
 
+/// Cells along the side of a region of a level.
 constexpr int side_of(int level) { return 2 << level; }
 
-/// Regions of one level: those that have active cells, those that were merged, and what is known of them.
+/// The regions of one level: those that have active cells, those that were merged, and what is known of them.
 struct Level {
   std::uint64_t present = 0, merged = 0;
   std::array<QefSum, 64> sums;
@@ -136,6 +144,7 @@ struct Level {
   std::array<std::uint16_t, 64> points;
 };
 
+/// Merges one block. It is large, and lives on the stack of the thread that merges.
 class BlockMerger {
  public:
   BlockMerger(const RegionInput& input, std::int32_t block)
@@ -149,6 +158,7 @@ class BlockMerger {
   BlockResult merge(std::uint16_t* mask, Eigen::Vector3f* points) {
     sum_cells();
     const bool merges = input_.options.threshold > 0 || input_.field.simplifies_outside();
+    // Steps 2 to 4 of §6.4, level by level.
     if (merges) {
       set_limits();
       for (int level = 0; level < 3; ++level) {
@@ -162,6 +172,7 @@ class BlockMerger {
   }
 
  private:
+  /// The QEF of each active cell: every crossing goes to the up to four cells around its edge.
   void sum_cells() {
     slots_.fill(kNoSlot);  // what lies in cells that get no point goes to a sum of its own
     for_each_bit(active_, [&](int cell) {
@@ -176,7 +187,8 @@ class BlockMerger {
     }
   }
 
-  /// What E may be in each region: the least that one of its cells allows.
+  /// Sets what E may be in each region: the least that one of its cells allows. Cells where the field says so allow
+  /// any.
   void set_limits() {
     const auto threshold = static_cast<float>(input_.options.threshold);
     for (Level& level : levels_) level.limits.fill(kNoLimit);
@@ -193,6 +205,7 @@ class BlockMerger {
     });
   }
 
+  /// Adds to a region's sum, or begins it; sums are not cleared beforehand, for most are never used.
   void add(Level& level, int region, const QefSum& sum) {
     const std::uint64_t bit = std::uint64_t{1} << region;
     QefSum& total = level.sums[region];
@@ -203,6 +216,7 @@ class BlockMerger {
     level.present |= bit;
   }
 
+  /// The sums of a level from those of the one below: eq. 6.3 is additive, so no crossing is visited again.
   void sum_regions(int number) {
     Level& level = levels_[number];
     if (number == 0) {
@@ -216,9 +230,10 @@ class BlockMerger {
     }
   }
 
+  /// The region of the next level that a region is in.
   static int parent(int level, int region) { return kRegion[level + 1][kFirstCell[level][region]]; }
 
-  /// Regions whose cells are all mergeable.
+  /// The regions whose cells are all mergeable: each child with an active cell has been merged.
   std::uint64_t mergeable(int number) const {
     std::uint64_t result = levels_[number].present;
     if (number == 0) return result;
@@ -228,6 +243,8 @@ class BlockMerger {
     return result;
   }
 
+  /// Tries the regions of a level, topology first: it costs a few operations, and the minimisers of those that pass
+  /// are found together.
   void merge_level(int number) {
     Level& level = levels_[number];
     int candidates = 0;
@@ -249,19 +266,21 @@ class BlockMerger {
     }
   }
 
+  /// Places of points by the chosen placement, relative to the block's middle.
   void place(std::span<const QefSum* const> sums, Vector3d* places) const {
     if (input_.options.placement == AdaptiveOptions::Placement::optimal)
       return minimisers(sums, input_.options.truncation, places);
     for (std::size_t i = 0; i < sums.size(); ++i) places[i] = sums[i]->mass_point();
   }
 
-  /// Level of the coarsest merged region of the cell.
+  /// The level of the coarsest merged region of the cell, or kAlone.
   int level_of(int cell) const {
     for (int number = 2; number >= 0; --number)
       if (levels_[number].merged >> kRegion[number][cell] & 1) return number;
     return kAlone;
   }
 
+  /// Numbers points in the order of the first active cell of each, and writes the mask and the points.
   void number_cells(std::uint16_t* mask, Eigen::Vector3f* points) {
     for (Level& level : levels_) level.points.fill(kNoPoint);
     merged_into_.fill(kNoRegion);
@@ -288,7 +307,8 @@ class BlockMerger {
     for (int i = 0; i < alone; ++i) put(points[mask[lone_cells_[i]]], lone_places_[i], lone_cells_[i], 1);
   }
 
-  /// Writes the point of the region of that side that begins at the cell.
+  /// Writes the point of the region of that side that begins at the cell, and counts it if it is outside: nothing
+  /// holds it there (trap T7).
   void put(Eigen::Vector3f& out, const Vector3d& place, int cell, int side) {
     out = (place + Vector3d::Constant(kMiddle)).cast<float>();
     const int corner[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
@@ -298,6 +318,7 @@ class BlockMerger {
     result_.escaped += escaped;
   }
 
+  /// How far the planes of merged regions are from the regions' points at most.
   void find_largest_distance() {
     double largest = 0.0;
     for (int i = 0; i < plane_count_; ++i) {
@@ -305,6 +326,7 @@ class BlockMerger {
       std::uint8_t before = kNoRegion;
       for_each_cell_around(plane, [&](int cell) {
         const std::uint8_t region = merged_into_[cell];
+        // Cells of a region often follow one another, and have the same distance.
         if (region == before || region == kNoRegion) return;
         before = region;
         const Vector3d& place = levels_[region >> 6].places[region & 63];
@@ -322,9 +344,9 @@ class BlockMerger {
   BlockMask active_;
   BlockResult result_;
   int cells_ = 0, plane_count_ = 0;
-  std::array<std::uint16_t, 512> slots_;  ///< by cell: where its sum is
+  std::array<std::uint16_t, 512> slots_;  ///< where the sum of each cell is
   std::array<QefSum, 513> sums_;
-  std::array<std::uint8_t, 512> merged_into_;  ///< by cell: 64 times the level and the region
+  std::array<std::uint8_t, 512> merged_into_;  ///< region of each cell, plus 64 times its level
   std::array<Level, 3> levels_;              ///< of regions of 2³, 4³ and 8³ cells
   std::array<std::uint16_t, 512> lone_cells_;
   std::array<const QefSum*, 512> lone_sums_;

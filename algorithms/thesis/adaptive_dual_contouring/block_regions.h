@@ -30,9 +30,10 @@ struct BlockResult {
   float largest_plane_distance = 0.0f;  ///< voxels
 };
 
-/// Merges, writes for each active one of the 512 cells the number of its point within the block to `mask`, whose other
-/// entries stay as they are, and that many points, voxels from the block's first sample, to `points`, which has room for
-/// 512. Cells are active whose corners differ in sign, less those that the field leaves out.
+/// Merges the cells of one block. Writes for each active one of the 512 cells the number of its point within the
+/// block to `mask`, whose other entries stay as they are, and that many points, voxels from the block's first sample,
+/// to `points`, which has room for 512. Cells are active whose corners differ in sign, less those that the field
+/// leaves out. Blocks do not depend on each other, so that any thread may merge any.
 BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points);
 
 }  // namespace hermesh

@@ -6,7 +6,8 @@
 namespace hermesh {
 namespace {
 
-/// As many at a time as keep the vector units busy; a lane's result does not depend on the others.
+/// Sums that are solved at a time: as many as keep the vector units busy. A lane's result does not depend on the
+/// others.
 constexpr int kLanes = 16;
 using Lanes = float[kLanes];
 
@@ -17,11 +18,12 @@ struct EigenLanes {
   alignas(64) Lanes vectors[3][3];        ///< by eigenvalue, by coordinate
 };
 
-/// Jacobi's rotation of the axes p and q; r is the third.
+/// Jacobi's rotation in the plane of the axes p and q, which makes their common entry 0; r is the third axis.
 [[gnu::always_inline]] inline void rotate(EigenLanes& m, int p, int q, int r) {
   constexpr float kTiny = 1e-30f;
   for (int i = 0; i < kLanes; ++i) {
     const float d = m.diagonal[q][i] - m.diagonal[p][i], e = 2.0f * m.off[r][i];
+    // The tangent of the smaller of the two angles that do it; with kTiny a matrix that is 0 stays as it is.
     const float t = std::copysign(1.0f, d) * e / (std::fabs(d) + std::sqrt(d * d + e * e) + kTiny);
     const float c = 1.0f / std::sqrt(1.0f + t * t), s = t * c;
     m.diagonal[p][i] -= t * m.off[r][i];
@@ -38,6 +40,8 @@ struct EigenLanes {
   }
 }
 
+/// Eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for a symmetric matrix
+/// of three rows this takes the place of the singular value decomposition of A (eq. 6.4).
 [[gnu::always_inline]] inline void decompose(EigenLanes& m) {
   for (int k = 0; k < 3; ++k)
     for (int a = 0; a < 3; ++a) std::fill_n(m.vectors[k][a], kLanes, k == a ? 1.0f : 0.0f);
@@ -49,6 +53,7 @@ struct EigenLanes {
   }
 }
 
+/// Puts AᵀA of one sum into its lane.
 void load(EigenLanes& m, int lane, const QefSum& sum) {
   constexpr int kDiagonal[3] = {0, 3, 5}, kOff[3] = {4, 2, 1};
   for (int i = 0; i < 3; ++i) {
@@ -57,7 +62,7 @@ void load(EigenLanes& m, int lane, const QefSum& sum) {
   }
 }
 
-/// Aᵀ(b − A x), how E falls at x.
+/// The vector Aᵀ(b − A x): half of how steeply E falls at x.
 Eigen::Vector3d slope(const QefSum& sum, const Eigen::Vector3d& x) {
   const auto v = [&](int i) { return sum.value(i); };
   return {v(6) - (v(0) * x[0] + v(1) * x[1] + v(2) * x[2]), v(7) - (v(1) * x[0] + v(3) * x[1] + v(4) * x[2]),
@@ -69,6 +74,7 @@ Eigen::Vector3d slope(const QefSum& sum, const Eigen::Vector3d& x) {
 [[gnu::target_clones("avx512f", "avx2", "default")]] void solve(EigenLanes& m, float truncation, const Lanes (&slopes)[3],
                                                      Lanes (&step)[3]) {
   decompose(m);
+  // Squares of singular values are compared, so the share is squared, too.
   const float share = truncation * truncation;
   for (int i = 0; i < kLanes; ++i) {
     const float largest = std::max(m.diagonal[0][i], std::max(m.diagonal[1][i], m.diagonal[2][i]));
@@ -97,8 +103,11 @@ void minimisers(std::span<const QefSum* const> sums, double truncation, Eigen::V
   for (std::size_t first = 0; first < sums.size(); first += kLanes) {
     const int n = static_cast<int>(std::min<std::size_t>(kLanes, sums.size() - first));
     for (int i = 0; i < kLanes; ++i) {
+      // Lanes without a sum repeat the last one.
       const QefSum& sum = *sums[first + static_cast<std::size_t>(std::min(i, n - 1))];
       load(m, i, sum);
+      // From the mass point, in double precision, so that only the step is a single one, and a direction without a
+      // singular value stays at the mass point: the pseudo-inverse of §6.2.1 about another origin.
       const Eigen::Vector3d fall = slope(sum, sum.mass_point());
       for (int a = 0; a < 3; ++a) slopes[a][i] = static_cast<float>(fall[a]);
     }

@@ -12,9 +12,10 @@ namespace hermesh {
 /// go by way of the memory.)
 struct QefSum {
   using Pair = double __attribute__((vector_size(16)));
-  /// AᵀA (xx, xy, xz, yy, yz, zz), Aᵀb (x, y, z), bᵀb, Σp (x, y, z), number of planes.
+  /// The entries AᵀA (xx, xy, xz, yy, yz, zz), Aᵀb (x, y, z), bᵀb, Σp (x, y, z), number of planes.
   Pair pairs[7];
 
+  /// The function of one crossing: its point in the shared frame, its normal of unit length.
   static QefSum of_plane(const float (&point)[3], const float (&normal)[3]) {
     const double x = normal[0], y = normal[1], z = normal[2];
     const double d = x * point[0] + y * point[1] + z * point[2];
@@ -30,16 +31,19 @@ struct QefSum {
     return *this;
   }
 
+  /// Entry i of the fourteen, in the order of `pairs`.
   double value(int i) const { return pairs[i / 2][i % 2]; }
+  /// Number of planes.
   double planes() const { return value(13); }
   /// Mean of the crossings: where minimisers start from, and the `average` placement.
   Eigen::Vector3d mass_point() const { return Eigen::Vector3d(value(10), value(11), value(12)) * (1.0 / planes()); }
-  /// E(x), never negative.
+  /// E(x) in square voxels, never negative.
   double error(const Eigen::Vector3d& x) const;
 };
 
-/// For each the minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1): singular values
-/// of A below `truncation`, at least 0.001, times the largest are set to zero. It may lie anywhere.
+/// Writes for each sum the minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1):
+/// singular values of A below `truncation`, at least 0.001, times the largest are set to zero. It may lie anywhere.
+/// `out` has room for as many places, in the sums' frame.
 void minimisers(std::span<const QefSum* const> sums, double truncation, Eigen::Vector3d* out);
 
 }  // namespace hermesh

@@ -11,7 +11,8 @@ namespace hermesh {
 
 namespace region_topology {
 
-/// Corners of a cube that `from` reaches along edges whose ends are both in `set`. Bit 4x + 2y + z.
+/// The corners of a cube that `from` reaches along edges whose ends are both in `set`. Corner (x, y, z) is bit 4x +
+/// 2y + z.
 constexpr unsigned reached(unsigned set, unsigned from) {
   for (;;) {
     unsigned next = from;
@@ -23,8 +24,9 @@ constexpr unsigned reached(unsigned set, unsigned from) {
   }
 }
 
-/// Gerstner & Pajarola 2000: edges whose ends have one sign are collapsed; the contour is one disc if a single edge is
-/// left, that is, if the corners inside hang together, those outside do, and there are some of both.
+/// The first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose ends have one sign
+/// are collapsed; the contour is one disc if a single edge is left, that is, if the corners inside hang together,
+/// those outside do, and there are some of both.
 constexpr std::array<bool, 256> collapse_table() {
   std::array<bool, 256> table{};
   for (unsigned inside = 1; inside < 255; ++inside) {
@@ -35,13 +37,14 @@ constexpr std::array<bool, 256> collapse_table() {
   return table;
 }
 
-/// Made by the compiler: filled at start-up it could be read before it is whole (trap T13).
+/// The table of the first test, made by the compiler: filled at start-up it could be read before it is whole (trap
+/// T13).
 inline constexpr std::array<bool, 256> kCollapsesToOneEdge = collapse_table();
 
 /// The signs of 3×3×3 samples, half a region's side apart: bit 9x + 3y + z.
 using Signs27 = std::uint32_t;
 
-/// The corners among them, at the bits of the table.
+/// The eight corners among the 27 samples, at the bits of the table.
 constexpr unsigned corners(Signs27 signs) {
   unsigned result = 0;
   for (unsigned corner = 0; corner < 8; ++corner)
@@ -49,8 +52,8 @@ constexpr unsigned corners(Signs27 signs) {
   return result;
 }
 
-/// Ju et al. 2002: the sign in the middle of an edge is that of one of its ends, in the middle of a face that of one of
-/// its corners, and in the middle of the cube that of one of its corners.
+/// The second test (Ju et al. 2002): the sign in the middle of an edge is that of one of its ends, in the middle of a
+/// face that of one of its corners, and in the middle of the cube that of one of its corners.
 constexpr bool middles_agree(Signs27 s) {
   constexpr unsigned kStep[3] = {9, 3, 1};
   for (int axis = 0; axis < 3; ++axis) {
@@ -66,6 +69,7 @@ constexpr bool middles_agree(Signs27 s) {
   return (all != 0 && all != 255) || (all & 1) == ((s >> 13) & 1);
 }
 
+/// Whether a region passes both tests.
 constexpr bool passes(Signs27 signs) { return kCollapsesToOneEdge[corners(signs)] && middles_agree(signs); }
 
 }  // namespace region_topology
@@ -73,12 +77,14 @@ constexpr bool passes(Signs27 signs) { return kCollapsesToOneEdge[corners(signs)
 /// The signs of the 9³ samples at the corners of a block's cells.
 class SignLattice {
  public:
-  /// By bit 4x + 2y + z, the block itself and its upper neighbours: their signs, or null where all are `uniform`.
+  /// The signs of a block, or null where all are `uniform`. The block itself and its upper neighbours are parts 4x +
+  /// 2y + z.
   struct Part {
     const BlockMask* inside = nullptr;
     bool uniform = false;
   };
   SignLattice() = default;
+  /// Takes the block's samples, and the first layers of its neighbours'.
   explicit SignLattice(const std::array<Part, 8>& parts) {
     for (int x = 0; x < 9; ++x)
       for (int y = 0; y < 9; ++y) {
@@ -88,7 +94,7 @@ class SignLattice {
       }
   }
 
-  /// Cells whose corners differ.
+  /// The cells whose corners differ in sign, by their first samples.
   BlockMask active_cells() const {
     BlockMask active;
     for (int x = 0; x < 8; ++x) {
@@ -106,7 +112,7 @@ class SignLattice {
     return active;
   }
 
-  /// Of the region of `side` 2, 4 or 8 cells whose first sample is (x, y, z).
+  /// The signs at the 27 samples of the region of `side` 2, 4 or 8 cells whose first sample is (x, y, z).
   region_topology::Signs27 around(int x, int y, int z, int side) const {
     const int half = side / 2;
     region_topology::Signs27 signs = 0;

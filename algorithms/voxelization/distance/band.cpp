@@ -27,6 +27,7 @@ struct Pending {
   std::int32_t id[kBatch];
   int count = 0;
 
+  /// Takes triangle j of `from`, which is number `triangle` of the mesh.
   void add(const kernels::MeshCorners& from, int j, std::uint32_t triangle) {
     for (int i = 0; i < 9; ++i) corners.corner[i][count] = from.corner[i][j];
     id[count++] = std::int32_t(triangle);
@@ -40,7 +41,7 @@ struct Pending {
   }
 };
 
-/// One leaf at a time; its buffers serve the next.
+/// Computes one leaf at a time; its buffers serve the next. Each thread has its own.
 class LeafWork {
  public:
   /// `without`: triangles to leave out, ascending; may be null.
@@ -48,17 +49,22 @@ class LeafWork {
            const std::vector<std::uint32_t>* without = nullptr)
       : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(kernels::chosen()) {}
 
-  /// False when no voxel is within reach.
+  /// Computes a block's values, active voxels and crossed edges; false when no voxel is within reach.
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
            kernels::EdgeBits& crossed) {
     frame_ = {soup_.scale(), {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0}};
+    // Distances are those of the samples; sides, and so crossings, are those of the places a hair beside them
+    // (sample_side.h).
     side_frame_ = frame_;
     for (std::size_t a = 0; a < 3; ++a) side_frame_.origin[a] += kSideShift[a];
+    // Any start above reach² does: finish() limits it. The bytes 0xff make every number −1, no triangle.
     for (float& d : distances_.squared) d = float(reach_ * reach_) * 2.0f;
     if (ids_) std::memset(distances_.id, 0xff, sizeof distances_.id);
     crossed = {};
     crossed_ = &crossed;
     gather(block);
+    // Kernels that look from voxels take whole clusters, which may hold triangles to leave out. Of equally near
+    // triangles the first one looked at stays the nearest; the bins give them in one order whatever the threads do.
     if (triangles_ > kMany && !without_)
       look_from_voxels();
     else
@@ -74,6 +80,7 @@ class LeafWork {
   const kernels::Distances& distances() const { return distances_; }
 
  private:
+  /// Squared distance in voxels from the box to the box of the block's samples.
   double gap2(const VoxelBox& box) const {
     double sum = 0;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -84,6 +91,7 @@ class LeafWork {
     return sum;
   }
 
+  /// Collects the clusters within reach of the block. Their spans stay valid until the bins go to another slab.
   void gather(const BlockAt& block) {
     clusters_.clear();
     triangles_ = 0;
@@ -94,7 +102,7 @@ class LeafWork {
     });
   }
 
-  /// At most 16.
+  /// Copies the corners of at most 16 triangles. Lanes beyond them keep what was there, and are masked out later.
   void fetch(std::span<const std::uint32_t> triangles, kernels::MeshCorners& to) const {
     for (std::size_t j = 0; j < triangles.size(); ++j) {
       const Triangle t = soup_.triangle(triangles[j]);
@@ -105,7 +113,8 @@ class LeafWork {
     }
   }
 
-  /// At most 16 triangles look for their voxels and edges.
+  /// Looks for the voxels and edges of at most 16 triangles. Those that pass the test of the box gather in `pending_`
+  /// and `crossing_` until there are 16, so that the kernels work on full batches.
   void add(std::span<const std::uint32_t> triangles) {
     fetch(triangles, fetched_);
     const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
@@ -144,22 +153,29 @@ class LeafWork {
     crossing_.count = 0;
   }
 
+  /// Makes linear functions of the pending triangles.
   void set_up(Pending& triangles, Batch& batch) {
     triangles.fill();
     std::memcpy(batch.id, triangles.id, sizeof batch.id);
     kernels_.to_leaf(triangles.corners, frame_, corners_);
+    // A thin triangle has no normal to speak of, and counts as its longest side.
     for (unsigned thin = kernels_.set_up(corners_, batch); thin; thin &= thin - 1)
       kernels::set_up_segment(corners_, __builtin_ctz(thin), batch);
   }
 
+  /// Lets each voxel look for its triangle among the clusters, whose batches are set up when the first voxel wants
+  /// them.
   void look_from_voxels() {
     boxes_.resize((clusters_.size() + kBatch - 1) / kBatch);
     for (std::size_t i = 0; i < boxes_.size() * kBatch; ++i) set_box(i);
     pointers_.assign(clusters_.size(), nullptr);
+    // The deque does not move its batches when it grows, and keeps them for the next leaf.
     used_ = 0;
     const kernels::LazyBatches lazy{boxes_.data(), pointers_.data(), int(clusters_.size()), &prepare, this};
     kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
     for (const TriangleBins::Cluster& cluster : clusters_) {
+      // Triangles still look for their edges; most clusters of tiny ones lie between the grid lines and meet none.
+      // Whether one is at an edge does not depend on the reach, so a voxel will do.
       if (!meets_edges(cluster.box)) continue;
       fetch(cluster.triangles, fetched_);
       const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
@@ -171,7 +187,8 @@ class LeafWork {
     kernels::Boxes& boxes = boxes_[i / kBatch];
     for (std::size_t a = 0; a < 3; ++a) {
       const bool there = i < clusters_.size();
-      // Rounding outwards by far more than single precision's error at this range.
+      // The box is rounded outwards by far more than single precision's error at this range. Those that fill up the
+      // last sixteen are so far away that none is ever near, and their squares are still finite.
       boxes.side[a][0][i % kBatch] =
           there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
       boxes.side[a][1][i % kBatch] =
@@ -195,8 +212,8 @@ class LeafWork {
     return &batch;
   }
 
-  /// Whether an edge of this leaf may meet the box: at least two of its sides must reach across a whole
-  /// number.
+  /// Whether an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so at least two of the
+  /// box's sides must reach across one. The margin of 1e-5 is wider than the shift of the sides' lattice.
   bool meets_edges(const VoxelBox& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -228,6 +245,7 @@ class LeafWork {
   std::size_t used_ = 0;
 };
 
+/// A leaf of OpenVDB with these values; its buffer is not filled before they are copied in.
 std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, const std::uint64_t* active) {
   auto leaf = std::make_unique<FloatLeaf>(
       openvdb::PartialCreate(), openvdb::Coord(block[0] * 8, block[1] * 8, block[2] * 8), 0.0f, false);
@@ -239,8 +257,8 @@ std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, 
   return leaf;
 }
 
-/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. A part of a slab at a time, so that
-/// this thread can report between them. Few blocks to a task: one of a fine mesh takes a good part of a
+/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. It does a part of a slab at a time, so that
+/// this thread can report between them. Few blocks make a task: one of a fine mesh takes a good part of a
 /// millisecond, and a slab's last tasks are waited for.
 template <class F>
 void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span<const std::uint32_t> blocks,
@@ -265,6 +283,7 @@ void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span
   bins.forget_slabs();
 }
 
+/// The nearest triangles in OpenVDB's order, from the kernels' order of 2×2×4 voxels.
 LeafTriangles nearest_triangles(const kernels::Distances& distances) {
   LeafTriangles result;
   for (int x = 0; x < 8; ++x)
@@ -304,6 +323,7 @@ Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& wor
   band.leaves.resize(band.blocks.size());
   band.crossed.resize(band.blocks.size());
   if (work.nearest) band.nearest.resize(band.blocks.size());
+  // Every block has its own place in the arrays, which are as long as they will be: threads share nothing.
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& leaf) {
     band.crossed[leaf.block] = leaf.crossed;
     if (!leaf.any) return;

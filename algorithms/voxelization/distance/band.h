@@ -14,45 +14,51 @@ namespace hermesh {
 
 using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 
-/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order.
+/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest. It means nothing for a
+/// voxel that is out of reach.
 using LeafTriangles = std::array<std::int32_t, 512>;
 
-/// Block i is number i of the bins' blocks().
+/// Distances around the triangles, without signs. Block i is number i of `TriangleBins::blocks()`.
 struct Band {
   double voxel_size = 1.0;  ///< world units
   std::vector<BlockAt> blocks;
   /// Distance of each voxel in world units, at most the reach; the active voxels are those below it. Null
   /// where no voxel is.
   std::vector<std::unique_ptr<FloatLeaf>> leaves;
-  std::vector<kernels::EdgeBits> crossed;               ///< grid edges that some triangle crosses, as sample_side.h places their ends
+  std::vector<kernels::EdgeBits> crossed;               ///< edges between side_place()s that a triangle crosses
   std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless asked for
 };
 
-/// One block's share.
+/// What was found for one block.
 struct FoundLeaf {
-  std::uint32_t block = 0;  ///< number
-  bool any = false;         ///< whether a voxel is within reach; without, nothing below but `crossed` counts
+  std::uint32_t block = 0;  ///< number of the block
+  bool any = false;         ///< whether a voxel is within reach; if not, only `crossed` has a meaning
+  /// World units, in OpenVDB's order, at most the reach.
   alignas(64) float values[512];
+  /// Voxels below the reach, bit (y, z) of word x.
   std::uint64_t active[8];
   kernels::EdgeBits crossed;
-  LeafTriangles nearest;  ///< where asked for
+  LeafTriangles nearest;  ///< only where asked for
 };
 
+/// What find_leaves() is to find.
 struct BandWork {
   double reach = 3.0;  ///< voxels, at least 1
   double voxel_size = 1.0;
-  bool nearest = false;                                 ///< the nearest triangles, too
-  const std::vector<std::uint32_t>* blocks = nullptr;   ///< numbers of those to do; null for all
+  bool nearest = false;                                 ///< whether the nearest triangles are asked for
+  const std::vector<std::uint32_t>* blocks = nullptr;   ///< numbers of the blocks to compute; null for all
   const std::vector<std::uint32_t>* without = nullptr;  ///< triangles to leave out, ascending; may be null
 };
 
-/// Calls found(leaf) once for each block, in any order and from several threads at once. Distances are exact
-/// to some 1e-6 voxel: every triangle that can be nearest to a voxel within reach is looked at.
+/// Calls found(leaf) once for each block, in any order and from several threads at once; what `leaf` holds depends on
+/// neither. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel within reach is
+/// looked at. The bins are left without clusters, unless they have one slab.
 /// @throws Cancelled.
 void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
                  const std::function<void(const FoundLeaf&)>& found);
 
-/// All leaves. @throws Cancelled.
+/// The distances of all blocks, in memory at once. `work.blocks` and `work.without` count as in find_leaves().
+/// @throws Cancelled.
 Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context);
 
 }  // namespace hermesh

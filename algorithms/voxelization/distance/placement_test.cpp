@@ -16,13 +16,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Distance to a box, negative inside.
+/// The exact signed distance from p to a box, negative inside.
 double to_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
   const Vector3d out = (low - p).cwiseMax(p - high);
   return out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0);
 }
 
-/// As a file of decimal numbers would bring it.
+/// A box whose coordinates went through a file of decimal numbers.
 PolygonMesh box_from_file(const Vector3d& low, const Vector3d& high) {
   const auto path =
       std::filesystem::temp_directory_path() / ("hermesh-placement-" + std::to_string(getpid()) + ".obj");

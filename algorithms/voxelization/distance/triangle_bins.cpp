@@ -14,11 +14,11 @@ namespace {
 /// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
 /// each, so small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
-/// Triangles of a slab, about, and slabs at most: few enough triangles that the clusters of three slabs are
-/// small beside the volume, few enough slabs that each keeps all threads busy.
+/// The number of triangles that a slab aims at, and the most slabs: few enough triangles that the clusters of three
+/// slabs are small beside the volume, few enough slabs that each keeps all threads busy.
 constexpr std::size_t kInSlab = 1 << 16;
 constexpr std::size_t kMostSlabs = 16;
-/// A thread that asks in any order keeps the bins around its block, and more while they are small: as many
+/// A thread that asks in any order keeps the bins around its block, and more while they are small: up to as many
 /// bins, or as many triangles.
 constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
@@ -39,6 +39,7 @@ template <class F>
 void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
   BlockAt from, to;
   for (int a = 0; a < 3; ++a) {
+    // Only samples count, so the first block is that of the first sample within reach.
     from[a] = block_of(std::ceil(box.low[a] - reach));
     to[a] = block_of(std::floor(box.high[a] + reach));
   }
@@ -49,19 +50,21 @@ void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
   for (std::int32_t x = from[0]; x <= to[0]; ++x)
     for (std::int32_t y = from[1]; y <= to[1]; ++y) {
       const double gap_xy = gap2(0, x) + gap2(1, y);
+      // Corners of the box of blocks, which are farther than the reach, are left out.
       if (gap_xy > reach * reach) continue;
       for (std::int32_t z = from[2]; z <= to[2]; ++z)
         if (gap_xy + gap2(2, z) <= reach * reach) f(BlockAt{x, y, z});
     }
 }
 
-/// Whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes
-/// through its edges.
+/// A test whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes through
+/// its edges: a large triangle's box has many blocks that are not near the triangle.
 class TriangleSlab {
  public:
   explicit TriangleSlab(const TriangleCorners& c) {
     const Eigen::Map<const Eigen::Vector3d> p0(c.data()), p1(c.data() + 3), p2(c.data() + 6);
     const Eigen::Vector3d normal = (p1 - p0).cross(p2 - p0);
+    // Without an area there are no planes, and every block near the box passes.
     if (!(normal.squaredNorm() > 0)) return;
     add(normal.normalized(), p0);
     for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) {
@@ -109,6 +112,7 @@ void parallel_chunks(const Chunks& chunks, const RunContext& context, F&& f) {
   });
 }
 
+/// A triangle by the sum of its box's lower and upper corner, twice the centre, in world units.
 struct Centre {
   Eigen::Vector3f at;
   std::uint32_t triangle;
@@ -127,6 +131,7 @@ void make_compact(std::span<Centre> centres) {
     (high - low).maxCoeff(&axis);
     // Whole clusters on the lower side.
     const std::size_t half = (centres.size() / 2 + kClusterSize - 1) / kClusterSize * kClusterSize;
+    // Equal places are told apart by number, so that the outcome is unique.
     std::nth_element(centres.begin(), centres.begin() + std::ptrdiff_t(half), centres.end(),
                      [&](const Centre& a, const Centre& b) {
                        return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.triangle < b.triangle;
@@ -136,8 +141,8 @@ void make_compact(std::span<Centre> centres) {
   }
 }
 
-/// Orders many triangles along the Morton curve through cells of half a voxel, in linear time. Fills
-/// `sorted`.
+/// Orders many triangles along the Morton curve through cells of half a voxel, by a counting sort, in linear time.
+/// Fills `sorted`.
 void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, double scale,
                   std::vector<std::uint32_t>& cell, std::vector<Centre>& sorted) {
   constexpr int kBits = 4;
@@ -159,18 +164,20 @@ void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, doub
   for (std::size_t i = 0; i < centres.size(); ++i) sorted[next[cell[i]]++] = centres[i];
 }
 
+/// Bytes that a step between two numbers takes, seven bits in each.
 std::size_t packed_size(std::uint32_t step) {
   std::size_t bytes = 1;
   for (; step >= 128; step >>= 7) ++bytes;
   return bytes;
 }
 
+/// Writes a step at `at`, and moves `at` behind it.
 void write_packed(std::uint32_t step, std::uint8_t*& at) {
   for (; step >= 128; step >>= 7) *at++ = std::uint8_t(step | 128);
   *at++ = std::uint8_t(step);
 }
 
-/// What a piece of the work files in a bin.
+/// The triangles that a piece of the work files in a bin.
 struct BinRun {
   explicit BinRun(std::uint32_t of_bin) : code(of_bin) {}
   std::uint32_t code;  ///< of the bin in the piece's set
@@ -203,6 +210,8 @@ struct TriangleBins::Survey {
 
 void BinBox::add(const VoxelBox& box, const BlockAt& bin) {
   for (std::size_t a = 0; a < 3; ++a) {
+    // The sixteenth that a lower side is in, and the one above that of an upper side: truncation and the added 1
+    // round outwards. A small triangle lies well within 0 to 255, and the clamp only guards it.
     const double start = 8.0 * bin[a] - 3.0;
     low[a] = std::min(low[a], std::uint8_t(std::clamp(16.0 * (box.low[a] - start), 0.0, 255.0)));
     high[a] = std::max(high[a], std::uint8_t(std::clamp(16.0 * (box.high[a] - start) + 1.0, 0.0, 255.0)));
@@ -248,6 +257,8 @@ TriangleBins::Survey TriangleBins::survey() {
   found.runs.resize(chunks.count);
   all_large_.resize(chunks.count);
   parallel_chunks(chunks, context_, [&](std::size_t chunk) {
+    // A chunk writes to its own runs and list of large triangles, and numbers bins by itself; numbers that all agree
+    // on come when the sets are merged.
     std::vector<BinRun>& runs = found.runs[chunk];
     CodeNumbers numbers;
     for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
@@ -262,6 +273,7 @@ TriangleBins::Survey TriangleBins::survey() {
       if (number == runs.size()) runs.emplace_back(code);
       BinRun& run = runs[number];
       run.box.add(box, block);
+      // The first number of a run is a step from the last one of an earlier chunk, and so is measured in pack().
       if (run.count++ == 0)
         run.first = t;
       else
@@ -274,13 +286,15 @@ TriangleBins::Survey TriangleBins::survey() {
   return found;
 }
 
-/// The boxes are made again rather than remembered, which for ten million triangles would take more memory
-/// than the volume.
+/// Packs the triangles' numbers by bin. The boxes are made again rather than remembered, which for ten million
+/// triangles would take more memory than the volume.
 void TriangleBins::pack(Survey& survey) {
   const std::size_t bins = bins_.size();
   first_byte_.assign(bins + 1, 0);
   count_.assign(bins, 0);
   box_of_bin_.assign(bins, {});
+  // One thread goes through the chunks in their order, so that each run learns where its bytes begin within its bin,
+  // and from which number its first step is.
   std::vector<std::uint32_t> before(bins, 0);  // the last triangle so far
   for (std::size_t chunk = 0; chunk < survey.runs.size(); ++chunk) {
     const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
@@ -293,6 +307,7 @@ void TriangleBins::pack(Survey& survey) {
       run.first = std::exchange(before[bin], run.last);
     }
   }
+  // The bins one after the other in one array.
   std::uint64_t total = 0;
   for (std::uint64_t& bytes : first_byte_) total += std::exchange(bytes, total);
   packed_.resize(total);
@@ -300,6 +315,7 @@ void TriangleBins::pack(Survey& survey) {
   parallel_chunks(chunks, context_, [&](std::size_t chunk) {
     std::vector<BinRun>& runs = survey.runs[chunk];
     const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
+    // Each run has a range of bytes for itself, so that the chunks write at the same time.
     std::vector<std::uint8_t*> to;
     CodeNumbers numbers;
     for (const BinRun& run : runs) {
@@ -316,8 +332,8 @@ void TriangleBins::pack(Survey& survey) {
   });
 }
 
-/// Across x unless another side is much longer: blocks are numbered along x first, so that those who ask for
-/// them in their order stay in a slab for long.
+/// Cuts space into slabs: across x unless another side is much longer, for blocks are numbered along x first, so that
+/// those who ask for them in their order stay in a slab for long.
 void TriangleBins::choose_slabs() {
   place_.resize(bins_.size());
   std::array<std::map<std::int32_t, std::size_t>, 3> layers;  // how many triangles
@@ -337,6 +353,7 @@ void TriangleBins::choose_slabs() {
     slabs_.push_back({.end = begin = layer + 1, .bins = {}, .files = {}});
     filed = 0;
   }
+  // The last slab, or the only one, has no end, so that slab_of() knows every block.
   slabs_.push_back({.end = std::numeric_limits<std::int32_t>::max(), .bins = {}, .files = {}});
   for (std::uint32_t bin = 0; bin < bins_.size(); ++bin) {
     std::vector<std::uint32_t>& bins = slabs_[slab_of(bin_at_[bin])].bins;
@@ -345,6 +362,7 @@ void TriangleBins::choose_slabs() {
   }
 }
 
+/// Finds the blocks near any triangle, and files the large triangles under theirs.
 void TriangleBins::choose_blocks(const Survey& survey) {
   const std::size_t chunks = survey.bins.size();
   std::vector<BlockSet> sets(2 * chunks);
@@ -352,6 +370,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {
     for (const BinRun& run : survey.runs[chunk]) {
       context_.check();
+      // Small triangles ask for blocks by the box of their run: a few blocks too many, and far fewer questions.
       for_each_block_near(run.box.in_voxels(survey.bins[chunk].block(run.code)), reach_,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
     }
@@ -361,12 +380,14 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   first_large_.assign(blocks_.size() + 1, 0);
   for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
     const std::vector<std::uint32_t> translation = blocks_.translation(sets[chunks + chunk]);
+    // Count, scan, fill: here a block's code in its set becomes its number in the table, too.
     for (auto& [block, triangle] : pairs[chunk]) ++first_large_[block = blocks_.number(translation, block)];
   }
   std::uint64_t total = 0;
   for (std::uint64_t& count : first_large_) total += std::exchange(count, total);
   large_.resize(total);
   std::vector<std::uint64_t> next(first_large_.begin(), first_large_.end() - 1);
+  // Chunks in their order, so that the triangles of a block ascend.
   for (Pairs& chunk : pairs) {
     for (const auto& [block, triangle] : chunk) large_[next[block]++] = triangle;
     chunk = {};
@@ -374,6 +395,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   all_large_ = {};
 }
 
+/// The blocks near each large triangle, as codes of the set that they are put into.
 TriangleBins::Pairs TriangleBins::file_large(const std::vector<std::uint32_t>& triangles,
                                              BlockSet& blocks) const {
   Pairs pairs;
@@ -397,6 +419,7 @@ std::size_t TriangleBins::slab_of(const BlockAt& block) const {
 
 void TriangleBins::go_to_slab(std::size_t slab) {
   for (std::size_t i = 0; i < slabs_.size(); ++i)
+    // Going on by one slab keeps two of three.
     if (i + 1 < slab || i > slab + 1) slabs_[i].files.reset();
   for (std::size_t i = slab == 0 ? 0 : slab - 1; i < std::min(slab + 2, slabs_.size()); ++i)
     if (!slabs_[i].files)
@@ -415,8 +438,8 @@ std::size_t TriangleBins::bytes_in_memory() const {
   return bytes;
 }
 
-/// The thread's own. They serve few questions, so the triangles stay in the mesh's order: where that goes
-/// along the surface, its sixteens are compact, too.
+/// The files of a bin for this thread alone, made when it first asks. They serve few questions, so the triangles stay
+/// in the mesh's order: where that goes along the surface, its sixteens are compact, too.
 const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
   std::unordered_map<std::uint32_t, Files>& lent = lent_.local();
   const auto known = lent.find(bin);
@@ -427,7 +450,7 @@ const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
   return lent.emplace(bin, make_files({bin}, Purpose::few_questions)).first->second;
 }
 
-/// Buffers of one thread.
+/// Buffers for the sorting of one bin after the other by one thread.
 struct TriangleBins::Sorter {
   std::vector<Centre> centres, sorted;
   std::vector<std::uint32_t> cells;
@@ -448,6 +471,7 @@ TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& b
   files.first_cluster.back() = clusters;
   files.order.resize(triangles);
   files.clusters.resize(clusters);
+  // Where each bin's numbers and clusters go is known by now, so that bins are filled in by any thread.
   const auto some = [&](std::size_t begin, std::size_t end) {
     Sorter sorter;
     for (std::size_t i = begin; i < end; ++i) {
@@ -458,6 +482,7 @@ TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& b
       enclose(of_bin, files.clusters.data() + files.first_cluster[i]);
     }
   };
+  // The thread that asks is likely to be one of many already.
   if (purpose == Purpose::few_questions) {
     some(0, bins.size());
     return files;
@@ -467,6 +492,7 @@ TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& b
   return files;
 }
 
+/// Writes the numbers of a bin's triangles, ascending.
 void TriangleBins::unpack(std::uint32_t bin, std::uint32_t* to) const {
   const std::uint8_t* at = packed_.data() + first_byte_[bin];
   std::uint32_t triangle = 0;
@@ -497,6 +523,7 @@ void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, S
                  [](const Centre& c) { return c.triangle; });
 }
 
+/// Boxes of each sixteen triangles, in the mesh's own single precision, in which minima and maxima are exact.
 void TriangleBins::enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const {
   for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++clusters) {
     *clusters = box_of(triangles[first]);

@@ -23,7 +23,7 @@ struct VoxelBox {
   std::array<double, 3> low, high;
 };
 
-/// From a block's first voxel to its last and `margin` more.
+/// The box from a block's first voxel to its last and `margin` voxels more on every side.
 inline VoxelBox around(const BlockAt& block, double margin) {
   VoxelBox box;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -33,10 +33,11 @@ inline VoxelBox around(const BlockAt& block, double margin) {
   return box;
 }
 
+/// Triangles of a cluster at most: as many as a kernel's batch has lanes.
 inline constexpr std::size_t kClusterSize = 16;
 
-/// The box of small triangles that are filed in a bin: sixteenths of a voxel from three voxels before the
-/// bin's first, rounded outwards. A small triangle reaches two voxels beyond its bin.
+/// The box of small triangles that are filed in a bin, in sixteenths of a voxel from three voxels before the bin's
+/// first, rounded outwards. A small triangle reaches two voxels beyond its bin, so that eight bits are enough.
 struct BinBox {
   std::array<std::uint8_t, 3> low{255, 255, 255}, high{0, 0, 0};
 
@@ -45,28 +46,31 @@ struct BinBox {
   VoxelBox in_voxels(const BlockAt& bin) const;
 };
 
+/// The triangles of a soup by the blocks of voxels that they can be near.
 class TriangleBins {
  public:
-  /// `reach`: how far from a triangle, in voxels, its distance matters. The soup and the context have to
-  /// outlive the bins. @throws Cancelled.
+  /// Sorts the triangles. `reach` is how far from a triangle, in voxels, its distance matters. The soup and the
+  /// context have to outlive the bins.
+  /// @throws Cancelled.
   TriangleBins(const IndexSoup& soup, double reach, RunContext& context);
 
-  /// Blocks with a voxel that may be nearer than the reach to a triangle; some have none.
+  /// Blocks with a voxel that may be nearer than the reach to a triangle; some of them have none in the end.
   const BlockTable& blocks() const { return blocks_; }
 
+  /// Up to sixteen small triangles that are close together.
   struct Cluster {
     std::span<const std::uint32_t> triangles;  ///< numbers, at most kClusterSize
     VoxelBox box;
   };
-  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are
-  /// within reach. From any thread, but not from within f, where the slabs around the block are not in
-  /// memory: the clusters are made then, and kept for this thread's next call.
+  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are within
+  /// reach, in an order that depends on the mesh alone. From any thread, but not from within f, where the slabs
+  /// around the block are not in memory: the clusters are made then, and kept for this thread's next call.
   template <class F>
   void for_each_cluster(const BlockAt& block, F&& f) const {
     for_each_cluster(block, around(block, reach_), f);
   }
-  /// The same for the clusters that may meet a box, which reaches no farther around the block's voxels than
-  /// the reach. The smaller the box, the fewer clusters have to be made.
+  /// Calls f(cluster) for the clusters that may meet the box `near`, which reaches no farther around the block's
+  /// voxels than the reach. The smaller the box, the fewer clusters have to be made.
   template <class F>
   void for_each_cluster(const BlockAt& block, const VoxelBox& near, F&& f) const;
   /// Large triangles within reach of block number `i`, in ascending order.
@@ -74,23 +78,24 @@ class TriangleBins {
     return {large_.data() + first_large_[i], first_large_[i + 1] - first_large_[i]};
   }
 
-  /// Space is cut across one axis into slabs; the triangles that matter to a block are in its own and the two
-  /// beside it.
+  /// Number of the slabs that space is cut into across one axis; the triangles that matter to a block are in its own
+  /// slab and the two beside it.
   std::size_t slab_count() const { return slabs_.size(); }
+  /// Number of the slab that a block is in.
   std::size_t slab_of(const BlockAt& block) const;
   /// Makes the clusters of a slab and its neighbours, and forgets those of the others. For work that goes
   /// from slab to slab; not while another thread asks for clusters. @throws Cancelled.
   void go_to_slab(std::size_t slab);
-  /// Forgets all clusters, unless there is but one slab.
+  /// Forgets all clusters, unless there is but one slab, whose clusters stay for every later question.
   void forget_slabs();
-  /// What the small triangles take now.
+  /// Bytes that the small triangles take now.
   std::size_t bytes_in_memory() const;
 
  private:
   struct FloatBox {
     Eigen::Vector3f low, high;  ///< world units relative to the mesh's origin, exact
   };
-  /// Triangles of some bins, and their clusters; clusters do not reach across bins.
+  /// Triangles of some bins, and their clusters, which do not reach across bins.
   struct Files {
     std::vector<std::uint32_t> first, order;  ///< bin b: order[first[b]] …
     std::vector<std::uint32_t> first_cluster;
@@ -131,19 +136,19 @@ class TriangleBins {
   BlockTable bins_;
   std::vector<BlockAt> bin_at_;
   std::vector<BinBox> box_of_bin_;
-  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte,
-  /// the lowest first, the eighth bit where more follow.
+  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte, the
+  /// lowest first, the eighth bit set where more follow.
   std::vector<std::uint8_t> packed_;
   std::vector<std::uint64_t> first_byte_;
   std::vector<std::uint32_t> count_;
   std::size_t axis_ = 0;
   std::vector<Slab> slabs_;
-  std::vector<std::uint32_t> place_;  ///< of each bin among those of its slab
+  std::vector<std::uint32_t> place_;  ///< place of each bin among those of its slab
   BlockTable blocks_;
   std::vector<std::vector<std::uint32_t>> all_large_;  ///< large triangles, by piece of the work
   std::vector<std::uint64_t> first_large_;
   std::vector<std::uint32_t> large_;
-  /// Files of single bins for those who ask in any order.
+  /// Files of single bins, by thread, for those who ask in any order.
   mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> lent_;
 };
 

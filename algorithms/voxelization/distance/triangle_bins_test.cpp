@@ -64,7 +64,7 @@ std::vector<std::uint32_t> asked(const TriangleBins& bins, const BlockAt& block)
   return found;
 }
 
-/// Every triangle whose box is within reach of the block, and none twice.
+/// Expects every triangle whose box is within reach of the block, and none twice.
 void expect_complete(const TriangleBins& bins, const IndexSoup& soup, const BlockAt& block, double reach) {
   const std::vector<std::uint32_t> found = asked(bins, block);
   ASSERT_TRUE(std::adjacent_find(found.begin(), found.end()) == found.end());

@@ -15,21 +15,25 @@ using openvdb::Coord;
 using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 using IntLeaf = openvdb::Int32Tree::LeafNodeType;
 
+/// How far the band is to reach on one side of the surface.
 struct Side {
   bool asked = false;  ///< whether the band is to be widened here
   double width = 0;    ///< voxels
   float limit = 0;     ///< world units
 };
 
-/// Asks for the voxels of a leaf one after the other; what one found bounds the next.
+/// Queries for the voxels of a leaf one after the other, where the answer to one bounds the search for the next.
 class VoxelQueries {
  public:
   explicit VoxelQueries(const TriangleTree& tree) : tree_(tree) {}
 
   NearestTriangle operator()(const Eigen::Vector3d& p, double width) {
+    // Distance changes by no more than one moves, so the last one and the step bound this one; the rest is for
+    // rounding.
     const double known = last_ + (p - at_).norm() + 1e-6;
     NearestTriangle found{width * width, TriangleTree::kNone};
     if (known < width) found = tree_.nearest(p, known * known);
+    // A bound beyond the width, and one that rounding made too small, leave nothing found.
     if (found.triangle == TriangleTree::kNone) found = tree_.nearest(p, width * width);
     at_ = p;
     last_ = found.triangle == TriangleTree::kNone ? kFar : std::sqrt(found.squared);
@@ -62,7 +66,10 @@ class Widening {
     std::vector<FloatLeaf*> leaves;
     distance_.tree().getNodes(leaves);
     std::vector<std::unique_ptr<IntLeaf>> ids(leaves.size());
+    // `known_` has every block that is, or is about to be, looked at, so that each is once.
     for (const FloatLeaf* leaf : leaves) known_.insert(leaf->origin());
+    // The triangles go to copies of their leaves: adding leaves to a tree is for one thread at a time, while its
+    // other leaves are read here by all.
     parallel_blocks(leaves.size(), context_, [&](std::size_t i) {
       if (nearest_) ids[i] = ids_of(leaves[i]->origin());
       complete(*leaves[i], ids[i].get());
@@ -70,6 +77,7 @@ class Widening {
     add_ids(ids);
     std::vector<Coord> around;
     for (const FloatLeaf* leaf : leaves) add_neighbours(leaf->origin(), around);
+    // Then ring by ring outwards and inwards, until a ring has no voxel in the band.
     while (!around.empty()) around = add_blocks(around);
   }
 
@@ -86,7 +94,8 @@ class Widening {
       if (leaf && !leaf->isEmpty()) nearest_->tree().addLeaf(leaf.release());
   }
 
-  /// The inactive voxels: they keep their sign, and get their distance where the band reaches.
+  /// Completes the inactive voxels of a leaf: they keep their sign, and get their distance where the band reaches.
+  /// Active ones are right already.
   void complete(FloatLeaf& leaf, IntLeaf* ids) const {
     VoxelQueries query(tree_);
     for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
@@ -97,12 +106,14 @@ class Widening {
       const NearestTriangle found = query(Eigen::Vector3d(at.x(), at.y(), at.z()), side.width);
       const float value = float(std::sqrt(found.squared) * voxel_size_);
       const bool on = found.triangle != TriangleTree::kNone && value < side.limit;
+      // Out of reach, the value is that of the new width, as in a band that had it from the start.
       leaf.setValueOnly(i, std::copysign(on ? value : side.limit, before));
       leaf.setActiveState(i, on);
       if (ids && on) ids->setValueOn(i, boundary_.ids[found.triangle]);
     }
   }
 
+  /// Adds the blocks around one that nobody has looked at, and that are on a side which is to be widened.
   void add_neighbours(const Coord& block, std::vector<Coord>& around) {
     for (int x = -8; x <= 8; x += 8)
       for (int y = -8; y <= 8; y += 8)
@@ -112,13 +123,14 @@ class Widening {
         }
   }
 
-  /// A block without a leaf lies on one side. The way from a voxel to the surface leads through blocks that
-  /// touch each other and have a voxel in the band, so none is missed. Returns the blocks around those that
-  /// have one.
+  /// Makes leaves of blocks without one, and returns the blocks around those that have a voxel in the band. A block
+  /// without a leaf lies on one side as a whole. The way from a voxel to the surface leads through blocks that touch
+  /// each other and have a voxel in the band, so none is missed.
   std::vector<Coord> add_blocks(const std::vector<Coord>& blocks) {
     std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
     std::vector<std::unique_ptr<IntLeaf>> ids(blocks.size());
     parallel_blocks(blocks.size(), context_, [&](std::size_t i) {
+      // A tile's value tells the side, for the flood fill has signed the tiles.
       leaves[i] = std::make_unique<FloatLeaf>(blocks[i], distance_.tree().getValue(blocks[i]), false);
       if (nearest_) ids[i] = std::make_unique<IntLeaf>(blocks[i], -1, false);
       complete(*leaves[i], ids[i].get());
@@ -126,6 +138,7 @@ class Widening {
     add_ids(ids);
     std::vector<Coord> around;
     for (std::size_t i = 0; i < blocks.size(); ++i) {
+      // A block without a voxel in the band stays a tile.
       if (leaves[i]->isEmpty()) continue;
       distance_.tree().addLeaf(leaves[i].release());
       add_neighbours(blocks[i], around);

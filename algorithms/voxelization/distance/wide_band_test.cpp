@@ -24,7 +24,7 @@ void add_box(PolygonMesh& mesh, const Vector3d& low, const Vector3d& high) {
     mesh.quads.push_back({n + q[0], n + q[1], n + q[2], n + q[3]});
 }
 
-/// Distance to a box, negative inside.
+/// The exact signed distance from p to a box, negative inside.
 double to_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
   const Vector3d out = (low - p).cwiseMax(p - high);
   return out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0);

@@ -13,8 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Some hundred kilobytes of the one, some megabytes of the other: where sheets cross a block may hold thousands, and to
-/// file them again costs more than what is asked of them.
+/// The most that is kept. Some hundred kilobytes of blocks, some megabytes of triangles: where sheets cross a block
+/// may hold thousands, and to file them again costs more than what is asked of them.
 constexpr std::size_t kMostBlocks = 256, kMostObstacles = 20000;
 
 /// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all did.
@@ -31,7 +31,8 @@ bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
 
 }  // namespace
 
-/// Count, scan, fill: some hundred little lists would cost more than what is asked of them.
+/// The triangles of one block by cell, in one array (count, scan, fill): some hundred little lists would cost more
+/// than what is asked of them.
 struct CellObstacles::Block {
   std::vector<Obstacle> obstacles;
   std::vector<std::uint32_t> triangles;  ///< their numbers in the soup
@@ -40,6 +41,7 @@ struct CellObstacles::Block {
   std::vector<std::uint32_t> numbers;
 
   Block(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& at) {
+    // First how many triangles each cell has. A triangle whose plane passes all cells of the block by is not kept.
     const auto add = [&](std::uint32_t triangle) {
       obstacles.emplace_back(Facet(soup.corners(triangle)));
       bool touches = false;
@@ -54,11 +56,13 @@ struct CellObstacles::Block {
     };
     bins.for_each_cluster(at, around(at, 1.1), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
+        // The cells of a block reach from its first voxel to the next block's; the rest is more than the margin.
         if (cluster.box.low[a] > at[a] * 8.0 + 8.1 || cluster.box.high[a] < at[a] * 8.0 - 0.1) return;
       for (const std::uint32_t t : cluster.triangles) add(t);
     });
     if (const std::uint32_t i = bins.blocks().find(at); i != BlockTable::kNone)
       for (const std::uint32_t t : bins.large(i)) add(t);
+    // Then where each cell's list begins, and last the lists.
     std::partial_sum(first.begin(), first.end(), first.begin());
     numbers.resize(first.back());
     std::array<std::uint32_t, 513> next = first;
@@ -70,7 +74,8 @@ struct CellObstacles::Block {
     return {numbers.data() + first[cell], numbers.data() + first[cell + 1]};
   }
 
-  /// One that is in the way, or null. What is in one way is often in the next one, so it comes first from now on.
+  /// Finds an obstacle of the cell that is in the way, or null. What is in one way is often in the next one, so it
+  /// comes first from now on; whether one is found does not depend on the order.
   const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to, std::size_t& work) {
     const std::span<std::uint32_t> there = in_cell(cell);
     for (auto i = there.begin(); i != there.end(); ++i) {
@@ -82,7 +87,8 @@ struct CellObstacles::Block {
     return nullptr;
   }
 
-  /// Makes a triangle of the cell the first one met if it is; of several at one place that of the least number.
+  /// Makes a triangle of the cell the first one met if it is; of several at one place the one with the least number,
+  /// for the order of the list depends on what was asked before.
   void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& met) {
     for (const std::uint32_t i : in_cell(cell))
       if (const double along = obstacles[i].meeting(from, to);
@@ -91,12 +97,13 @@ struct CellObstacles::Block {
   }
 
  private:
-  /// Calls f(place_in_tile()) for the cells that may touch it.
+  /// Calls f(place_in_tile()) for the cells that an obstacle may touch, by its box and its plane.
   template <class F>
   static void for_each_cell(const Obstacle& obstacle, const BlockAt& at, F&& f) {
     const Vector3d origin(at[0] * 8.0, at[1] * 8.0, at[2] * 8.0);
     int from[3], to[3];
     for (int a = 0; a < 3; ++a) {
+      // The clamps leave nothing of a box beside the block: 8 to 7 above it, 0 to −1 below.
       from[a] = int(std::clamp(std::floor(obstacle.low()[a] - origin[a]), 0.0, 8.0));
       to[a] = int(std::clamp(std::floor(obstacle.high()[a] - origin[a]), -1.0, 7.0));
     }
@@ -112,11 +119,13 @@ CellObstacles::CellObstacles(const IndexSoup& soup, const TriangleBins& bins, st
 CellObstacles::~CellObstacles() = default;
 CellObstacles::CellObstacles(CellObstacles&&) noexcept = default;
 
+/// The block that a cell is in, made if it is not kept.
 CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
   const BlockAt at = tile_of(cell);
   if (last_ && at == last_at_) return *last_;
   auto known = blocks_.find(at);
   if (known == blocks_.end()) {
+    // All at once rather than the oldest: questions go from block to block, and what is near is made again soon.
     if (blocks_.size() >= kMostBlocks || (blocks_.size() >= kept_ && obstacles_ > kMostObstacles)) {
       blocks_.clear();
       obstacles_ = 0;
@@ -134,6 +143,7 @@ bool CellObstacles::is_free_in(const Voxel& cell, const Vector3d& from, const Ve
   return !block_of(cell).find(place_in_tile(cell), from, to, work_);
 }
 
+/// What met a way lately is tried first, then the cells that the way leads through.
 bool CellObstacles::is_free(const Vector3d& from, const Vector3d& to) {
   for (const Obstacle& obstacle : met_)
     if (obstacle.meeting(from, to) >= 0) return false;
@@ -152,6 +162,7 @@ bool CellObstacles::is_free(const Vector3d& from, const Vector3d& to) {
   return true;
 }
 
+/// Puts a copy in the place of the oldest of the few that are remembered, so that it outlives its block.
 void CellObstacles::remember(const Obstacle& met) {
   constexpr std::size_t kMost = 4;
   if (met_.size() < kMost) {
@@ -164,6 +175,7 @@ void CellObstacles::remember(const Obstacle& met) {
 
 CellObstacles::Met CellObstacles::first_met(const Vector3d& from, const Vector3d& to) {
   Met first;
+  // All cells of the box, in any order: the least parameter wins.
   all_cells(from, to, [&](const Voxel& cell) {
     Block& block = block_of(cell);
     work_ += 1 + block.in_cell(place_in_tile(cell)).size();

@@ -24,12 +24,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// How far off an edge's samples its triangles are looked for, in voxels: farther than the places of their sides are.
+/// How far off an edge between samples its triangles are looked for, in voxels: farther than the places of their
+/// sides are.
 constexpr double kNearby = 1e-5;
-/// How many faces all triangles may be cut into: a constant, some a sample, and some a triangle. What they take is some
-/// microseconds each.
+/// The most faces that all triangles may be cut into: a constant, some a sample, and some a triangle. What they take
+/// is some microseconds each.
 constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
 
+/// One run of find_inner_sheets(): suspicious places, triangles there, their faces, and what is on both sides of
+/// these.
 class Finder {
  public:
   Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
@@ -43,6 +46,8 @@ class Finder {
     find_sides();
     settle_doubts();
     InnerSheets sheets;
+    // `sheets_` is in the order of `triangles_`. A triangle with one inner face goes out as a whole, and those of its
+    // faces that stay come back as pieces.
     std::size_t next = 0;
     for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
       const std::size_t first = next;
@@ -59,10 +64,10 @@ class Finder {
   }
 
  private:
-  /// Voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
-  /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the
-  /// solid; but inner sheets near a seam look the same, so they count where a chain of such voxels leads to
-  /// one with an odd number.
+  /// Finds the voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
+  /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the solid; but
+  /// inner sheets near a seam look the same, so they count where a chain of such voxels leads to one with an odd
+  /// number.
   void find_suspects() {
     std::vector<VoxelBits> marked(band_.blocks.size(), VoxelBits{}), counts = marked;
     parallel_blocks(marked.size(), context_, [&](std::size_t i) {
@@ -74,6 +79,7 @@ class Finder {
         const int sheets = edge.sheets();
         const std::uint64_t bit = std::uint64_t(1) << (place & 63);
         if (sheets > 0) marked[i][place >> 6] |= bit;
+        // An odd number of sheets with the solid at both ends: one of them at least bounds nothing.
         if (sheets % 2 == 1) counts[i][place >> 6] |= bit;
       }
     });
@@ -96,7 +102,8 @@ class Finder {
       }
   }
 
-  /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that counts.
+  /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that counts. What
+  /// is reached does not depend on the order.
   void spread_over_neighbours(const std::vector<VoxelBits>& marked, std::vector<VoxelBits>& counts) const {
     std::vector<Voxel> stack;
     for (std::uint32_t i = 0; i < counts.size(); ++i)
@@ -145,13 +152,14 @@ class Finder {
     int axis;
     std::vector<double> hits;
 
-    /// How many sheets cross it; doubled faces, and those that share the side that is hit, count once.
+    /// How many sheets cross the edge; doubled faces, and those that share the side that is hit, count once.
     int sheets() {
       std::sort(hits.begin(), hits.end());
       int count = 0;
       for (std::size_t i = 0; i < hits.size(); ++i) count += i == 0 || hits[i] - hits[i - 1] > 1e-6 ? 1 : 0;
       return count;
     }
+    /// Notes where a triangle meets the edge, if it does.
     void meet(const Facet& facet) {
       for (int a = 0; a < 3; ++a) {
         const auto [low, high] = std::minmax({facet.corner[0][a], facet.corner[1][a], facet.corner[2][a]});
@@ -164,6 +172,7 @@ class Finder {
     }
   };
 
+  /// Meets the edges of a block with the triangles near them; the box of the edges keeps most clusters away.
   void find_hits(std::uint32_t block, std::vector<InnerEdge>& edges) const {
     VoxelBox box;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -185,6 +194,7 @@ class Finder {
     for (const std::uint32_t t : bins_.large(block)) meet(t);
   }
 
+  /// The block's edges between two voxels inside that the band's kernels found crossed.
   std::vector<InnerEdge> inner_edges(std::uint32_t block) const {
     std::vector<InnerEdge> edges;
     BlockFinder finder(bins_.blocks());
@@ -201,7 +211,7 @@ class Finder {
     return edges;
   }
 
-  /// Voxels inside whose upper neighbour on the axis is inside, too, with a triangle between.
+  /// Bits of the voxels inside whose upper neighbour on the axis is inside, too, with a triangle between.
   VoxelBits inner_edges(std::uint32_t block, int axis, BlockFinder& finder) const {
     VoxelBits edges{};
     std::uint64_t any = 0;
@@ -217,7 +227,7 @@ class Finder {
     return edges;
   }
 
-  /// All that touch a suspicious voxel.
+  /// Finds all triangles that touch a suspicious voxel, ascending.
   std::vector<std::uint32_t> find_triangles() const {
     std::vector<std::vector<std::uint32_t>> small(suspects_.blocks.size());
     const auto keep_those_that_touch = [&](std::vector<std::uint32_t>& triangles) {
@@ -245,6 +255,7 @@ class Finder {
     return triangles;
   }
 
+  /// Adds the small triangles near a block's suspicious voxels: those whose clusters come within a voxel of it.
   void add_small_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
     const BlockAt& at = band_.blocks[block];
     bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
@@ -269,7 +280,7 @@ class Finder {
     }
   }
 
-  /// All that crosses one of them near a suspicious voxel is one of them, or a cap.
+  /// Cuts the triangles into faces. All that crosses one of them near a suspicious voxel is one of them, or a cap.
   void cut_triangles() {
     std::vector<Triangle> corners;
     for (const std::uint32_t t : triangles_) corners.push_back(soup_.triangle(t));
@@ -283,6 +294,7 @@ class Finder {
     const TriangleTree cap_tree(caps.points, caps.triangles, 1.0);
     double area = 0;
     for (const std::uint32_t t : triangles_) area += Facet(soup_.corners(t)).normal().norm();
+    // The budget of all triangles together; it grows with the blocks that have suspicious samples.
     const double most = double(kMostFaces + kFacesPerSample * 512 * suspects_.blocks.size());
     faces_.assign(triangles_.size(), {});
     tbb::enumerable_thread_specific<Suspicion> suspicions(
@@ -290,6 +302,7 @@ class Finder {
     in_parts(triangles_.size(), 0.4, 0.6, [&](std::size_t i) {
       const Facet facet(soup_.corners(triangles_[i]));
       const double own_area = facet.normal().norm();
+      // A triangle without area bounds nothing, and has no sides to look from; it stays.
       if (!(own_area > 0)) return;
       constexpr double kMargin = 0.01;  // beyond what is near enough to part the space next to it
       TriangleCutter cutter(facet);
@@ -312,17 +325,18 @@ class Finder {
     }
   }
 
-  /// The whole triangle where nothing crosses it.
+  /// The face of a sheet; the whole triangle where nothing crosses it.
   TriangleFace face(const TriangleSheet& sheet) const {
     if (!faces_[sheet.triangle].empty()) return faces_[sheet.triangle][sheet.face];
     const Facet facet(soup_.corners(triangles_[sheet.triangle]));
     return {{facet.corner[0], facet.corner[1], facet.corner[2]}, true};
   }
+  /// Unit normal of the sheet's triangle, which has an area.
   Vector3d unit_normal(const TriangleSheet& sheet) const {
     return Facet(soup_.corners(triangles_[sheet.triangle])).normal().normalized();
   }
 
-  /// Some of the sheets, given by number, block by block, so that a neighbourhood is looked up once.
+  /// Orders some of the sheets, given by number, block by block, so that a neighbourhood is looked up once.
   std::vector<std::pair<BlockAt, std::uint32_t>> by_block(const std::vector<std::uint32_t>& some) const {
     std::vector<std::pair<BlockAt, std::uint32_t>> order(some.size());
     parallel_blocks(some.size(), context_, [&](std::size_t i) {
@@ -334,7 +348,7 @@ class Finder {
     return order;
   }
 
-  /// Calls f(sheet, prober) for some of the sheets in parallel.
+  /// Calls f(sheet, prober) for some of the sheets in parallel. A call writes to its own sheet alone.
   template <class F>
   void for_each_sheet(const std::vector<std::uint32_t>& some, double done, double to, F&& f) {
     const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(some);
@@ -344,6 +358,7 @@ class Finder {
              [&](std::size_t i) { f(sheets_[order[i].second], probers.local()); });
   }
 
+  /// Looks from every face, and notes what could not be cut to the end.
   void find_sides() {
     std::vector<std::uint32_t> all(sheets_.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -361,6 +376,7 @@ class Finder {
     if (crowded > 0) note_crowded(crowded, largest);
   }
 
+  /// Leaves a note about the faces that were not cut to the end.
   void note_crowded(std::size_t faces, double largest) {
     char size[32];
     std::snprintf(size, sizeof size, "%.2g", largest);
@@ -397,6 +413,7 @@ class Finder {
     const bool quick = little_doubt && soup_.size() <= kSmallModel;
     if (!quick && inner_triangles < kTheRule * doubtful_triangles) return;
     const OrientedWinding winding(soup_);
+    // Faces that agree on no side have no numbers that tell.
     if (!winding.usable()) return;
     if (doubtful.size() <= kFew)
       for_each_sheet(doubtful, 0.8, 0.9, [&](TriangleSheet& sheet, Prober& prober) {
@@ -406,7 +423,7 @@ class Finder {
   }
 
   /// Asks the winding numbers about sides of which nothing is known. Outside of all that is closed the number is 0,
-  /// whatever the orientation of each.
+  /// whatever the orientation of each part.
   void wind(const std::vector<std::uint32_t>& doubtful, const WindingNumber& winding) {
     const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(doubtful);
     constexpr std::size_t kTogether = 256;  // two places each
@@ -421,6 +438,7 @@ class Finder {
         const TriangleFace of = face(sheet);
         for (const Vector3d& place : places_beside(of, of.middle(), unit_normal(sheet))) places.push_back(place);
       }
+      // A batch is a block's share in a fixed order, so that its single precision errs in the same way on any run.
       std::vector<float> numbers(places.size());
       winding.at(places, numbers);
       for (std::size_t i = 0; i < places.size(); ++i) {
@@ -431,6 +449,7 @@ class Finder {
     });
   }
 
+  /// Adds a face as a fan of triangles in world units.
   static void add_pieces(const TriangleFace& face, double voxel_size, std::uint32_t parent,
                          InnerSheets& sheets) {
     const std::uint32_t n = std::uint32_t(sheets.pieces.points.size());
@@ -442,6 +461,7 @@ class Finder {
     }
   }
 
+  /// Finds the blocks whose distances a left out triangle may have touched: those in its box, grown by the reach.
   void find_blocks(double reach, InnerSheets& sheets) const {
     std::vector<char> near(band_.blocks.size(), 0);
     BlockFinder finder(bins_.blocks());

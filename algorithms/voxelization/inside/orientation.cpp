@@ -34,6 +34,7 @@ std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
   for (std::size_t i = 0; i < points.size(); ++i)
     places[i] = {points[i][0], points[i][1], points[i][2], static_cast<std::uint32_t>(i)};
   tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    // The number tells equal places apart, so that each group begins with its lowest point whatever the threads do.
     return std::tie(a.x, a.y, a.z, a.point) < std::tie(b.x, b.y, b.z, b.point);
   });
   std::vector<std::uint32_t> first(points.size());
@@ -49,6 +50,7 @@ std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
   return merged;
 }
 
+/// One run of orient_faces(), step by step in the order of its methods.
 class Orienter {
  public:
   Orienter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
@@ -73,8 +75,10 @@ class Orienter {
   }
 
  private:
+  /// The bit of an entry of `neighbours_` that says that the two faces are wound against each other.
   static constexpr std::uint32_t kDisagrees = 1;
 
+  /// A side of a face, by its points in ascending order, so that the sides at one edge sort next to each other.
   struct Edge {
     std::uint32_t low, high;
     std::uint32_t face_and_way;  ///< twice the face's number, plus 1 if it runs from high to low
@@ -82,6 +86,7 @@ class Orienter {
       return std::tie(low, high, face_and_way) < std::tie(o.low, o.high, o.face_and_way);
     }
   };
+  /// Faces that are connected over edges of two faces.
   struct Patch {
     std::size_t begin = 0, end = 0;  ///< in queue_
     bool consistent = true, orientable = true, closed = true;
@@ -94,13 +99,14 @@ class Orienter {
   Eigen::Vector3d corner(std::size_t face, int c) const {
     return points_[triangles_[face][c]].cast<double>();
   }
+  /// The face's normal as given, as long as its area.
   Eigen::Vector3d area_vector(std::size_t face) const {
     const Eigen::Vector3d a = corner(face, 0);
     return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
   }
 
-  /// Faces that are there with both windings count for the area, so that it is known how much of it cancels; those of
-  /// double walls do not, unless there are no others.
+  /// Drops the duplicates and the double walls. Faces that are there with both windings count for the area, so that
+  /// it is known how much of it cancels; those of double walls do not, unless there are no others.
   void drop_duplicates() {
     const DuplicateFaces duplicates = find_duplicates(triangles_);
     result_.duplicates = duplicates.dropped.size();
@@ -111,7 +117,8 @@ class Orienter {
       if (result_.turns[face] != 0 || !(area_ > 0)) cancelling_area_ += area_vector(face).norm();
   }
 
-  /// The area, its centre, about which volumes are taken, and its box.
+  /// Measures the area, its centre, about which volumes are taken, and its box. One thread adds up face by face, so
+  /// that the sums are the same on every machine.
   void measure() {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t face = 0; face < triangles_.size(); ++face) {
@@ -125,6 +132,7 @@ class Orienter {
     if (area_ > 0) centre_ = sum / area_;
   }
 
+  /// Finds for each face the ones next to it over edges of two faces, and lists the edges of more.
   void link_neighbours() {
     std::vector<Edge> edges;
     edges.reserve(3 * triangles_.size());
@@ -161,7 +169,7 @@ class Orienter {
       neighbours_.assign(triangles_.size(), {kNone, kNone, kNone});
   }
 
-  /// Two faces agree if they run along their edge in opposite ways.
+  /// Makes two faces neighbours. They agree if they run along their edge in opposite ways.
   void link(std::uint32_t a, std::uint32_t b) {
     const std::uint32_t disagrees = (a & 1) == (b & 1) ? kDisagrees : 0;
     const auto add = [](std::array<std::uint32_t, 3>& list, std::uint32_t entry) {
@@ -171,7 +179,7 @@ class Orienter {
     add(neighbours_[b >> 1], (a & ~1u) | disagrees);
   }
 
-  /// Turns patch by patch, each from its lowest face on.
+  /// Turns patch by patch, each from its lowest face on, as orient_faces() says.
   void agree() {
     std::vector<std::int8_t> turns(triangles_.size(), 0);  // 0: not met yet
     std::vector<Patch> patches;
@@ -181,12 +189,15 @@ class Orienter {
     for (std::size_t face = 0; face < triangles_.size(); ++face) {
       if (turns[face] != 0 || result_.turns[face] == 0 || is_degenerate(triangles_[face])) continue;
       Patch patch = spread(static_cast<std::uint32_t>(face), turns);
+      // The first face had no right to choose for all: the winding given to more of the area wins.
       if (patch.turned > patch.given) turn_over(patch, turns);
+      // The volume of the mesh as given, before closed patches are turned by their own.
       given_volume += patch.volume;
       given_vector += patch.vector;
       if (!follows_given(patch) && patch.volume < 0) turn_over(patch, turns);
       patches.push_back(patch);
     }
+    // All patches that follow the file turn together or not at all, so that a hole stays a hole.
     const bool inside_out = largest_volume(given_volume, given_vector) < -kNoVolume * std::pow(area_, 1.5);
     for (Patch& patch : patches) {
       if (inside_out && follows_given(patch)) turn_over(patch, turns);
@@ -206,7 +217,7 @@ class Orienter {
     int own;
   };
 
-  /// Sorts by patch and edge, and adds up what is of the same.
+  /// Sorts the flows by patch and edge, and adds up those of the same patch and edge.
   static void merge_by_patch(std::vector<Flow>& flows) {
     const auto key = [](const Flow& f) { return std::tie(f.patch, f.edge); };
     tbb::parallel_sort(flows.begin(), flows.end(), [&](const Flow& a, const Flow& b) { return key(a) < key(b); });
@@ -219,15 +230,16 @@ class Orienter {
     flows.resize(count);
   }
 
-  /// Leaves out each patch of which the others are independent: at every edge of its border two or more others meet, and
-  /// without it these run along the edge as often one way as the other. So it is a wall within the solid or a fin of no
-  /// thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall would make a solid, too; the
-  /// least area comes first, and no surface within the wall's border has less than a plane one.
+  /// Leaves out each patch that the others do not need: at every edge of its border two or more others meet, and
+  /// without it these run along the edge as often one way as the other. So it is a wall within the solid or a fin of
+  /// no thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall would make a solid,
+  /// too; the least area comes first, and no surface within the wall's border has less than a plane one.
   void leave_out_walls(const std::vector<Patch>& patches, std::vector<std::int8_t>& turns) {
     if (shared_edges_.empty() || result_.non_manifold_edges > two_face_edges_) return;
     std::vector<std::uint32_t> patch_of(triangles_.size(), kNone);
     for (std::uint32_t p = 0; p < patches.size(); ++p)
       for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) patch_of[queue_[i]] = p;
+    // `total` has the flow of all patches along each edge; a closed rest is one for which it is 0.
     std::vector<int> total;
     std::vector<Flow> flows;
     for_groups(
@@ -251,6 +263,8 @@ class Orienter {
       // An edge of one face is the border of a hole, and the patch may be what is left of a solid.
       if (patches[p].has_rim || !patches[p].orientable) continue;
       const auto [begin, end] = std::ranges::equal_range(flows, p, {}, &Flow::patch);
+      // The others are closed along the border where the whole flow is the patch's own. A patch that has no such
+      // border, or whose own faces cancel along all of it, is kept.
       const bool others_are_closed = std::all_of(begin, end, [&](const Flow& f) { return f.own == total[f.edge]; });
       if (!others_are_closed || std::all_of(begin, end, [](const Flow& f) { return f.own == 0; })) continue;
       for (auto f = begin; f != end; ++f) total[f->edge] -= f->own;
@@ -258,8 +272,9 @@ class Orienter {
     }
   }
 
-  /// The volume of an open surface, which is that of the cone to it, depends on where the cone's apex is: it
-  /// is linear in the apex, and so the largest in one of the corners of the box.
+  /// The largest volume that the surface has about any apex in its box. The volume of an open surface, which is that
+  /// of the cone to it, depends on where the apex is: it is linear in the apex, and so the largest in one of the
+  /// corners of the box.
   double largest_volume(double about_centre, const Eigen::Vector3d& vector) const {
     double volume = about_centre;
     for (int a = 0; a < 3; ++a)
@@ -291,6 +306,7 @@ class Orienter {
         if (disagrees) patch.consistent = false;
         std::int8_t& known = turns[entry >> 1];
         if (known == 0) queue_.push_back(entry >> 1);
+        // A face that two ways reach with different turns is where a Möbius strip closes.
         if (known == -turn) patch.orientable = false;
         if (known == 0) known = turn;
       }
@@ -299,7 +315,7 @@ class Orienter {
     return patch;
   }
 
-  /// Whether the winding is that of the file, and not that of the volume.
+  /// Whether the patch's winding is that of the file, and not that of its volume.
   static bool follows_given(const Patch& patch) {
     return patch.consistent || !patch.closed || !patch.orientable;
   }
@@ -312,7 +328,7 @@ class Orienter {
 
   std::span<const Eigen::Vector3f> points_;
   std::vector<Triangle> triangles_;  ///< of merged points
-  /// Per face its neighbours over edges of two faces: twice the number, plus kDisagrees.
+  /// Neighbours of each face over edges of two faces: twice the number, plus kDisagrees.
   std::vector<std::array<std::uint32_t, 3>> neighbours_;
   std::vector<char> on_rim_;          ///< faces with an edge that no other has
   std::vector<Edge> shared_edges_;    ///< of more than two faces, one after the other

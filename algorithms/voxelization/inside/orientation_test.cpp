@@ -40,7 +40,7 @@ Soup cube(float half, const Eigen::Vector3f& centre = Eigen::Vector3f::Zero()) {
   return box;
 }
 
-/// Every triangle with points of its own.
+/// The mesh with points of its own for every triangle.
 Soup unwelded(const Soup& soup) {
   Soup result;
   for (const Triangle& t : soup.triangles) {
@@ -51,7 +51,7 @@ Soup unwelded(const Soup& soup) {
   return result;
 }
 
-/// A strip of quads around a circle that turns by as many half turns.
+/// A strip of quads around a circle that turns by that many half turns.
 Soup strip(int half_turns, int quads = 20) {
   Soup soup;
   for (int i = 0; i < quads; ++i) {
@@ -182,7 +182,7 @@ TEST(Orientation, LeavesOutTheWallBetweenTwoParts) {
   EXPECT_EQ(found.verdict, Verdict::usable);
 }
 
-/// One solid of two rooms: without the wall the rest is closed, as either room would be with it.
+/// A solid of two rooms is closed without the wall between them, as either room would be with it.
 TEST(Orientation, LeavesOutASingleWallWithinASolid) {
   Soup soup;
   for (const float z : {0.0f, 2.0f, 5.0f})

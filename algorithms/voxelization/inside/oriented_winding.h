@@ -7,7 +7,8 @@
 
 namespace hermesh {
 
-/// Keeps a reference to the mesh, and copies its triangles if it has quads.
+/// The orientation and the winding number of a mesh. It keeps a reference to the mesh, and copies its triangles if it
+/// has quads.
 class OrientedWinding {
  public:
   explicit OrientedWinding(const IndexSoup& soup) : OrientedWinding(soup.mesh(), soup.scale()) {}
@@ -15,8 +16,9 @@ class OrientedWinding {
   OrientedWinding& operator=(const OrientedWinding&) = delete;
 
   const Orientation& orientation() const { return orientation_; }
+  /// Whether the number tells inside from outside.
   bool usable() const { return orientation_.verdict == Orientation::Verdict::usable; }
-  /// Of points in voxels.
+  /// The winding number at points in voxels relative to the mesh's origin.
   const WindingNumber& number() const { return number_; }
 
  private:

@@ -16,7 +16,7 @@ namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-/// More voxels than this are no pocket.
+/// A region of more voxels than this is no pocket.
 constexpr std::size_t kMost = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away.
@@ -29,18 +29,20 @@ const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
 constexpr std::size_t kKept = 27;
 
+/// A region of few voxels that the flood from infinity did not reach.
 struct Pocket {
   std::uint32_t region = 0;
   std::vector<Voxel> voxels;
   std::vector<std::uint32_t> blocks;  ///< numbers of those that hold them
 };
 
-/// The voxels of a block that are at most `far` from a voxel on each axis, as bits.
+/// Bits of the voxels of a block that are at most `far` from a voxel on each axis.
 VoxelBits cube_bits(const BlockAt& block, const Voxel& middle, std::int32_t far) {
   return box_bits(block, {middle[0] - far, middle[1] - far, middle[2] - far},
                   {middle[0] + far, middle[1] + far, middle[2] + far});
 }
 
+/// One run of open_pockets().
 class PocketOpener {
  public:
   PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
@@ -57,6 +59,8 @@ class PocketOpener {
     std::vector<char> open(regions_.count, 0);
     open[Regions::kOutside] = 1;
     for (const std::int32_t far : kFar) {
+      // A round opens all pockets that see a goal, and these are the goals of the next: what is opened does not
+      // depend on the order in which threads ask.
       far_ = far;
       goals_ = open;
       std::vector<std::uint32_t> asked = closed_ones(open);
@@ -64,6 +68,7 @@ class PocketOpener {
       for (bool first = true; !asked.empty(); first = false) {
         mark_goals(first);
         const std::vector<char> sees = look(asked);
+        // What was a goal in this round has been looked for by all; only what it opened is new.
         if (first) goals_.assign(regions_.count, 0);
         for (const std::uint32_t pocket : opened_) goals_[pockets_[pocket].region] = 0;
         opened_.clear();
@@ -76,6 +81,7 @@ class PocketOpener {
       }
       opened_.clear();
     }
+    // The threads' blocks have served.
     obstacles_.clear();
     open_along_walls(open);
     for (BlockComponent& component : regions_.components)
@@ -83,6 +89,7 @@ class PocketOpener {
   }
 
  private:
+  /// The pockets that are still closed, by number.
   std::vector<std::uint32_t> closed_ones(const std::vector<char>& open) const {
     std::vector<std::uint32_t> closed;
     for (std::uint32_t i = 0; i < pockets_.size(); ++i)
@@ -90,8 +97,8 @@ class PocketOpener {
     return closed;
   }
 
-  /// Only these can see what has just been opened. To ask all would take as many looks as a slit has voxels for each
-  /// of the rounds that lead through it.
+  /// Finds the closed pockets in the blocks around those just opened, for no others can see them. To ask all would
+  /// take as many looks as a slit has voxels for each of the rounds that lead through it.
   std::vector<std::uint32_t> closed_ones_near_opened(const std::vector<char>& open) const {
     std::vector<std::uint32_t> near;
     for (const std::uint32_t pocket : opened_)
@@ -139,7 +146,7 @@ class PocketOpener {
       }
   }
 
-  /// Which of these pockets see a goal.
+  /// Tells which of these pockets see a goal. Threads read the goals and write an entry each.
   std::vector<char> look(const std::vector<std::uint32_t>& asked) const {
     std::vector<char> sees(asked.size(), 0);
     tbb::parallel_for(std::size_t(0), asked.size(), [&](std::size_t i) {
@@ -152,8 +159,8 @@ class PocketOpener {
     return sees;
   }
 
-  /// Opens those that a way along their walls leads out of. One after the other, with obstacles of their own: what these
-  /// cost must not depend on what threads asked before.
+  /// Opens the pockets that a way along their walls leads out of. It asks one after the other, with obstacles of
+  /// their own: what these cost must not depend on what threads asked before.
   void open_along_walls(std::vector<char>& open) {
     CellObstacles obstacles(soup_, bins_, kKept);
     goals_ = open;
@@ -171,8 +178,8 @@ class PocketOpener {
     }
   }
 
-  /// Whether the triangles around the first voxel face it more often than not. What is inside of a thin wall is many
-  /// pockets, and to follow all ways within it would take longer than all the rest.
+  /// Whether the triangles around the first voxel face it at least as often as not. What is inside of a thin wall is
+  /// many pockets, and to follow all ways within it would take longer than all the rest.
   bool may_be_outside(const Pocket& pocket, CellObstacles& obstacles) const {
     const Vector3d from = side_place(pocket.voxels.front());
     int facing = 0;
@@ -184,13 +191,15 @@ class PocketOpener {
     return facing >= 0;
   }
 
+  /// Where the ways along a pocket's walls lead.
   struct Ways {
     bool lead_out = false;
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
-  /// They lead out if a goal is seen from them before any other large region. Where that comes first, there is a hole in
-  /// the solid, which must not be emptied.
+  /// Follows the ways along a pocket's walls, and those of the pockets that are seen from them. They lead out if a
+  /// goal is seen before any other large region. Where that comes first, there is a hole in the solid, which must not
+  /// be emptied.
   Ways follow_walls(const Pocket& pocket, CellObstacles& obstacles) const {
     Ways ways{.lead_out = false, .regions = {pocket.region}};
     WallWalk walk(soup_, obstacles);
@@ -221,6 +230,7 @@ class PocketOpener {
     return ways;
   }
 
+  /// Lists the small regions in the order of their first components.
   void find_pockets() {
     std::vector<std::size_t> size(regions_.count, 0);
     for (const BlockComponent& component : regions_.components)
@@ -251,7 +261,7 @@ class PocketOpener {
       }
   }
 
-  /// kNone where there is no block, which neither the outside nor the depth of a solid has.
+  /// The region of a voxel; kNone where there is no block, as in the depth of a solid or far outside.
   std::uint32_t region_of(const Voxel& voxel) const {
     const std::uint32_t i = bins_.blocks().find(tile_of(voxel));
     if (i == BlockTable::kNone) return BlockTable::kNone;
@@ -261,6 +271,7 @@ class PocketOpener {
     return regions_.components[c].region;
   }
 
+  /// Whether a straight way to a goal's voxel, at most `far_` off on each axis, is free.
   bool sees_goal(const Voxel& voxel, CellObstacles& obstacles) const {
     std::vector<std::uint32_t> near;  // blocks with goals
     BlockAt low, high;
@@ -271,14 +282,14 @@ class PocketOpener {
           if (const std::uint32_t block = bins_.blocks().find({x, y, z});
               block != BlockTable::kNone && goal_bits_[block] != VoxelBits{})
             near.push_back(block);
-    // Near ones first.
+    // Near ones first, which are the likeliest to be seen.
     for (std::int32_t far = 1; far <= far_; ++far)
       for (const std::uint32_t block : near)
         if (sees_goal_in(block, voxel, far, obstacles)) return true;
     return false;
   }
 
-  /// At that distance, the largest of the three axes'.
+  /// Whether a goal's voxel in the block is seen whose distance, the largest of the three axes', is `far`.
   bool sees_goal_in(std::uint32_t block, const Voxel& voxel, std::int32_t far, CellObstacles& obstacles) const {
     const BlockAt& at = blocks_[block];
     const VoxelBits within = cube_bits(at, voxel, far), nearer = cube_bits(at, voxel, far - 1);
@@ -292,6 +303,7 @@ class PocketOpener {
     return false;
   }
 
+  /// Whether a segment is free, and one beside it: a triangle in whose plane the first lies would not be met.
   static bool is_free(const Vector3d& from, const Vector3d& to, CellObstacles& obstacles) {
     return obstacles.is_free(from, to) && obstacles.is_free(from, to + kAside);
   }
@@ -303,13 +315,13 @@ class PocketOpener {
   const RunContext& context_;
   mutable tbb::enumerable_thread_specific<CellObstacles> obstacles_;
   std::vector<Pocket> pockets_;
-  std::vector<std::uint32_t> pocket_of_;  ///< by region, kNone for large ones
-  std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< by block
-  std::vector<std::uint32_t> opened_;                   ///< in the last round
+  std::vector<std::uint32_t> pocket_of_;  ///< the pocket of each region, kNone for large ones
+  std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< the pockets of each block
+  std::vector<std::uint32_t> opened_;                   ///< pockets opened in the last round
   std::int32_t far_ = 0;
   std::vector<VoxelBits> goal_bits_;  ///< voxels of the goals, by block
-  bool all_marked_ = false;                  ///< not those that were opened last alone
-  std::vector<std::uint32_t> marked_blocks_;  ///< otherwise
+  bool all_marked_ = false;                  ///< whether `goal_bits_` has all goals, or those opened last
+  std::vector<std::uint32_t> marked_blocks_;  ///< blocks with bits of the latter
   std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };
 

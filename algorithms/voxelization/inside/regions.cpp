@@ -8,13 +8,15 @@
 namespace hermesh {
 namespace {
 
+/// Bits of the voxels with z = 0.
 constexpr std::uint64_t kBottomZ = 0x0101010101010101ull;
 
-/// Where one may step from each voxel of a block to its upper neighbour within the block.
+/// The voxels of a block from which one may step to the upper neighbour within the block, by axis.
 struct Steps {
   VoxelBits up[3];
 };
 
+/// Steps between voxels that no triangle separates. Along x nobody steps from the last word.
 Steps steps_between(const kernels::EdgeBits& crossed) {
   Steps steps;
   for (std::size_t x = 0; x < 8; ++x) {
@@ -25,6 +27,7 @@ Steps steps_between(const kernels::EdgeBits& crossed) {
   return steps;
 }
 
+/// Steps between neighbours both of which are in `free`: cells without a block on a coarse level.
 Steps steps_among(const VoxelBits& free) {
   Steps steps;
   for (std::size_t x = 0; x < 8; ++x) {
@@ -35,6 +38,7 @@ Steps steps_among(const VoxelBits& free) {
   return steps;
 }
 
+/// Lets the bits of one layer spread along its steps, all at once, until nothing is added. A step leads both ways.
 std::uint64_t spread_in_word(std::uint64_t m, std::uint64_t up_y, std::uint64_t up_z) {
   std::uint64_t before;
   do {
@@ -45,15 +49,17 @@ std::uint64_t spread_in_word(std::uint64_t m, std::uint64_t up_y, std::uint64_t 
   return m;
 }
 
-/// All voxels of `free` that can be reached from its first one.
+/// Finds all voxels of `free` that can be reached from its first one.
 VoxelBits reach_from_first(const VoxelBits& free, const Steps& steps) {
   VoxelBits reached{};
   for (std::size_t x = 0; x < 8; ++x)
     if (free[x]) {
+      // Only the lowest bit, the first in the order of the voxels.
       reached[x] = free[x] & -free[x];
       break;
     }
   bool changed = true;
+  // Takes over from both neighbouring layers, then spreads within the layer.
   const auto visit = [&](std::size_t x) {
     std::uint64_t m = reached[x];
     if (x > 0) m |= reached[x - 1] & steps.up[0][x - 1];
@@ -65,12 +71,14 @@ VoxelBits reach_from_first(const VoxelBits& free, const Steps& steps) {
   };
   while (changed) {
     changed = false;
+    // Up and down in turn: one sweep crosses all layers that lie in its way.
     for (std::size_t x = 0; x < 8; ++x) visit(x);
     for (std::size_t x = 8; x-- > 0;) visit(x);
   }
   return reached;
 }
 
+/// Parts `free` into connected sets, in the order of their first voxels.
 void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& components) {
   const auto any = [&] {
     std::uint64_t bits = 0;
@@ -83,7 +91,7 @@ void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& 
   }
 }
 
-/// Blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level
+/// A level of blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level
 /// below, and the components are those of the cells without a block.
 struct Level {
   std::vector<BlockAt> blocks;
@@ -92,6 +100,8 @@ struct Level {
   std::uint32_t node = 0;  ///< number of the first component's node
 };
 
+/// Fills in a level's components: components_of(i, list) adds those of block i. Chunks of a size that depends on
+/// nothing are put together in their order, so that the numbers are the same at any thread count.
 template <class F>
 void find_components(Level& level, const RunContext& context, F&& components_of) {
   const std::size_t n = level.blocks.size();
@@ -114,7 +124,8 @@ void find_components(Level& level, const RunContext& context, F&& components_of)
   }
 }
 
-/// The levels and who is connected to whom.
+/// All levels, and a set of disjoint regions over their components. Empty space is a component of the coarsest kind
+/// of cell that it fills, so that space costs by surface and not by volume.
 class Hierarchy {
  public:
   Hierarchy(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed, const RunContext& context)
@@ -127,6 +138,7 @@ class Hierarchy {
       free.fill(~0ull);
       add_components(free, steps_between(crossed[i]), out);
     });
+    // Eight times coarser each time, until all blocks are around the origin.
     while (!add_level()) {
     }
     std::uint32_t node = 1;  // 0 is infinity
@@ -135,15 +147,17 @@ class Hierarchy {
       node += std::uint32_t(level.components.size());
     }
     sets_ = DisjointSets(node);
+    // Joining is for one thread; the sets do not depend on the order.
     for (std::size_t l = 0; l < levels_.size(); ++l) connect(l);
   }
 
   Level& finest() { return levels_[0]; }
+  /// The node that stands for the region of a component of the finest level.
   std::uint32_t root(std::uint32_t component) { return sets_.find(levels_[0].node + component); }
 
  private:
-  /// True when the level just made has only the eight blocks around zero, so that there is nothing beyond but
-  /// infinity.
+  /// Adds the level above the coarsest one. True when it has only the eight blocks around zero, so that there is
+  /// nothing beyond but infinity.
   bool add_level() {
     const BlockTable& below = *tables_.back();
     std::vector<BlockSet> set(1);
@@ -157,6 +171,7 @@ class Hierarchy {
     Level& level = levels_.emplace_back();
     level.blocks = tables_.back()->blocks();
     find_components(level, context_, [&](std::size_t i, std::vector<VoxelBits>& out) {
+      // A bit of a tile is a block of the level below, so that the others are empty cells.
       VoxelBits free = below.tiles()[below.find_tile(level.blocks[i])].mask;
       for (std::uint64_t& word : free) word = ~word;
       add_components(free, steps_among(free), out);
@@ -164,7 +179,8 @@ class Hierarchy {
     return last;
   }
 
-  /// Node of the empty space at a cell of level l that has no block.
+  /// Finds the node of the empty space at a cell of level l that has no block: on the first level whose block holds
+  /// it.
   std::uint32_t empty_at(std::size_t l, BlockAt cell) const {
     for (; l + 1 < levels_.size(); ++l) {
       const BlockAt parent = tile_of(cell);
@@ -180,6 +196,7 @@ class Hierarchy {
     return Regions::kOutside;
   }
 
+  /// Joins the components of a level's blocks to what is across their faces: blocks of the level, or empty space.
   void connect(std::size_t l) {
     const Level& level = levels_[l];
     BlockFinder finder(*tables_[l]);
@@ -192,12 +209,14 @@ class Hierarchy {
           const std::uint32_t j = finder.find(at);
           if (j == BlockTable::kNone)
             connect_to_empty(l, i, axis, side, empty_at(l, at));
+          // Two blocks are joined once, from the lower one, which owns the edges between them.
           else if (side == 1)
             connect_blocks(l, i, j, axis);
         }
     }
   }
 
+  /// Joins the components that have a cell on that side of a block to the empty space beyond.
   void connect_to_empty(std::size_t l, std::uint32_t block, int axis, int side, std::uint32_t node) {
     const Level& level = levels_[l];
     for (std::uint32_t c = level.first[block]; c < level.first[block + 1]; ++c)
@@ -207,6 +226,7 @@ class Hierarchy {
   void connect_blocks(std::size_t l, std::uint32_t lower, std::uint32_t upper, int axis) {
     const Level& level = levels_[l];
     std::uint64_t open = ~0ull;
+    // Only voxels have triangles between them; empty cells that touch are one space.
     if (l == 0) {
       VoxelBits bits;
       for (std::size_t x = 0; x < 8; ++x) bits[x] = crossed_[lower].word[axis][x];
@@ -238,6 +258,7 @@ std::uint64_t face(const VoxelBits& bits, int axis, int side) {
       result |= (bits[x] >> (side ? 56 : 0) & 255u) << (8 * x);
     } else {
       const std::uint64_t column = bits[x] >> (side ? 7 : 0) & kBottomZ;
+      // The product gathers the eight bits of a column, one in each byte, in its top byte.
       result |= (column * 0x0102040810204080ull >> 56) << (8 * x);
     }
   }
@@ -267,6 +288,8 @@ Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBit
   Level& finest = hierarchy.finest();
   regions.first = finest.first;
   regions.components.resize(finest.components.size());
+  // Regions get their numbers in the order of their first component, whatever node is the root of their set. Node 0,
+  // infinity, is the root of its own.
   std::vector<std::uint32_t> number_of_root;
   regions.count = 1;
   for (std::uint32_t c = 0; c < finest.components.size(); ++c) {

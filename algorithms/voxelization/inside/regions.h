@@ -14,7 +14,7 @@ namespace hermesh {
 
 class RunContext;
 
-/// 512 voxels of a block: bit (y, z) of word x.
+/// A set of voxels of a block: bit 8y + z of word x.
 using VoxelBits = std::array<std::uint64_t, 8>;
 
 /// Voxels of one block that are connected within it.
@@ -23,8 +23,9 @@ struct BlockComponent {
   std::uint32_t region;
 };
 
+/// The components of all blocks, and which of them belong together.
 struct Regions {
-  /// The region that reaches infinity.
+  /// Number of the region that reaches infinity.
   static constexpr std::uint32_t kOutside = 0;
   /// Components of block i: components[first[i]] … components[first[i + 1] − 1].
   std::vector<std::uint32_t> first;
@@ -32,16 +33,17 @@ struct Regions {
   std::uint32_t count = 0;  ///< of regions; numbered in the order of their first component
 };
 
-/// Upper neighbours in y and z of voxels (y, z) that are in the same word of a block's bits.
+/// Bits of the voxels in a word whose upper neighbour in y, or in z, is in the same word, as a block has them.
 inline constexpr std::uint64_t kBelowTopY = 0x00FFFFFFFFFFFFFFull, kBelowTopZ = 0x7F7F7F7F7F7F7F7Full;
 
-/// The 64 voxels of one side of a block, 0 lower and 1 upper, as bits in the order of the two other axes.
+/// The bits of the 64 voxels on one side of a block, 0 lower and 1 upper, in the order of the two other axes.
 std::uint64_t face(const VoxelBits& bits, int axis, int side);
 
 /// Bits of the voxels whose upper neighbour along the axis (in `upper`, beyond the block) differs from them.
 VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis);
 
-/// `table` numbers the blocks, `crossed` has an entry for each. @throws Cancelled.
+/// Finds the regions of voxels. `table` numbers the blocks, `crossed` has an entry for each.
+/// @throws Cancelled.
 Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed,
                      const RunContext& context);
 

@@ -18,7 +18,7 @@ struct Scene {
     table = BlockTable(sets);
     crossed.resize(table.size(), kernels::EdgeBits{});
   }
-  /// The edge up from a voxel.
+  /// Marks the edge up from a voxel as crossed.
   void cross(const BlockAt& voxel, int axis) {
     const std::uint32_t block = table.find(tile_of(voxel));
     ASSERT_NE(block, BlockTable::kNone);

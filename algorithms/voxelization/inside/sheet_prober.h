@@ -15,14 +15,14 @@
 
 namespace hermesh {
 
-/// Which voxels are suspicious.
+/// The voxels around which sheets may be inner.
 struct Suspects {
   std::vector<VoxelBits> voxels;      ///< by block
   std::vector<std::uint32_t> blocks;  ///< those with some
 };
 
-/// Whether pieces are near such voxels; each thread has its own, since it keeps the block that it looked up
-/// last.
+/// Tells whether pieces are near suspicious voxels; each thread has its own, since it keeps the block that it looked
+/// up last.
 class Suspicion {
  public:
   Suspicion(const Suspects& suspects, const Band& band, const BlockTable& blocks)
@@ -57,7 +57,7 @@ class Suspicion {
   }
 
  private:
-  /// Whether one of the block's is in the box.
+  /// Whether one of the block's suspicious voxels is in the box.
   bool has(std::uint32_t block, const BlockAt& at, const Voxel& from, const Voxel& to) const {
     const VoxelBits bits = box_bits(at, from, to);
     for (std::size_t x = 0; x < 8; ++x)
@@ -73,7 +73,7 @@ class Suspicion {
 /// How far off a sheet the ways to voxels start, in voxels: beyond rounding and beyond doubled faces, but in
 /// a narrow face nearer than its border.
 inline constexpr double kMostOff = 1e-3, kLeastOff = 1e-5;
-/// Of a face that is no larger, in voxels, one place tells as much as several.
+/// The size of a face, in voxels, of which one place tells as much as several.
 inline constexpr double kSmallFace = 0.5;
 
 /// A face of a triangle, and what is known about it.
@@ -81,8 +81,9 @@ struct TriangleSheet {
   std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
   std::uint32_t face = 0;
   Side side = Side::unknown;
-  std::array<Side, 2> sides{Side::unknown, Side::unknown};  ///< of that alone: along the normal, against it
+  std::array<Side, 2> sides{Side::unknown, Side::unknown};  ///< what each side is: along the normal, against it
 
+  /// A face is outer if one of its sides is, and inner if both are inner.
   void conclude() {
     if (sides[0] == Side::outer || sides[1] == Side::outer)
       side = Side::outer;
@@ -98,15 +99,16 @@ inline std::array<Eigen::Vector3d, 2> places_beside(const TriangleFace& face, co
   return {place + off * normal, place - off * normal};
 }
 
-/// What a thread asks about faces.
+/// Looks from faces for the voxels around them; each thread has its own.
 class Prober {
  public:
   Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
          const std::vector<VoxelBits>& inside, const Suspects& suspects)
       : probe_(soup, bins, inside), suspicion_(suspects, band, bins.blocks()) {}
 
-  /// All places of a whole face have the same around them, so that one that sees something tells. It is outer
-  /// where one of its sides is; of a face that is not whole, all places have to agree that it is inner.
+  /// Finds out what is on the two sides of a face. All places of a whole face have the same around them, so that one
+  /// that sees something tells. It is outer where one of its sides is; of a face that is not whole, all places have
+  /// to agree that it is inner.
   void look(const TriangleFace& face, const Eigen::Vector3d& normal, TriangleSheet& sheet) {
     if (!suspicion_.touches(face.corners)) {
       sheet.side = Side::outer;
@@ -123,7 +125,7 @@ class Prober {
     if (!face.whole && !agree && sheet.side == Side::inner) sheet.side = Side::unknown;
   }
 
-  /// Looks farther where nothing was seen, from the face's middle.
+  /// Follows the narrow spaces beside a face's middle where nothing was seen.
   void follow_spaces(const TriangleFace& face, const Eigen::Vector3d& normal, TriangleSheet& sheet) {
     const std::array<Eigen::Vector3d, 2> places = places_beside(face, face.middle(), normal);
     for (std::size_t i = 0; i < 2; ++i)
@@ -132,7 +134,7 @@ class Prober {
   }
 
  private:
-  /// Whether it is inner at that place for certain.
+  /// Looks from a place of a face to both sides; true if the face is inner there for certain.
   bool look_from(const Eigen::Vector3d& place, const TriangleFace& face, const Eigen::Vector3d& normal,
                  TriangleSheet& sheet) {
     bool inner = true;

@@ -11,7 +11,7 @@
 namespace hermesh {
 namespace {
 
-/// Voxels of each block that are not connected to infinity.
+/// The voxels of each block that are not connected to infinity: the inside as the flood sees it.
 std::vector<VoxelBits> enclosed_voxels(const Regions& regions, std::size_t blocks) {
   std::vector<VoxelBits> result(blocks, VoxelBits{});
   for (std::size_t i = 0; i < blocks; ++i)
@@ -26,8 +26,8 @@ struct OpenEdge {
   Eigen::Vector3d end[2];
 };
 
-/// Edges of the block that are crossed, and those of them with both ends outside; edges inside the block
-/// only.
+/// Counts of the block's edges that are crossed, and of those of them with both ends outside. Edges that lead to
+/// another block are left out: a sample of the block's edges is enough to tell a leak.
 struct CrossedEdges {
   int all = 0, open = 0;
   OpenEdge example;
@@ -39,6 +39,7 @@ CrossedEdges crossed_edges(const Band& band, std::size_t block, const VoxelBits&
     for (std::size_t x = 0; x < (axis == 0 ? 7u : 8u); ++x) {
       const std::uint64_t within = axis == 0 ? ~0ull : axis == 1 ? kBelowTopY : kBelowTopZ;
       const std::uint64_t crossed = band.crossed[block].word[axis][x] & within;
+      // The upper neighbour's bit, moved to where the edge's own bit is.
       const std::uint64_t upper = axis == 0   ? inside[(x + 1) & 7]
                                   : axis == 1 ? inside[x] >> 8
                                               : inside[x] >> 1;
@@ -65,8 +66,8 @@ struct Flood {
   std::vector<OpenEdge> leaks;  ///< one open edge of every block in which nearly all are open
 };
 
-/// Nearly all edges of a block are open where the flood leaked in, and at a plate thinner than a voxel.
-/// Single open edges are at thin features and mean nothing.
+/// Counts the open edges block by block. Nearly all edges of a block are open where the flood leaked in, and at a
+/// plate thinner than a voxel. Single open edges are at thin features and mean nothing.
 Flood look_at_flood(const Band& band, const std::vector<VoxelBits>& inside, const RunContext& context) {
   constexpr int kEnough = 12;
   std::vector<CrossedEdges> edges(band.blocks.size());
@@ -74,6 +75,7 @@ Flood look_at_flood(const Band& band, const std::vector<VoxelBits>& inside, cons
                   [&](std::size_t i) { edges[i] = crossed_edges(band, i, inside[i]); });
   Flood flood;
   double all = 0, closed = 0;
+  // Each block has a place of its own above, and one thread adds up in their order.
   for (const CrossedEdges& e : edges) {
     all += e.all;
     closed += e.all - e.open;
@@ -83,7 +85,7 @@ Flood look_at_flood(const Band& band, const std::vector<VoxelBits>& inside, cons
   return flood;
 }
 
-/// Whether the flood reached what the polygons wind around.
+/// Whether the flood reached what the polygons wind around: an even sample of the open edges is asked for.
 bool leaked(const std::vector<OpenEdge>& open, const WindingNumber& winding) {
   constexpr std::size_t kMost = 256;
   const std::size_t step = std::max<std::size_t>(1, open.size() / kMost);
@@ -100,6 +102,7 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   Signs signs;
   Regions regions = find_regions(bins.blocks(), band.crossed, context);
   std::optional<OrientedWinding> winding;
+  // Winding numbers are made when first asked for: a closed mesh never needs them.
   const auto wound = [&]() -> const OrientedWinding& {
     context.check();
     if (!winding) winding.emplace(soup);
@@ -122,11 +125,13 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
       flood_from_infinity();
     }
     if (rule == SignRule::flood_fill) return signs;
+    // The flood found an inside and no block through which it might have leaked.
     if (flood.leaks.empty() && flood.share > 0) return signs;
   }
   if (!wound().usable()) {
     // Faces that cancel can still enclose something.
     if (rule == SignRule::automatic && flood.share > 0.5) return signs;
+    // Nobody gets signs that are made up: voxelize() gives distances alone.
     context.note(std::string("The distances have no sign: ") + explanation(wound().orientation().verdict) + ".");
     signs.inside.clear();
     signs.usable = false;
@@ -138,6 +143,7 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
         "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
   }
   const Orientation& orientation = wound().orientation();
+  // A surface of which every edge has two faces has no rim for a cap to begin at.
   const bool open = orientation.boundary_edges + orientation.non_manifold_edges > 0;
   return winding_signs(wound().number(), bins.blocks(), band, regions, open, reach, context);
 }

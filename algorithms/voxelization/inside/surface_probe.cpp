@@ -37,7 +37,7 @@ SurfaceProbe::SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins,
                            const std::vector<VoxelBits>& inside)
     : inside_(inside), finder_(bins.blocks()), obstacles_(soup, bins, kKept) {}
 
-/// 0 or 1, or 2 where there is no block.
+/// Whether a voxel is inside: 0 or 1, or 2 where there is no block and nobody knows.
 int SurfaceProbe::inside_at(const Voxel& voxel) {
   const std::uint32_t block = finder_.find(tile_of(voxel));
   if (block == BlockTable::kNone) return 2;
@@ -45,6 +45,7 @@ int SurfaceProbe::inside_at(const Voxel& voxel) {
   return int(inside_[block][place >> 6] >> (place & 63) & 1);
 }
 
+/// Looks the corners of a cell up, unless they are known from the last question.
 void SurfaceProbe::enter(const Voxel& cell) {
   if (has_cell_ && cell == cell_) return;
   cell_ = cell;

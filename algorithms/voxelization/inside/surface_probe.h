@@ -15,13 +15,13 @@ enum class Side { outer, inner, unknown };
 /// Looks around among the triangles; each thread has its own, since it keeps what it looked up.
 class SurfaceProbe {
  public:
-  /// Keeps references. `inside`: the voxels inside each block of the bins.
+  /// Keeps references. `inside` has the voxels inside each block of the bins, by number.
   SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside);
 
-  /// What is around a place off the surface, by straight ways to the corners of the cell that it is in.
+  /// What is around a place off the surface, in voxels, by straight ways to the corners of the cell that it is in.
   Side seen_from(const Eigen::Vector3d& p);
-  /// The same of a place next to a sheet with this unit normal from which nothing is seen: follows the narrow space to
-  /// where it is wider, as long as it widens.
+  /// What is around a place next to a sheet with this unit normal from which nothing is seen: follows the narrow
+  /// space to where it is wider, as long as it widens.
   Side followed_from(Eigen::Vector3d p, const Eigen::Vector3d& normal);
 
  private:

@@ -11,18 +11,20 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// In voxels: a corner that is no farther from a plane lies in it.
+/// A corner that is no farther from a plane, in voxels, lies in it.
 constexpr double kOn = 1e-7;
-/// What ends this near to a triangle parts the space next to it, from which voxels are looked for.
+/// What ends this near to a triangle, in voxels, parts the space next to it, from which voxels are looked for: as far
+/// as sheet_prober.h starts its ways at most.
 constexpr double kTouching = 1e-3;
-/// A strip along a face's border that is no wider stays with the face.
+/// A strip along a face's border that is no wider, in voxels, stays with the face.
 constexpr double kBorder = 1e-6;
 
-/// Twice the area, positive if counter-clockwise.
+/// Twice the area of a triangle, positive if counter-clockwise.
 double turn(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
+/// Area of a convex polygon, as a fan from its first corner.
 double area_of(const std::vector<Vector2d>& corners) {
   double twice = 0;
   for (std::size_t i = 2; i < corners.size(); ++i) twice += turn(corners[0], corners[i - 1], corners[i]);
@@ -63,6 +65,7 @@ double TriangleFace::room_at(const Vector3d& place) const {
 
 TriangleCutter::TriangleCutter(const Facet& triangle)
     : triangle_(triangle), normal_(triangle.normal().normalized()) {
+  // Coordinates in the triangle's plane, in which it is counter-clockwise, so that its inside is left of each side.
   along_ = (triangle.corner[1] - triangle.corner[0]).normalized();
   across_ = normal_.cross(along_);
   for (const Vector3d& corner : triangle.corner) outline_.push_back(flat(corner));
@@ -78,10 +81,12 @@ void TriangleCutter::add(const Facet& other) {
   double height[3];
   for (int i = 0; i < 3; ++i) height[i] = normal_.dot(other.corner[i] - triangle_.corner[0]);
   const auto [lowest, highest] = std::minmax({height[0], height[1], height[2]});
+  // Wholly above or below.
   if (lowest > kTouching || highest < -kTouching) return;
   std::vector<Place> met, touching;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
+    // The line of the crossing ends where sides of the other triangle pass the plane, or at corners in it.
     if (std::abs(height[i]) <= kOn) met.push_back(flat(other.corner[i]));
     if (std::abs(height[i]) <= kTouching) touching.push_back(flat(other.corner[i]));
     if ((height[i] > kOn && height[j] < -kOn) || (height[i] < -kOn && height[j] > kOn)) {
@@ -89,6 +94,8 @@ void TriangleCutter::add(const Facet& other) {
       met.push_back(flat(other.corner[i] + part * (other.corner[j] - other.corner[i])));
     }
   }
+  // Two ends make the crossing. Where there are fewer, a side that comes close as a whole cuts; where all three
+  // corners do, the whole outline.
   if (met.size() == 2) add_cut(met[0], met[1]);
   if (touching.size() == 2 && met.size() < 2) add_cut(touching[0], touching[1]);
   if (touching.size() == 3)
@@ -105,6 +112,7 @@ std::vector<TriangleCutter::Side> TriangleCutter::sides(const std::vector<Place>
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Place &a = corners[i], side = corners[(i + 1) % corners.size()] - a;
     const double length = side.norm();
+    // A side without length has no direction; its neighbours bound the polygon.
     if (!(length > 0)) continue;
     const Place inward(-side.y() / length, side.x() / length);
     sides.push_back({inward, inward.dot(a)});
@@ -112,7 +120,8 @@ std::vector<TriangleCutter::Side> TriangleCutter::sides(const std::vector<Place>
   return sides;
 }
 
-/// To what of it is within a convex polygon; false if it is no more than a point, or on the border.
+/// Clips a cut to its part within a convex polygon (Cyrus & Beck 1978); false if that is no more than a point, or on
+/// the border.
 bool TriangleCutter::clip(const std::vector<Side>& sides, Cut& cut) {
   double begin = 0, end = 1;
   for (const Side& side : sides) {
@@ -127,11 +136,14 @@ bool TriangleCutter::clip(const std::vector<Side>& sides, Cut& cut) {
   return true;
 }
 
-/// Along the longest of its cuts that parts it, and forgets those that do not.
+/// Splits a part along the longest of its cuts that parts it, and forgets the cuts that do not. The part keeps what
+/// is left of the line, `other` gets the rest, and each the cuts within it.
 bool TriangleCutter::split(Part& part, Part& other) {
   while (!part.cuts.empty()) {
     const auto longest = std::ranges::max_element(
         part.cuts, {}, [](const Cut& cut) { return (cut.to - cut.from).squaredNorm(); });
+    // The longest first: it is the likeliest to cut all the way, so that the line, which goes on beyond its ends,
+    // cuts nothing in vain.
     const Cut line = *longest;
     *longest = part.cuts.back();
     part.cuts.pop_back();
@@ -147,6 +159,7 @@ bool TriangleCutter::split(Part& part, Part& other) {
     for (std::size_t i = 0; i < side.size(); ++i) {
       const std::size_t j = (i + 1) % side.size();
       const Place &a = part.corners[i], &b = part.corners[j];
+      // A corner on the line belongs to both.
       if (side[i] >= 0) left.corners.push_back(a);
       if (side[i] <= 0) other.corners.push_back(a);
       if ((side[i] > 0 && side[j] < 0) || (side[i] < 0 && side[j] > 0)) {
@@ -167,6 +180,7 @@ bool TriangleCutter::split(Part& part, Part& other) {
   return false;
 }
 
+/// The part in space.
 TriangleFace TriangleCutter::face(const Part& part) const {
   TriangleFace face;
   for (const Place& p : part.corners)
@@ -174,7 +188,8 @@ TriangleFace TriangleCutter::face(const Part& part) const {
   return face;
 }
 
-/// Where there are more than there may be faces, to hand all of them down would take far longer than to cut.
+/// Takes as many of the longest cuts as there may be faces: to hand all of them down would take far longer than to
+/// cut.
 std::vector<TriangleCutter::Cut> TriangleCutter::longest_cuts(std::size_t most) const {
   std::vector<Cut> cuts = cuts_;
   if (cuts.size() <= most) return cuts;
@@ -191,6 +206,7 @@ std::vector<TriangleFace> TriangleCutter::faces(
   std::vector<Part> parts = {{outline_, longest_cuts(most), area_of(outline_)}};
   const bool all_cuts = parts[0].cuts.size() == cuts_.size();
   while (!parts.empty()) {
+    // The largest part is the next to be cut, so that when no more faces may be made only small ones are uncut.
     std::ranges::pop_heap(parts, smaller);
     Part part = std::move(parts.back()), other;
     parts.pop_back();

@@ -15,18 +15,20 @@ struct TriangleFace {
   std::vector<Eigen::Vector3d> corners;
   bool whole = true;  ///< no other triangle crosses it
 
-  /// A place within.
+  /// The mean of the corners, which is within.
   Eigen::Vector3d middle() const;
+  /// Area in voxels².
   double area() const;
-  /// How far two of its corners lie apart at most.
+  /// The largest distance between two corners.
   double size() const;
-  /// How far a place within is from the border.
+  /// The distance of a place within from the border.
   double room_at(const Eigen::Vector3d& place) const;
 };
 
+/// Collects the lines that cut one triangle, and then cuts it. All in voxels.
 class TriangleCutter {
  public:
-  /// The triangle must have an area.
+  /// Prepares a triangle, which must have an area.
   explicit TriangleCutter(const Facet& triangle);
 
   /// Cuts the triangle where another one meets it: along the line in which they cross, along an edge that ends within a
@@ -34,10 +36,12 @@ class TriangleCutter {
   /// meet in a point or along the triangle's own border.
   void add(const Facet& other);
 
-  /// No more than `most` faces, the largest of which are cut first (an autopartition: Paterson & Yao 1990); those that
-  /// would have to be cut further are not whole. Only those are cut for which `matters` holds.
+  /// Cuts the triangle into no more than `most` faces, the largest of which are cut first (an autopartition: Paterson
+  /// & Yao 1990); those that would have to be cut further are not whole. Only faces for which `matters` holds are
+  /// cut.
   std::vector<TriangleFace> faces(std::size_t most,
                                   const std::function<bool(const TriangleFace&)>& matters) const;
+  /// Whether any line cuts the triangle.
   bool has_cuts() const { return !cuts_.empty(); }
 
  private:

@@ -22,7 +22,7 @@ struct Hinge {
 
   Hinge(const Vector3d& a, const Vector3d& b)
       : origin(a), middle(0.5 * (a + b)), along((b - a).stableNormalized()), length((b - a).norm()) {}
-  /// From the edge to a point, square to it.
+  /// The vector from the edge's line to a point, square to the line.
   Vector3d to(const Vector3d& point) const {
     const Vector3d way = point - origin;
     return way - way.dot(along) * along;
@@ -36,11 +36,13 @@ CellObstacles::Voxel cell_of(const Vector3d& place) {
   return {cell(0), cell(1), cell(2)};
 }
 
+/// Unit normal on the front of a triangle, from which it is wound counter-clockwise.
 Vector3d WallWalk::normal_of(std::uint32_t triangle) const {
   return Facet(soup_.corners(triangle)).normal().stableNormalized();
 }
 
 void WallWalk::add(const Place& place) {
+  // The first place on a side stands for all of it, also where other triangles cross it: so the walk ends.
   const bool front = normal_of(place.triangle).dot(place.up) > 0.0;
   if (known_.insert(std::uint64_t(place.triangle) * 2 + front).second) places_.push_back(place);
 }
@@ -55,6 +57,7 @@ void WallWalk::begin(const Vector3d& from, const Vector3d& way) {
 }
 
 std::optional<Vector3d> WallWalk::next() {
+  // Neighbours are looked for only when the place before has been of no use, so that a short walk stays cheap.
   if (given_ > 0) go_on_from(Place(places_[given_ - 1]));
   if (given_ == places_.size()) return std::nullopt;
   return places_[given_++].at;
@@ -66,7 +69,8 @@ void WallWalk::go_on_from(const Place& place) {
     if (const std::optional<Place> to = across(place, edge)) add(*to);
 }
 
-/// The middle of the next triangle around an edge, if it can be gone to.
+/// Finds the middle of the next triangle around an edge, if it can be gone to. Of all triangles at the edge the next
+/// one is at the least angle, measured from this triangle's plane through the space above it.
 std::optional<WallWalk::Place> WallWalk::across(const Place& from, std::size_t edge) {
   const Triangle t = soup_.triangle(from.triangle);
   const Facet facet(soup_.corners(from.triangle));
@@ -88,10 +92,13 @@ std::optional<WallWalk::Place> WallWalk::across(const Place& from, std::size_t e
     if (angle < 0.0) angle += 2.0 * std::numbers::pi;
     if (angle > least || (angle == least && (!next || number > next->triangle))) continue;
     least = angle;
+    // The side of the other triangle that faces the wedge between the two.
     const Vector3d up = std::sin(angle) * back - std::cos(angle) * from.up;
     next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
   }
   if (!next || least < kFolded) return std::nullopt;
+  // Over a place in the middle of the wedge, a hair off the edge; both halves of the way have to be free, for a
+  // triangle that shares no edge may cross the wedge.
   const Vector3d bridge = hinge.middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
   if (!obstacles_.is_free(from.at, bridge) || !obstacles_.is_free(bridge, next->at)) return std::nullopt;
   return next;

@@ -40,7 +40,8 @@ template <class Real>
   return y < 0 ? -angle : angle;
 }
 
-/// Van Oosterom & Strackee, The Solid Angle of a Plane Triangle, IEEE Trans. Biomed. Eng. 30(2), 1983, eq. 8.
+/// Adds a triangle's solid angle at each point: van Oosterom & Strackee, The Solid Angle of a Plane Triangle, IEEE
+/// Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop holds scalars alone, which the compiler can turn into lanes.
 template <class Real>
 [[gnu::always_inline]] inline void add_solid_angle(const PlacedTriangle<Real>& triangle,
                                                    const Targets& targets) {
@@ -64,6 +65,7 @@ template <class Real>
     const Real ab = ax * bx + ay * by + az * bz;
     const Real bc = bx * cx + by * cy + bz * cz;
     const Real ca = cx * ax + cy * ay + cz * az;
+    // The triple product of equation 8 by the triangle's plane, which is the same for all points.
     const Real volume = offset - (nx * x + ny * y + nz * z);
     sum[i] += float(2 * arctan2(volume, la * (lb * lc + bc) + lb * ca + lc * ab));
   }
@@ -83,6 +85,8 @@ HERMESH_LANES void add_triangle(const PlacedTriangle<double>& triangle, const Ta
 // ∫n·R/|R|³ − 3 RᵀBR/|R|⁵ + 15/2 C(R,R,R)/|R|⁷.
 HERMESH_LANES void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets) {
   float b[6], c[10];
+  // A symmetric tensor's components off the diagonal count as often as their indices can be ordered: 2 of a pair; 3
+  // of a triple with two equal, 6 of one with none.
   for (int k = 0; k < 6; ++k) b[k] = multipole.second[k] * (k == 1 || k == 2 || k == 4 ? -6.0f : -3.0f);
   for (int k = 0; k < 10; ++k)
     c[k] = multipole.third[k] * (k == 0 || k == 6 || k == 9 ? 7.5f : k == 4 ? 45.0f : 22.5f);

@@ -5,9 +5,9 @@
 
 namespace hermesh::winding {
 
-/// Points relative to an origin near them, and for each the solid angle that it was found to be surrounded by
-/// so far, 4π for once around. Every point has its own sum, so that the order of additions, and with it every
-/// bit, is the same for any width of the lanes.
+/// Points relative to an origin near them, in voxels, and for each the solid angle that it was found to be surrounded
+/// by so far, 4π for once around. Every point has its own sum, so that the order of additions, and with it every bit,
+/// is the same for any width of the lanes.
 struct Targets {
   const float *x, *y, *z;
   float* solid_angle;
@@ -33,13 +33,16 @@ struct PlacedTriangle {
   Real offset;        ///< normal · corner
 };
 
-/// Adds what the triangles in a box make up, seen from points outside its sphere.
+/// Adds the solid angle of the triangles in a box, seen from points outside its sphere.
+/// @param multipole the field of the triangles
 /// @param centre of the box relative to the targets' origin
+/// @param targets the points, and their sums
 void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets);
 
 /// Adds the solid angle of a triangle to within 3e-6; nothing for a point in its plane but outside it.
 void add_triangle(const PlacedTriangle<float>& triangle, const Targets& targets);
-/// The same in double precision, for triangles that are large beside the distances between the points.
+/// Adds the solid angle of a triangle in double precision, for triangles that are large beside the distances between
+/// the points.
 void add_triangle(const PlacedTriangle<double>& triangle, const Targets& targets);
 
 }  // namespace hermesh::winding

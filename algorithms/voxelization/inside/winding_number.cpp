@@ -31,6 +31,7 @@ constexpr int kTriple[10][3] = {{0, 0, 0}, {0, 0, 1}, {0, 0, 2}, {0, 1, 1}, {0, 
 /// Where a pair's component is in kPair's order.
 constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
+/// Centre of a box of the tree in voxels.
 Eigen::Vector3d box_centre(const TriangleTree& tree, std::size_t box) {
   const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
   Eigen::Vector3d centre;
@@ -39,6 +40,7 @@ Eigen::Vector3d box_centre(const TriangleTree& tree, std::size_t box) {
   return centre;
 }
 
+/// Half the diagonal of a box in voxels.
 double box_radius(const TriangleTree& tree, std::size_t box) {
   const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
   double squared = 0.0;
@@ -49,12 +51,14 @@ double box_radius(const TriangleTree& tree, std::size_t box) {
   return 0.5 * std::sqrt(squared) * tree.scale();
 }
 
+/// Whether a place of a pack has no box: its lower corner is above its upper one.
 bool is_empty(const TriangleTree& tree, std::size_t box) {
   const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
   return pack.lower[0][box % kFan] > pack.upper[0][box % kFan];
 }
 
-/// Moments about a centre: of dipoles n at u the symmetric parts of n, n u and n u u, in voxels.
+/// Moments about a centre: the symmetric parts of n, n u and n u u summed over dipoles n at u, in voxels. The field
+/// is a contraction with symmetric tensors, so that other parts have no effect.
 struct Moments {
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   std::array<double, 6> second{};
@@ -72,7 +76,8 @@ struct Moments {
     }
   }
 
-  /// Adds the moments of a child whose centre is at s.
+  /// Adds the moments of a child whose centre is at s: those about the child's centre, moved by the binomial
+  /// expansion of u + s. The child's are for a radius of 1, so each order gets its power of the radius back.
   void add_child(const Multipole& child, const Eigen::Vector3d& s) {
     const double r = child.radius;
     const double r2 = r * r, r3 = r2 * r, r4 = r2 * r2;
@@ -85,7 +90,8 @@ struct Moments {
     }
   }
 
-  /// Takes the traces out, whose fields vanish, and scales to a radius of 1.
+  /// Takes the traces out, whose fields vanish, and scales to a radius of 1, so that single precision holds the
+  /// moments of any size of box.
   Multipole multipole(double radius) const {
     Multipole result;
     result.radius = static_cast<float>(radius);
@@ -108,7 +114,8 @@ struct Moments {
   }
 };
 
-/// Integrals up to second order are those of the midpoints of the three sides with equal weights.
+/// The multipole of a leaf's triangles. Integrals up to second order over a triangle are those of the midpoints of
+/// the three sides with equal weights, so each triangle becomes three dipoles without loss.
 Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> turns, std::size_t box) {
   const Eigen::Vector3d centre = box_centre(tree, box);
   Moments moments;
@@ -123,9 +130,11 @@ Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> 
     moments.add_dipole(third_of_area, (b + c) / 2);
     moments.add_dipole(third_of_area, (c + a) / 2);
   }
+  // The corners lie within the radius in spite of rounding to single precision.
   return moments.multipole(std::sqrt(squared) * (1 + 1e-7));
 }
 
+/// The multipole of a box from those of its children, without a look at the triangles.
 Multipole parent_multipole(const TriangleTree& tree, const std::vector<Multipole>& multipoles, BoxRef ref) {
   const Eigen::Vector3d centre = box_centre(tree, ref.box);
   const std::size_t first = tree.child_pack(ref) * kFan;
@@ -137,6 +146,7 @@ Multipole parent_multipole(const TriangleTree& tree, const std::vector<Multipole
     radius = std::max(radius, s.norm() + multipoles[child].radius);
     moments.add_child(multipoles[child], s);
   }
+  // Either sphere holds the triangles: the one around the children's spheres, and the one around the box.
   return moments.multipole(std::min(radius, box_radius(tree, ref.box)) * (1 + 1e-7));
 }
 
@@ -154,11 +164,13 @@ class Batch {
     for (std::size_t i = 0; i < count_; ++i) order_[i] = static_cast<std::uint16_t>(i);
     sort(points, 0, count_);
     for (std::size_t i = 0; i < count_; ++i) {
+      // About an origin among them, the points lose no more than 1e-7 of their extent in single precision.
       const Eigen::Vector3f p = (points[order_[i]] - origin_).cast<float>();
       x_[i] = p[0], y_[i] = p[1], z_[i] = p[2], sum_[i] = 0.0f;
     }
   }
 
+  /// Writes the numbers in the order in which the points were given.
   void evaluate(std::span<float> values) {
     std::vector<BoxRef> roots;
     push_children(tree_.packs().size() - 1, static_cast<std::uint32_t>(tree_.level_count() - 1), roots);
@@ -168,11 +180,12 @@ class Batch {
   }
 
  private:
-  /// Where a range of points is cut in two; full blocks give whole lanes.
+  /// Tells where a range of points is cut in two: full blocks of 16 give whole lanes.
   static std::size_t middle(std::size_t begin, std::size_t end) {
     return begin + std::min((end - begin + 31) / 32 * 16, end - begin);
   }
 
+  /// Orders a range so that each half is compact. Equal coordinates are told apart by number: the order is unique.
   void sort(std::span<const Eigen::Vector3d> points, std::size_t begin, std::size_t end) {
     if (end - begin <= kGroup) return;
     Bounds box;
@@ -188,6 +201,7 @@ class Batch {
     sort(points, cut, end);
   }
 
+  /// Adds the boxes of a pack; those that are empty, or hold a mere point, have no field.
   void push_children(std::size_t pack, std::uint32_t level, std::vector<BoxRef>& boxes) const {
     for (std::size_t k = 0; k < kFan; ++k)
       if (multipoles_[pack * kFan + k].radius > 0)
@@ -207,10 +221,12 @@ class Batch {
       boxes.pop_back();
       const Multipole& multipole = multipoles_[ref.box];
       const Eigen::Vector3d centre = box_centre(tree_, ref.box) - origin_;
+      // From the nearest point of the range's box, so that what is far from it is far from every point.
       const double away = (centre - centre.cwiseMax(lowest).cwiseMin(highest)).norm();
       if (away >= far_ * multipole.radius) {
         const Eigen::Vector3f c = centre.cast<float>();
         if (away < kVeryFar * multipole.radius) add_multipole(multipole, c.data(), targets);
+      // A box that is large beside the range would not become far if the range were halved, so it is opened.
       } else if (ref.level > 0 && (last || multipole.radius > extent)) {
         push_children(tree_.child_pack(ref), ref.level - 1, boxes);
       } else if (last) {
@@ -219,12 +235,14 @@ class Batch {
         later.push_back(ref);
       }
     }
+    // Every point adds the same boxes in the same order on any machine: which depends on the batch alone.
     if (last || later.empty()) return;
     const std::size_t cut = middle(begin, end);
     descend(begin, cut, later);
     descend(cut, end, std::move(later));
   }
 
+  /// The box of a range of points, relative to the batch's origin.
   static std::pair<Eigen::Vector3d, Eigen::Vector3d> box(const Targets& targets) {
     const float* coordinates[3] = {targets.x, targets.y, targets.z};
     Eigen::Vector3d lowest, highest;
@@ -235,6 +253,7 @@ class Batch {
     return {lowest, highest};
   }
 
+  /// Adds the exact solid angles of a leaf's triangles; one that is turned over has two corners swapped.
   void add_leaf(std::size_t box, const Targets& targets) const {
     for (const std::uint32_t t : tree_.leaf(box)) {
       const int turn = turns_.empty() ? 1 : turns_[t];
@@ -242,6 +261,7 @@ class Batch {
       const Eigen::Vector3d a = tree_.corner(t, 0) - origin_;
       const Eigen::Vector3d b = tree_.corner(t, turn > 0 ? 1 : 2) - origin_;
       const Eigen::Vector3d c = tree_.corner(t, turn > 0 ? 2 : 1) - origin_;
+      // Corners far outside the batch would lose in single precision what tells the samples apart.
       const double reach = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
       if (reach <= kWide * kWide * extent_ * extent_)
         add_triangle(placed<float>(a, b, c), targets);
@@ -280,6 +300,8 @@ class Batch {
 
 WindingNumber::WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns, double far)
     : tree_(tree), turns_(turns), far_(far), multipoles_(tree.packs().size() * kFan) {
+  // Level by level from the leaves up: the boxes of one depend only on those of the level below, and not on each
+  // other.
   for (std::uint32_t level = 0; level < tree.level_count(); ++level) {
     const std::size_t end = level + 1 < tree.level_count() ? tree.first_pack(level + 1) : tree.packs().size();
     tbb::parallel_for(tree.first_pack(level) * kFan, end * kFan, [&](std::size_t box) {

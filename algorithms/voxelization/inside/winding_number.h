@@ -23,24 +23,31 @@ class WindingNumber {
   /// How many radii away a box counts as far.
   static constexpr double kFar = 2.0;
 
-  /// @param turns for each triangle 1 as given, −1 turned over, 0 left out (Orientation::turns); empty:
-  /// all 1.
+  /// @param tree the triangles
+  /// @param turns for each triangle 1 as given, −1 turned over, 0 left out (Orientation::turns); empty: all 1
+  /// @param far how many radii away a box counts as far
   explicit WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns = {},
                          double far = kFar);
 
-  /// At a point of index space. On a triangle, one of the values on its two sides.
+  /// The number at a point in voxels relative to the mesh's origin. On a triangle, one of the values on its two
+  /// sides.
   double at(const Eigen::Vector3d& p) const;
-  /// At many points near each other, such as a block's samples in any order: they share one descent.
+  /// The numbers at many points near each other, such as a block's samples in any order: they share one descent.
   /// Positions count to 1e-7 of the extent of each 512 consecutive points.
+  /// @param points in voxels relative to the mesh's origin
   /// @param values as many as points
   void at(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
     evaluate(points, values, far_);
   }
-  /// The same with an error that is some sixty times smaller, in ten times the time or more.
+  /// The numbers at many points, as at() gives them, with an error that is some sixty times smaller, in ten times the
+  /// time or more.
+  /// @param points in voxels relative to the mesh's origin
+  /// @param values as many as points
   void at_finely(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
     evaluate(points, values, 4.0 * far_);
   }
 
+  /// Bytes that the multipoles take.
   std::size_t byte_size() const { return multipoles_.size() * sizeof(winding::Multipole); }
 
  private:
@@ -52,8 +59,12 @@ class WindingNumber {
   std::vector<winding::Multipole> multipoles_;  ///< by box number
 };
 
-/// The sum over all triangles by the formula of van Oosterom & Strackee in double precision, in linear time.
-/// @param scale voxels per unit of the points; p is in voxels
+/// The winding number as a sum over all triangles by the formula of van Oosterom & Strackee in double precision, in
+/// linear time.
+/// @param points in world units
+/// @param triangles by the numbers of their points
+/// @param scale voxels per unit of the points
+/// @param p a place in voxels
 double exact_winding_number(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles,
                             double scale, const Eigen::Vector3d& p);
 

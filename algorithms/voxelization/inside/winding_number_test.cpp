@@ -78,7 +78,7 @@ std::vector<Eigen::Vector3d> block_at(const Eigen::Vector3d& lower) {
   return points;
 }
 
-/// Largest error of single queries and of blocks around the same places.
+/// The largest error of single queries and of blocks around the same places.
 double largest_error(const Soup& soup, std::span<const Eigen::Vector3d> places) {
   const TriangleTree tree(soup.points, soup.triangles, 1.0);
   const WindingNumber fast(tree);

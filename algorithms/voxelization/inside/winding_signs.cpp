@@ -12,14 +12,15 @@
 namespace hermesh {
 namespace {
 
-/// Components whose winding number is this near ½ have every voxel asked.
+/// Components whose winding number is this near ½ have every voxel asked. The number of a component beside a closed
+/// surface is whole but for 0.01, so that only holes are within.
 constexpr float kDoubt = 0.25f;
 /// Voxels whose number is this near ½, twice its error, are asked once more.
 constexpr float kError = 0.02f;
 
 /// Samples this near to a triangle, in voxels, are asked about one by one.
 constexpr double kOnSurface = 1e-4;
-/// 0 to 511.
+/// All places of a block, 0 to 511.
 constexpr std::array<unsigned, 512> kAllPlaces = [] {
   std::array<unsigned, 512> places{};
   for (unsigned i = 0; i < 512; ++i) places[i] = i;
@@ -36,17 +37,19 @@ unsigned first_voxel(const VoxelBits& bits) {
   return 0;
 }
 
+/// The place whose side a voxel has, in voxels.
 Eigen::Vector3d voxel_at(const BlockAt& block, unsigned place) {
   return side_place(block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7),
                     block[2] * 8.0 + double(place & 7));
 }
 
-/// A block that is asked voxel by voxel.
+/// A block every voxel of which was asked, with its winding numbers and the sides that they give.
 struct Asked {
   std::unique_ptr<Samples> winding;
   VoxelBits inside;
 };
 
+/// One run of winding_signs().
 class WindingSigns {
  public:
   WindingSigns(const WindingNumber& winding, const BlockTable& table, const Band& band,
@@ -56,6 +59,8 @@ class WindingSigns {
   /// `rings`: how many blocks away from a cap its distance matters.
   Signs run(int rings) {
     ask_components();
+    // From the rims of holes the surface of ½ is followed block by block, until it ends at triangles. All blocks of a
+    // round are known before the next, so that the threads' order changes nothing.
     std::vector<BlockAt> doubtful = doubtful_blocks();
     while (!doubtful.empty()) {
       ask(doubtful);
@@ -70,7 +75,7 @@ class WindingSigns {
   }
 
  private:
-  /// The voxel of a component that is farthest from the triangles, where the number is least in doubt.
+  /// Finds the voxel of a component that is farthest from the triangles, where the number is least in doubt.
   unsigned representative(std::size_t block, const VoxelBits& voxels) const {
     unsigned best = first_voxel(voxels);
     if (!band_.leaves[block]) return best;
@@ -80,6 +85,7 @@ class WindingSigns {
     return best;
   }
 
+  /// Asks once for each component: without a triangle between, all its voxels have nearly the same number.
   void ask_components() {
     value_.resize(regions_.components.size());
     parallel_blocks(band_.blocks.size(), context_, [&](std::size_t i) {
@@ -89,6 +95,7 @@ class WindingSigns {
         places.push_back(representative(i, regions_.components[c].voxels));
         points.push_back(voxel_at(band_.blocks[i], places.back()));
       }
+      // A block's components are consecutive, so each block writes to a range for itself.
       const std::span<float> values(value_.data() + regions_.first[i], points.size());
       winding_.at(points, values);
       ask_singly(distances_of(std::uint32_t(i)), places, points, values);
@@ -98,8 +105,8 @@ class WindingSigns {
   bool sure(std::uint32_t component) const { return std::abs(value_[component] - 0.5f) > kDoubt; }
   bool side(std::uint32_t component) const { return value_[component] > 0.5f; }
 
-  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the
-  /// number is another one there, and changes within the component.
+  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the number
+  /// changes within the component, which is in doubt whatever its one voxel says.
   bool goes_round(std::uint32_t block, std::uint32_t component) const {
     const VoxelBits& voxels = regions_.components[component].voxels;
     const auto& crossed = band_.crossed[block].word;
@@ -112,7 +119,7 @@ class WindingSigns {
     return false;
   }
 
-  /// Blocks with a component in doubt, or next to one on the other side although no triangle is between.
+  /// Lists the blocks with a component in doubt, or next to one on the other side although no triangle is between.
   std::vector<BlockAt> doubtful_blocks() const {
     std::vector<char> doubtful(band_.blocks.size(), 0);
     BlockFinder finder(table_);
@@ -132,6 +139,7 @@ class WindingSigns {
     return result;
   }
 
+  /// Whether components of two neighbouring blocks are on different sides and connected across the face between.
   bool disagree(std::uint32_t lower, std::uint32_t upper, int axis) const {
     VoxelBits crossed;
     for (std::size_t x = 0; x < 8; ++x) crossed[x] = band_.crossed[lower].word[axis][x];
@@ -159,6 +167,7 @@ class WindingSigns {
     return block != BlockTable::kNone && band_.leaves[block] ? band_.leaves[block]->buffer().data() : nullptr;
   }
 
+  /// Asks more finely about the voxels whose side the error of the first answer could have turned.
   void ask_again(const BlockAt& block, Samples& values) const {
     std::vector<Eigen::Vector3d> points;
     std::vector<unsigned> places;
@@ -172,6 +181,7 @@ class WindingSigns {
     for (std::size_t i = 0; i < places.size(); ++i) values[places[i]] = again[i];
   }
 
+  /// Asks for every voxel of the blocks. Threads write to `found`, and one thread fills the map.
   void ask(const std::vector<BlockAt>& blocks) {
     std::vector<Asked> found(blocks.size());
     tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
@@ -188,9 +198,9 @@ class WindingSigns {
     for (std::size_t i = 0; i < blocks.size(); ++i) asked_.emplace(blocks[i], std::move(found[i]));
   }
 
-  /// Neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: a side of the
-  /// block on which the sign changes without a triangle, or where the neighbour is believed to be on the
-  /// other side.
+  /// Finds the neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: across a side of
+  /// the block on which the sign changes without a triangle, or where the neighbour is believed to be on the other
+  /// side. The map gives them in ascending order.
   std::vector<BlockAt> next_blocks(const std::vector<BlockAt>& from) const {
     std::map<BlockAt, int> next;
     for (const BlockAt& block : from) {
@@ -212,6 +222,7 @@ class WindingSigns {
     return result;
   }
 
+  /// Whether two samples on either side of a face differ without a triangle between.
   bool leads_to(const BlockAt& block, const BlockAt& at, int axis, int side) const {
     const BlockAt& lower = side ? block : at;
     const VoxelBits crossed = crossed_along(lower, axis);
@@ -227,6 +238,7 @@ class WindingSigns {
     return bits;
   }
 
+  /// What is known of a block's sides so far: voxel by voxel if it was asked, else by its components.
   VoxelBits inside_of(const BlockAt& block) const {
     if (const auto asked = asked_.find(block); asked != asked_.end()) return asked->second.inside;
     VoxelBits bits{};
@@ -241,10 +253,12 @@ class WindingSigns {
   // ---- Caps: the dual of the grid edges on which the number passes ½ and no triangle is, a quad an edge,
   // its corners the means of what crosses the cells around it (surface nets, Gibson 1998).
 
+  /// The crossings of a cell's edges, whose mean is the cap's vertex there.
   struct Cell {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
   };
+  /// An edge that passes ½, by its lower sample.
   struct CapEdge {
     std::array<std::int32_t, 3> lower;
     int axis;
@@ -280,6 +294,7 @@ class WindingSigns {
         const bool last = (place / stride) % 8 == 7;
         // Beyond what was asked nothing changes but at triangles.
         if (last && upper == asked_.end()) continue;
+        // The number jumps at a triangle by 1, and passes ½ there without being a cap.
         if (on_surface(block, place) ||
             on_surface(last ? above : block, last ? place - 7 * stride : place + stride))
           continue;
@@ -290,6 +305,7 @@ class WindingSigns {
         CapEdge edge{{}, axis};
         // Windings are taken a few millionths of a voxel beside the samples (SampleSide), on either side of whole numbers.
         for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(std::lround(crossing[a]));
+        // Linear between the two numbers, as a level set's crossing is.
         crossing[axis] += std::clamp((0.5 - double(from)) / (double(to) - double(from)), 0.0, 1.0);
         edges.push_back(edge);
         for_each_cell(edge, [&](const std::array<std::int32_t, 3>& cell) {
@@ -328,8 +344,8 @@ class WindingSigns {
     }
   }
 
-  /// Blocks around those that were asked, on one side of the surface as a whole unless they were asked
-  /// themselves.
+  /// Signs the blocks around those that were asked, which distances to caps reach: each is on one side of the surface
+  /// as a whole unless it was asked itself, so that one of its voxels speaks for all.
   void sign_beyond(int rings, std::map<BlockAt, VoxelBits>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();

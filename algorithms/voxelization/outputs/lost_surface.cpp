@@ -28,6 +28,7 @@ constexpr double kSameDistance =
     1e-3;                           ///< voxels: up to here a sample's distance is that to the place's polygon
 constexpr double kTouching = 1e-3;  ///< voxels: what is thinner is no wall to be kept
 
+/// A place of the surface without a change of sign around it.
 struct LostPlace {
   Vector3d at, normal;  ///< voxels; of unit length
 };
@@ -38,6 +39,7 @@ struct Part {
   std::vector<LostPlace> places;
 };
 
+/// One run of find_lost_surface(). It works in voxels of the grid.
 class Search {
  public:
   Search(const PolygonMesh& mesh, const LevelSet& level_set, bool boundary_distances,
@@ -55,6 +57,7 @@ class Search {
   }
 
   LostSurface run() {
+    // Area that a place stands for: a voxel², or more of a surface so large that there would be too many.
     const double share = std::max(1.0, total_area() / kMostPlaces);
     std::vector<Part> parts((triangles_.size() + kChunk - 1) / kChunk);
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
@@ -64,6 +67,8 @@ class Search {
         look(Facet(corner(t, 0), corner(t, 1), corner(t, 2)), share, samples, parts[i]);
     });
     LostSurface result;
+    // One thread adds up the parts in their order, which the size of the mesh alone decides: the sums are the same at
+    // any thread count.
     std::vector<LostPlace> places;
     for (const Part& part : parts) {
       result.area += part.area * voxel_size_ * voxel_size_;
@@ -77,11 +82,12 @@ class Search {
  private:
   using Samples = openvdb::FloatGrid::ConstUnsafeAccessor;
 
-  /// In voxels of the grid, whose placement need not be the mesh's own.
+  /// A corner in voxels of the grid, whose placement need not be the mesh's own.
   Vector3d corner(std::size_t triangle, std::size_t i) const {
     return origin_ + scale_ * mesh_.points[triangles_[triangle][i]].cast<double>();
   }
 
+  /// Area of the mesh in voxels², by parts of a fixed size.
   double total_area() const {
     std::vector<double> area((triangles_.size() + kChunk - 1) / kChunk, 0.0);
     tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t i) {
@@ -98,7 +104,8 @@ class Search {
     return sum / (voxel_size_ * voxel_size_);
   }
 
-  /// Places at the points of Roberts' sequence R2, which fill a triangle evenly whatever their number.
+  /// Looks at places of a triangle: its middle, or the points of Roberts' sequence R2, which fill it evenly whatever
+  /// their number.
   void look(const Facet& facet, double share, Samples& samples, Part& part) const {
     const Vector3d normal = facet.normal();
     const double area = 0.5 * normal.norm();
@@ -110,6 +117,7 @@ class Search {
       if (count > 1) {
         u = std::fmod(0.5 + double(i) * 0.7548776662466927, 1.0);
         v = std::fmod(0.5 + double(i) * 0.5698402909980532, 1.0);
+        // The far half of the parallelogram folds onto the triangle.
         if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
       }
       const Vector3d at =
@@ -123,6 +131,7 @@ class Search {
     }
   }
 
+  /// What a place is: shown by the level set, lost, or within the solid.
   enum class Verdict { kept, lost, inner };
 
   /// Whether the leaf that holds a cell's first corner holds all of them.
@@ -130,6 +139,7 @@ class Search {
     return (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
   }
 
+  /// Tells what a place is by the samples of its cell and of the ring of cells around it.
   Verdict look_around(const Vector3d& at, Samples& samples) const {
     const openvdb::Coord cell(int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z())));
     // All but a third of the cells have their corners in one leaf.
@@ -147,9 +157,11 @@ class Search {
             if ((samples.getValue(cell.offsetBy(x, y, z)) < 0.0f) != inside) return true;
       return false;
     };
+    // Samples −1 to 2 on each axis hold all that are within a voxel of the place.
     if (differs(0, 1) || differs(-1, 2)) return Verdict::kept;
     if (!inside) return Verdict::lost;
     if (!boundary_distances_) return Verdict::inner;
+    // A sample cannot be deeper than the place is away, if the polygon bounds the solid.
     for (int i = 0; i < 8; ++i) {
       const openvdb::Coord sample = cell.offsetBy(i & 1, i >> 1 & 1, i >> 2);
       const double away = (Vector3d(sample.x(), sample.y(), sample.z()) - at).norm();
@@ -158,6 +170,7 @@ class Search {
     return Verdict::lost;
   }
 
+  /// Measures the gaps at an even share of the lost places, and keeps the least.
   void find_thinnest(const std::vector<LostPlace>& places, LostSurface& result) const {
     const std::size_t step = (places.size() + kMostProbes - 1) / kMostProbes;
     std::vector<LostPlace> probes;
@@ -167,9 +180,11 @@ class Search {
     std::vector<double> thickness(probes.size(), kReach);
     tbb::parallel_for(std::size_t(0), probes.size(), [&](std::size_t i) {
       context_.check();
+      // A wall's other side is behind the place, a gap's before it.
       for (const double side : {-1.0, 1.0})
         thickness[i] = std::min(thickness[i], gap(tree, probes[i].at - origin_, side * probes[i].normal));
     });
+    // The first of equal ones, so that threads have no say.
     const auto least = std::min_element(thickness.begin(), thickness.end());
     if (*least >= kReach) return;
     const Vector3d& at = probes[std::size_t(least - thickness.begin())].at;
@@ -178,8 +193,8 @@ class Search {
     result.thickness = *least * voxel_size_;
   }
 
-  /// Those that may be within reach of one of the places: a tree of all of them would take longer than the
-  /// search where little is lost.
+  /// Selects the triangles that may be within reach of one of the places: a tree of all of them would take longer
+  /// than the search where little is lost.
   std::vector<Triangle> triangles_about(const std::vector<LostPlace>& places) const {
     // Cells as long as the reach: what is within reach of a place and no longer than it has all of its
     // corners within two cells of the place's.
@@ -202,13 +217,15 @@ class Search {
     const auto longest = static_cast<float>(kReach * voxel_size_);
     for (const Triangle& t : triangles_) {
       const Eigen::Vector3f &a = mesh_.points[t[0]], &b = mesh_.points[t[1]], &c = mesh_.points[t[2]];
+      // A triangle longer than a cell may come near a place with all corners far from it.
       const bool is_long = (a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c)).maxCoeff() > longest;
       if (near[t[0]] | near[t[1]] | near[t[2]] | is_long) result.push_back(t);
     }
     return result;
   }
 
-  /// How far it is from the place along a unit vector to the next triangle, in voxels, at most kReach.
+  /// The distance in voxels from the place along a unit vector to the next triangle, at most kReach. It begins a
+  /// little off the place, so that the place's own triangle does not count.
   static double gap(const TriangleTree& tree, const Vector3d& place, const Vector3d& along) {
     const Vector3d from = place + kOff * along, to = place + kReach * along;
     constexpr double kMargin = 1e-6;  // beyond what the boxes of slabs in a plane of samples are rounded by
@@ -241,6 +258,7 @@ std::string short_text(double value) {
 
 LostSurface find_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set,
                               bool distances_are_to_the_boundary, const RunContext& context) {
+  // Distances without sign, and fog, have no change of sign to look for.
   if (mesh.triangle_count() == 0 || level_set.grid().grid->getGridClass() != openvdb::GRID_LEVEL_SET)
     return {};
   return Search(mesh, level_set, distances_are_to_the_boundary, context).run();

@@ -15,6 +15,7 @@
 namespace hermesh {
 namespace {
 
+/// The point of side i–j that is nearest to p; its first end where the side has no length.
 TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& corners, int i,
                          int j) {
   const Eigen::Vector3d along = corners[j] - corners[i];
@@ -28,17 +29,20 @@ TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vecto
 
 // ---- What a voxel asks of an attribute.
 
+/// The closest point of one voxel.
 struct Foot {
   std::uint32_t voxel;  ///< in its leaf
   std::uint32_t triangle;
   TrianglePoint point;  ///< relative to the mesh's origin
 };
 
+/// Reads one attribute at closest points. It is copied into the function of a grid, and reads alone.
 class AttributeSampler {
  public:
   AttributeSampler(const PolygonMesh& mesh, const MeshAttribute& attribute)
       : mesh_(mesh), attribute_(attribute) {}
 
+  /// A component, interpolated (Aldén 2011, §5.2: barycentric interpolation of the closest point).
   double number(const Foot& foot, int component) const {
     const auto& values = std::get<std::vector<float>>(attribute_.values);
     const auto value = [&](int corner) {
@@ -48,16 +52,19 @@ class AttributeSampler {
     const Eigen::Vector3d& w = foot.point.weights;
     return w[0] * value(0) + w[1] * value(1) + w[2] * value(2);
   }
+  /// The number of the nearest corner: between two materials there is no third.
   std::int32_t whole(const Foot& foot) const {
     int corner = 0;
     foot.point.weights.maxCoeff(&corner);
     return std::get<std::vector<std::int32_t>>(attribute_.values)[place(foot.triangle, corner)];
   }
+  /// The first three components, with 0 for those that are missing.
   Eigen::Vector3d vector(const Foot& foot) const {
     Eigen::Vector3d result = Eigen::Vector3d::Zero();
     for (int i = 0; i < std::min(3, attribute_.components); ++i) result[i] = number(foot, i);
     return result;
   }
+  /// A direction, of unit length. Opposite normals of the corners may leave next to nothing of their mean.
   Eigen::Vector3d normal(const Foot& foot) const {
     constexpr double kCancelled = 1e-6;
     const Eigen::Vector3d sum = vector(foot);
@@ -65,10 +72,12 @@ class AttributeSampler {
   }
 
  private:
-  /// Of the first component in the array of values.
+  /// Place of the first component of an element in the array of values.
   std::size_t place(std::uint32_t triangle, int corner) const {
     return element(triangle, std::size_t(corner)) * std::size_t(attribute_.components);
   }
+  /// Number of the point, corner or polygon that a corner of a triangle has its values from. Corners and polygons are
+  /// those of all triangles, then those of all quads.
   std::size_t element(std::size_t triangle, std::size_t corner) const {
     if (attribute_.domain == AttributeDomain::point) return IndexSoup(mesh_, 1.0).triangle(triangle)[corner];
     const std::size_t triangles = mesh_.triangles.size();
@@ -79,6 +88,7 @@ class AttributeSampler {
     if (polygon) return triangles + quad;
     return 3 * triangles + 4 * quad + (half % 2 == 1 && corner > 0 ? corner + 1 : corner);
   }
+  /// The triangle's own unit normal, or zero where it has no area.
   Eigen::Vector3d triangle_normal(std::uint32_t triangle) const {
     const auto [a, b, c] = IndexSoup(mesh_, 1.0).triangle(triangle);
     const auto point = [&](std::uint32_t i) { return Eigen::Vector3d(mesh_.points[i].cast<double>()); };
@@ -91,6 +101,7 @@ class AttributeSampler {
 
 // ---- A grid that is being filled.
 
+/// A grid of any type while it is filled. One leaf is for one thread; different leaves may be filled at a time.
 class Layer {
  public:
   virtual ~Layer() = default;
@@ -99,12 +110,14 @@ class Layer {
   virtual openvdb::GridBase::Ptr finish(const std::string& name) = 0;
 };
 
-/// `Sample` gives the value of a Foot.
+/// A layer of one type of grid. `Sample` gives the value of a Foot.
 template <class Grid, class Sample>
 class SampledLayer final : public Layer {
  public:
   using Tree = typename Grid::TreeType;
   SampledLayer(const openvdb::Int32Grid& nearest, typename Grid::ValueType background, Sample sample)
+      // The topology is that of the triangles from the start, so that filling in adds no node, and leaf i is the same
+      // block in all layers.
       : grid_(Grid::create(std::make_shared<Tree>(nearest.tree(), background, openvdb::TopologyCopy()))),
         sample_(std::move(sample)) {
     grid_->setTransform(nearest.transform().copy());
@@ -134,6 +147,7 @@ std::unique_ptr<Layer> make_layer(const openvdb::Int32Grid& nearest, typename Gr
   return std::make_unique<SampledLayer<Grid, Sample>>(nearest, background, std::move(sample));
 }
 
+/// A layer, and what the grid says of itself.
 struct NamedLayer {
   std::string name;
   openvdb::VecType kind = openvdb::VEC_INVARIANT;
@@ -144,6 +158,7 @@ struct NamedLayer {
 
 openvdb::Vec3d to_vec3d(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
+/// Points, which a program that moves the grid has to move along: an absolute vector in world space.
 NamedLayer closest_point_layer(const openvdb::Int32Grid& nearest) {
   const auto position = [](const Foot& foot) { return openvdb::Vec3s(to_vec3d(foot.point.position)); };
   return {"closest-point",
@@ -153,6 +168,7 @@ NamedLayer closest_point_layer(const openvdb::Int32Grid& nearest) {
           make_layer<openvdb::Vec3SGrid>(nearest, openvdb::Vec3s(0.0f), position)};
 }
 
+/// The attribute's name, out of the way of the voxelizer's own grids.
 std::string grid_name(const MeshAttribute& attribute) {
   constexpr std::array names = {"sdf", "udf", "fog", "hermite", "closest-point", "triangle-id"};
   return (std::ranges::find(names, attribute.name) != names.end() ? "attribute-" : "") + attribute.name;
@@ -162,6 +178,7 @@ bool is_normal(const MeshAttribute& attribute) {
   return attribute.components == 3 && (attribute.name == "normal" || attribute.name.ends_with("-normal"));
 }
 
+/// Adds the grids of one attribute, two where it has four components: OpenVDB has no vector of four.
 void add_layers(const PolygonMesh& mesh, const MeshAttribute& attribute, const openvdb::Int32Grid& nearest,
                 std::vector<NamedLayer>& layers) {
   const AttributeSampler sampler(mesh, attribute);
@@ -195,6 +212,7 @@ void add_layers(const PolygonMesh& mesh, const MeshAttribute& attribute, const o
 
 // ---- The work.
 
+/// Refuses an attribute that the sampler would read beyond its end, or that holds what is no number.
 void check(const PolygonMesh& mesh, const MeshAttribute& attribute) {
   const std::size_t polygons = mesh.triangles.size() + mesh.quads.size(),
                     corners = 3 * mesh.triangles.size() + 4 * mesh.quads.size();
@@ -220,6 +238,7 @@ struct Feet {
   std::vector<std::uint32_t> missing;
 };
 
+/// Finds the closest points of a leaf's voxels on the triangles that are known to be the nearest: no search.
 Feet find_feet(const PolygonMesh& mesh, const openvdb::Int32Tree::LeafNodeType& leaf, double voxel_size) {
   const IndexSoup soup(mesh, 1.0);
   Feet feet;
@@ -239,6 +258,7 @@ Feet find_feet(const PolygonMesh& mesh, const openvdb::Int32Tree::LeafNodeType& 
   return feet;
 }
 
+/// The layer's grid with its name, kind and labels.
 openvdb::GridBase::Ptr finish(NamedLayer& layer) {
   const openvdb::GridBase::Ptr grid = layer.layer->finish(layer.name);
   grid->setVectorType(layer.kind);
@@ -253,6 +273,8 @@ openvdb::GridBase::Ptr finish(NamedLayer& layer) {
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c) {
   const std::array<Eigen::Vector3d, 3> corners = {a, b, c};
+  // The best of the three sides, then the foot of the perpendicular, if it lies within: on a degenerate triangle the
+  // sides alone are right.
   TrianglePoint best = on_segment(p, corners, 0, 1);
   const auto offer = [&](const TrianglePoint& other) {
     if ((other.position - p).squaredNorm() < (best.position - p).squaredNorm()) best = other;
@@ -263,6 +285,7 @@ TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, 
   Eigen::Vector3d weights;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &u = corners[(i + 1) % 3], &v = corners[(i + 2) % 3];
+    // The part of the area opposite corner i, in proportion; projecting p first would change nothing.
     weights[i] = (v - u).cross(p - u).dot(normal);
   }
   // On a sliver the weights may be rounded; the point is one of the triangle all the same, and only as good
@@ -275,6 +298,7 @@ TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, 
 }
 
 std::size_t bytes_per_voxel(const MeshAttribute& attribute) {
+  // Two components become a vector of three.
   return 4 * std::size_t(attribute.components == 2 ? 3 : attribute.components);
 }
 
@@ -292,6 +316,7 @@ std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mes
   }
   std::vector<const openvdb::Int32Tree::LeafNodeType*> leaves;
   nearest.tree().getNodes(leaves);
+  // Closest points once a leaf, for all grids.
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const Feet feet = find_feet(mesh, *leaves[i], voxel_size);
     for (const NamedLayer& layer : layers) {

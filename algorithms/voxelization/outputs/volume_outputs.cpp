@@ -26,7 +26,8 @@ constexpr const char* kNames =
 
 // ---- Volumes from the distances.
 
-/// Replaces every value, those of tiles and inactive ones included; `active` says which are active then.
+/// Replaces every value, those of tiles and inactive ones included; `active` says which are active then. The leaves
+/// are for all threads, each leaf for one; the few tiles above them for the thread that calls.
 template <class Map, class Active>
 void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Active active) {
   std::vector<openvdb::FloatTree::LeafNodeType*> leaves;
@@ -40,6 +41,7 @@ void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Ac
     }
   });
   auto tile = tree.beginValueAll();
+  // The iterator must stop above the leaves, whose values are new already.
   tile.setMaxDepth(openvdb::FloatTree::ValueAllIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) {
     const float value = map(*tile);
@@ -49,18 +51,21 @@ void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Ac
   }
 }
 
+/// Distances without sign, of a band that has signs. The background is positive already.
 openvdb::FloatGrid::Ptr make_udf(const openvdb::FloatGrid& sdf, RunContext& context) {
   const Stage stage(context, "udf");
   const openvdb::FloatGrid::Ptr grid = sdf.deepCopy();
   map_values(
       grid->tree(), context, [](float distance) { return std::abs(distance); },
+      // What is near the surface is on both sides, so the same voxels stay active.
       [](float, bool on) { return on; });
   grid->setName("udf");
   grid->setGridClass(openvdb::GRID_UNKNOWN);  // programs take a level set to have signs
   return grid;
 }
 
-/// From 1 at the inner end of the band to 0 at the surface, or at the outer end.
+/// Fog (§5.6): 1 inside, and a linear ramp from 1 at the inner end of the band to 0 at the surface, or at the outer
+/// end of the band.
 openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOptions& options, bool exterior,
                                  RunContext& context) {
   const Stage stage(context, "fog");
@@ -71,11 +76,14 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   map_values(
       grid->tree(), context,
       [=](float distance) {
+        // Exactly 1 beyond the band, where division might leave a little less.
         if (distance <= -inner) return 1.0f;
         if (distance < 0.0f && distance >= -on_surface) distance = 0.0f;  // a sample on the surface, which is no depth
         return std::clamp((outer - distance) / (outer + inner), 0.0f, 1.0f);
       },
       [](float density, bool) { return density > 0.0f; });
+  // The background was the exterior width, and inactive tiles of it are 0 by now; pruning makes tiles of leaves that
+  // are all 1 or all 0.
   openvdb::tools::changeBackground(grid->tree(), 0.0f);
   openvdb::tools::prune(grid->tree());
   grid->setName("fog");
@@ -83,6 +91,8 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   return grid;
 }
 
+/// The nearest triangles by the numbers that the user knows them by. A copy, for the other grids are made from
+/// triangulated()'s.
 openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
                                          const std::vector<std::uint32_t>& numbers, RunContext& context) {
   if (numbers.empty()) return nearest;
@@ -96,12 +106,14 @@ openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
   return grid;
 }
 
+/// Exact hits of the polygons on the grid's edges whose ends differ in sign.
 FloatHermite make_hermite(const openvdb::FloatGrid::Ptr& sdf, const PolygonMesh& mesh, RunContext& context) {
   return sample_polygons(make_level_set(sdf), 0.0, mesh, context);
 }
 
 // ---- What is asked for.
 
+/// The attributes asked for, in the order of the mesh, each once however often it is named.
 std::vector<const MeshAttribute*> chosen_attributes(const PolygonMesh& mesh, const VolumeRequest& request) {
   std::vector<const MeshAttribute*> chosen;
   std::string names;
@@ -117,6 +129,7 @@ std::vector<const MeshAttribute*> chosen_attributes(const PolygonMesh& mesh, con
   return chosen;
 }
 
+/// Refuses what is made of an inside if there is none. It is asked twice: before the work, and once it is known.
 void check_signs(const VolumeRequest& request, bool is_signed) {
   if (is_signed) return;
   for (const auto& [asked, name] : {std::pair(request.fog, "fog"), std::pair(request.hermite, "hermite")})
@@ -125,7 +138,8 @@ void check_signs(const VolumeRequest& request, bool is_signed) {
                   " needs an inside, but the distances have no sign; leave it out");
 }
 
-/// Beyond what the distances alone take.
+/// Bytes beyond those that the distances alone take: leaves of 512 values for each grid, and for the triangles that
+/// some are made from.
 double bytes_of_outputs(const VolumeRequest& request, const std::vector<const MeshAttribute*>& attributes,
                         double leaves) {
   std::size_t bytes = (request.udf ? 4 : 0) + (request.fog ? 4 : 0) +
@@ -136,6 +150,7 @@ double bytes_of_outputs(const VolumeRequest& request, const std::vector<const Me
   return 512.0 * leaves * double(bytes);
 }
 
+/// Refuses grids that together need more memory than there is, before the work begins. Unknown memory is enough.
 void check_fits(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
                 const std::vector<const MeshAttribute*>& attributes) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
@@ -184,6 +199,7 @@ VolumeRequest parse_volume_request(const std::string& list) {
     else
       throw Error("there is no grid '" + name + "'; choose of " + kNames);
   }
+  // getline() takes a comma at the end for the end of the list, and says nothing of the name that is missing.
   if (list.empty() || list.back() == ',')
     throw Error("a name is missing in the list of grids; choose of " + std::string(kNames));
   return request;
@@ -193,8 +209,10 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
                                   const VolumeRequest& request, RunContext& context) {
   const std::vector<const MeshAttribute*> attributes = chosen_attributes(mesh, request);
   check_signs(request, options.signs != SignRule::none);
+  // For the distances alone voxelize() does the same.
   if (!request.only_sdf()) check_fits(mesh, options, request, attributes);
 
+  // The triangles cost a number a voxel, so they are kept only where something is made from them.
   VoxelizeOptions with_nearest = options;
   with_nearest.nearest = request.triangle_id || request.closest_point || !attributes.empty();
   const Voxelization made = voxelize(mesh, with_nearest, context);
@@ -202,6 +220,7 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
 
   VolumeOutputs outputs;
   outputs.active_voxels = made.distance->activeVoxelCount();
+  // Without signs the distances themselves are "udf", and there is no other grid to make of them.
   if (request.sdf || (request.udf && !made.is_signed)) outputs.grids.push_back(made.distance);
   if (request.udf && made.is_signed) outputs.grids.push_back(make_udf(*made.distance, context));
   if (request.triangle_id) outputs.grids.push_back(make_triangle_id(made.nearest, request.triangle_numbers, context));
@@ -215,6 +234,7 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
 }
 
 std::filesystem::path hermite_path(const std::filesystem::path& path) {
+  // The extension stays last, so that the file is still known for a .vdb.
   std::filesystem::path beside = path;
   return beside.replace_extension(".hermite" + path.extension().string());
 }
@@ -228,6 +248,7 @@ void write_volume_outputs(const std::filesystem::path& path, const VolumeOutputs
     volumes.commit();
     return;
   }
+  // Both are complete before either gets its name.
   AtomicFile hermite(hermite_path(path));
   write_hermite(hermite.path(), *outputs.hermite, context);
   commit_together(hermite, volumes);

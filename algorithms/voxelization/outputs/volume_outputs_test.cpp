@@ -50,7 +50,7 @@ Vector3d torus_point(const Vector3d& p) {
   return ring + kMinor * (p - ring).normalized();
 }
 
-/// surface_transfer_test.cpp looks at their values.
+/// The torus with attributes of every domain; surface_transfer_test.cpp looks at their values.
 PolygonMesh torus_with_attributes() {
   PolygonMesh mesh = torus(48, 24);
   const std::size_t points = mesh.points.size(), polygons = mesh.quads.size();
@@ -159,7 +159,7 @@ TEST_F(VolumeOutputsTest, DistancesOfATorus) {
   EXPECT_EQ(id->activeVoxelCount(), sdf->activeVoxelCount());
 }
 
-/// Without an inside all is outside, whether it was asked for or found.
+/// Without an inside all space is outside, whether no signs were asked for or none were found.
 TEST_F(VolumeOutputsTest, UnsignedDistancesAreAsWideAsTheExteriorBand) {
   PolygonMesh sheet;
   sheet.points = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
@@ -221,7 +221,7 @@ TEST_F(VolumeOutputsTest, WithoutSigns) {
 
 // ---- Fog.
 
-/// Along a line through the middle of the cube's side from x = −1 inwards, voxels of 1/8.
+/// The fog of a cube along a line through the middle of its side at x = −1 inwards, voxels of 1/8.
 struct FogAlongX {
   float value(int steps_inwards) const {
     return grid->tree().getValue(openvdb::Coord(-8 + steps_inwards, 0, 0));

@@ -7,7 +7,7 @@
 
 namespace hermesh::shell_kernels {
 
-/// At once, see Surface::certain.
+/// How many prisms are looked at together (see Surface::certain), and the floats in the longest vectors.
 constexpr int kMostPrisms = 2, kLargestVector = 8;
 
 /// How far a place is beyond each of a prism's three walls, above its lid and below its bottom; negative
@@ -33,31 +33,31 @@ enum Certain {
 /// A mesh with a point for most cells of a lattice, or several, and a quad for most edges that it crosses.
 struct Surface {
   const float *x, *y,
-      *z;  ///< of points, relative to the corners of their blocks; kLargestVector more can be read
+      *z;  ///< coordinates of points, relative to the corners of their blocks; kLargestVector more can be read
   const std::uint32_t (*quads)[4];
   const std::uint8_t*
-      upright;  ///< by quad: 1 if both triangles, 012 and 023, face up along the block's direction
-  /// By point; kLargestVector more can be written. Bit kMostPrisms c + p: c (Certain) is certain of prism p.
-  /// Only for the points of windows.
+      upright;  ///< 1 for quads whose triangles, 012 and 023, both face up along the block's direction
+  /// What is certain of each point of the windows; kLargestVector more can be written. Bit kMostPrisms c + p
+  /// says that c (a Certain) is certain of prism p.
   std::uint16_t* certain;
 };
 
-/// 8 words each for the cells and for the edges by first sample, of each layer bit 8y+z. Quads are in the
-/// order of samples, those of one sample in that of axes.
+/// A block of the lattice: 8 words each for the cells and for the edges by first sample, of each layer bit
+/// 8y+z. Quads are in the order of samples, those of one sample in that of axes.
 struct Block {
   const std::uint64_t* active;         ///< cells with a point
-  const std::uint32_t* points_before;  ///< by word of these, in the block
+  const std::uint32_t* points_before;  ///< points of the block before each word of `active`
   std::uint32_t first_point;
   std::uint32_t first_later, later_points;             ///< cells' further points: all of them are looked at
-  const std::uint64_t *crossing[3], *without_quad[3];  ///< by axis
+  const std::uint64_t *crossing[3], *without_quad[3];  ///< edges along each axis
   std::uint32_t first_quad;
-  std::uint16_t quads_before[8];  ///< by layer, in the block
+  std::uint16_t quads_before[8];  ///< quads of the block before each layer
 };
 
 /// The part of a block that is looked at. All corners of its quads must be among the points of some window.
 struct Window {
   struct Part {
-    std::uint64_t rows;  ///< of each layer
+    std::uint64_t rows;  ///< bits of each layer
     int first, end;      ///< layers
   };
   const Block* block;
@@ -70,7 +70,7 @@ struct Box {
   float lower[3], upper[3];
 };
 
-/// All relative to one place.
+/// What is asked of a surface. All coordinates are relative to one place.
 struct Scan {
   const Surface* surface;
   const Window* windows;  ///< ascending by first_point
@@ -89,17 +89,17 @@ struct Candidate {
       between[2];  ///< a bit a prism: those it may be in, and of which it is between lid and bottom
 };
 
-/// A bit a prism: one of the points in the own boxes is in it; one is between its walls, but above or below
-/// it.
+/// What a scan finds. In `inside` a bit a prism: one of the points in the own boxes is in it; in `beyond`:
+/// one is between its walls, but above or below it.
 struct Found {
   unsigned inside, beyond;
   int candidates;
 };
 
-/// @param out room for a candidate for each edge of the windows' blocks
+/// Finds candidates. `out` has room for a candidate for each edge of the windows' blocks.
 using Look = Found(const Scan& scan, Candidate* out);
 
-/// For the level of vector code that is chosen, see simd_level.h.
+/// The code for the level of vector code that is chosen, see simd_level.h.
 Look* chosen();
 
 }  // namespace hermesh::shell_kernels

@@ -11,7 +11,7 @@
 
 namespace hermesh::kernels {
 
-/// Lanes of a batch.
+/// Number of triangles in a batch, a lane each.
 inline constexpr int kBatch = 16;
 
 /// Corners of up to 16 triangles, in voxels, relative to a leaf's first voxel: corner[3 · corner +
@@ -20,12 +20,13 @@ struct Corners {
   alignas(64) double corner[9][kBatch];
 };
 
-/// Corners as the mesh has them, in its single precision: [3 · corner + axis][triangle].
+/// Corners of up to 16 triangles as the mesh has them, in world units and single precision: corner[3 · corner +
+/// axis][triangle].
 struct MeshCorners {
   alignas(64) float corner[9][kBatch];
 };
 
-/// From the mesh's units to voxels relative to a leaf's first voxel: corner · scale − origin.
+/// The change from the mesh's units to voxels relative to a leaf's first voxel: corner · scale − origin.
 struct LeafFrame {
   double scale;
   double origin[3];
@@ -33,8 +34,8 @@ struct LeafFrame {
 
 /// Which of 16 triangles matter to a leaf, as bits.
 struct Near {
-  unsigned within_reach;  ///< the box is, by a margin for rounding
-  unsigned at_edges;      ///< the box touches a grid edge that the leaf owns, by the same margin
+  unsigned within_reach;  ///< the box is within reach of the leaf's voxels, with a margin for rounding
+  unsigned at_edges;      ///< the box touches the box of the leaf's grid edges, with the same margin
 };
 
 /// A triangle as linear functions of position x (voxels, relative to a leaf's first voxel), so that a
@@ -74,36 +75,36 @@ struct Boxes {
 struct LazyBatches {
   const Boxes* boxes;
   const Batch** batches;  ///< null until prepared
-  int count;              ///< of batches; boxes beyond it must be infinitely far away
+  int count;              ///< number of batches; boxes beyond it must be as good as infinitely far away
   const Batch* (*prepare)(void* context, int batch);
   void* context;
 };
 
-/// Grid edges that triangles cross: bit (x·8 + y)·8 + z of word x, axis of the edge first. An edge belongs to
-/// its lower end.
+/// Grid edges that triangles cross: bit 8y + z of word x, axis of the edge first. An edge belongs to its lower end.
 struct EdgeBits {
   std::uint64_t word[3][8];
 };
 
+/// The functions of one level of vector code. None keeps anything between calls, so that any thread may call them.
 struct Kernels {
-  /// By the boxes of 16 triangles.
+  /// Tells by the boxes of 16 triangles which of them matter to a leaf; `reach` is in voxels.
   Near (*near)(const MeshCorners&, const LeafFrame&, float reach);
-  /// All 16 to voxels.
+  /// Changes the corners of 16 triangles to voxels relative to the leaf, in double precision.
   void (*to_leaf)(const MeshCorners&, const LeafFrame&, Corners&);
-  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel,
-  /// call set_up_segment().
+  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel, and its
+  /// lane is for set_up_segment() to fill.
   unsigned (*set_up)(const Corners&, Batch&);
-  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch;
-  /// beyond it they may stay as they are.
+  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch; beyond it
+  /// they may stay as they are. With `ids`, notes which triangle is the nearest.
   void (*update)(const Batch&, int count, float reach, bool ids, Distances&);
-  /// The same for thousands of triangles far smaller than a voxel: a voxel at a time, 16 triangles at once,
-  /// batches whose box is farther than the nearest triangle so far left out.
+  /// Lowers the distances as `update` does, for thousands of triangles far smaller than a voxel: a voxel at a time,
+  /// 16 triangles at once, batches whose box is farther than the nearest triangle so far left out.
   void (*update_from_many)(const LazyBatches&, float reach, bool ids, Distances&);
   /// Adds the edges that the first `count` triangles cross, ends and borders included with a tolerance of
   /// 1e-9 voxel, so that no path along grid edges slips through between two triangles that share an edge.
   void (*cross)(const Corners&, int count, EdgeBits&);
-  /// Distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels below
-  /// it as bits. False when there is none.
+  /// Writes the distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels
+  /// below it as bits. False when there is none.
   bool (*finish)(const Distances&, float reach, float scale, float* values, std::uint64_t* active);
   /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit, to −`least` or less, and limits
   /// them on either side; leaves in `active` the bits of those below their limit.
@@ -111,17 +112,19 @@ struct Kernels {
                       std::uint64_t* active);
 };
 
-/// Lane `triangle` of the batch as a segment, its longest side.
+/// Sets lane `triangle` of the batch up as a segment, the triangle's longest side; as a point where all corners
+/// coincide.
 void set_up_segment(const Corners&, int triangle, Batch&);
 
 /// Names of the levels that this machine can run, slowest first: sse2, avx2, avx512.
 std::vector<std::string> levels();
 
-/// The kernels of a level. @throws Error for a name that is none, or that this machine cannot run.
+/// The kernels of a level by its name.
+/// @throws Error for a name that is none, or that this machine cannot run.
 const Kernels& at_level(std::string_view name);
 
-/// Those of the environment variable HERMESH_SIMD, or else of the machine's fastest level. @throws Error as
-/// at_level().
+/// The kernels of the level that the environment variable HERMESH_SIMD names, or else of the machine's fastest.
+/// @throws Error as at_level().
 const Kernels& chosen();
 
 }  // namespace hermesh::kernels

@@ -1,3 +1,5 @@
+// The kernels in vectors of four floats, compiled as all other code is: they run on whatever runs the program.
+// Headers come first, for what is included within the namespace may include nothing itself.
 #include <immintrin.h>
 
 #include "algorithms/voxelization/distance/kernels/constants.h"

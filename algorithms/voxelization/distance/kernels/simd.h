@@ -180,19 +180,19 @@ inline Floats square_root(Floats a) {
   for (int i = 0; i < Floats::kRegisters; ++i) a.r[i] = sqrt_register(a.r[i]);
   return a;
 }
-/// `value` where `test` is not below 0, and 0 where it is.
+/// Lanes of `value` where `test` is not below 0, and 0 where it is.
 inline Floats where_not_negative(Floats test, Floats value) {
   for (int i = 0; i < Floats::kRegisters; ++i) value.r[i] = keep_register(test.r[i], value.r[i]);
   return value;
 }
-/// Bit i: lane i of a is less than that of b.
+/// Bits of a comparison: bit i is set where lane i of `a` is less than that of `b`.
 inline unsigned less(Floats a, Floats b) {
   unsigned bits = 0;
   for (int i = 0; i < Floats::kRegisters; ++i) bits |= less_bits(a.r[i], b.r[i]) << (i * kFloatLanes);
   return bits;
 }
 
-/// Lane i of `set` where bit i is set, of `clear` where it is not.
+/// Selects lane i of `set` where bit i is set, of `clear` where it is not.
 inline Floats choose(unsigned bits, Floats set, Floats clear) {
   for (int i = 0; i < Floats::kRegisters; ++i) clear.r[i] = choose_register(bits, i, set.r[i], clear.r[i]);
   return clear;
@@ -211,13 +211,13 @@ inline Doubles load(const double* at) {
 inline void store(double* at, Doubles x) {
   for (int i = 0; i < Doubles::kRegisters; ++i) store_register(at, i, x.r[i]);
 }
-/// Eight floats; `at` need not be aligned.
+/// Loads eight floats as doubles; `at` need not be aligned.
 inline Doubles widened(const float* at) {
   Doubles result;
   for (int i = 0; i < Doubles::kRegisters; ++i) result.r[i] = load_wide(at, i);
   return result;
 }
-/// Rounded to single precision; `at` need not be aligned.
+/// Stores eight values rounded to single precision; `at` need not be aligned.
 inline void store_rounded(float* at, Doubles x) {
   for (int i = 0; i < Doubles::kRegisters; ++i) store_narrow(at, i, x.r[i]);
 }
