@@ -16,6 +16,9 @@
 namespace hermesh::validation {
 namespace {
 
+/// Counted from 1, as files of pieces are.
+std::string name_of(std::size_t piece) { return "piece " + std::to_string(piece + 1); }
+
 using Eigen::Vector3d;
 
 /// The share of the expected volume by which the pieces' sum may be off before a piece counts as lost. The
@@ -96,7 +99,7 @@ class Ledger {
       if (report.watertight() && report.oriented() && report.duplicate_polygons == 0) continue;
       ++ledger_.broken_pieces;
       if (ledger_.broken_pieces <= std::int64_t(kMaxPlaces)) {
-        std::string text = "piece " + std::to_string(i) + ":";
+        std::string text = name_of(i) + ":";
         for (const std::string& sentence : report.sentences()) text += " " + sentence;
         ledger_.places.push_back(text);
       }
@@ -162,8 +165,8 @@ class Ledger {
                         entries_[i].piece != entries_[i + 1].piece;
       if (end - i > 1 && !seam) {
         ledger_.repeated_triangles += static_cast<std::int64_t>(end - i);
-        say("a triangle stands in pieces " + std::to_string(entries_[i].piece) + " and " +
-                std::to_string(entries_[i + 1].piece) + " but is no seam",
+        say("a triangle stands in " + name_of(entries_[i].piece) + " and in " + name_of(entries_[i + 1].piece) +
+                " but is no seam",
             middle(entries_[i]));
       }
       for (std::size_t k = i; k < end; ++k) {
@@ -176,7 +179,7 @@ class Ledger {
         }
         if (e.surface <= 0) rest_.push_back(triangles_[e.triangle]);
         if (e.surface == 1 && ledger_.unmatched_cut++ < std::int64_t(kMaxPlaces))
-          say("a cut triangle of piece " + std::to_string(e.piece) + " has no other side", middle(e));
+          say("a cut triangle of " + name_of(e.piece) + " has no other side", middle(e));
       }
     }
   }
@@ -231,7 +234,7 @@ class Ledger {
         continue;
       ++ledger_.wrong_records;
       if (!pieces_[i].points.empty())
-        say("piece " + std::to_string(i) + " holds " + std::to_string(volumes_[i]) + ", its record says " +
+        say(name_of(i) + " holds " + std::to_string(volumes_[i]) + ", its record says " +
                 std::to_string(expected_.pieces[i]),
             pieces_[i].points.front());
     }
