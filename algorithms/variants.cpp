@@ -11,6 +11,8 @@
 namespace hermesh {
 
 std::span<const Extractor> our_extractors() {
+  // Promises are what the harness holds against every mesh of a variant: a promise that is missing here is a property
+  // that the method does not have, for the reason in its header.
   static const std::vector<Extractor> table = {
       {.name = "marching-cubes",
        .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, "
@@ -18,17 +20,20 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .manifold = true, .oriented = true},
        .options = marching_cubes_options(),
        .extract = marching_cubes},
+      // One point a cell, which all sheets in the cell share: closed, but not manifold.
       {.name = "dual-contouring",
        .summary = "uniform dual contouring of Hermite data, keeps sharp features (Ju et al. 2002; Aldén "
                   "2011, chapter 6)",
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},
+      // Chapter 6 with its faults (trap T5): regions of several sheets share a point, too.
       {.name = "adaptive-dual-contouring",
        .summary = "cells merged into 2³, 4³ and 8³ regions within each block, as printed (Aldén 2011, chapter 6)",
        .promises = {.closed = true, .oriented = true},
        .options = adaptive_dual_contouring_options(),
        .extract = adaptive_dual_contouring},
+      // The only one whose mesh is proved free of self-intersection.
       {.name = "manifold-dual-contouring",
        .summary = "adaptive dual contouring within a stated tolerance: closed, manifold, free of self-intersection, sharp",
        .promises = {.closed = true, .manifold = true, .oriented = true, .no_self_intersection = true},
@@ -49,6 +54,7 @@ std::span<const Voxelizer> our_voxelizers() {
        .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",
        .options = hermesh_voxelizer_options(),
        .voxelize = hermesh_voxelizer},
+      // Chapter 5 with its faults, for comparison.
       {.name = "thesis",
        .summary =
            "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
@@ -65,6 +71,8 @@ std::span<const Voxelizer> our_voxelizers() {
              .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
              .maximum = 1e15}},
        .voxelize =
+           // The options of chapter 5 are a struct of their own; a seed is a whole number of up to 1e15, which a
+           // double holds exactly.
            [](const VoxelizationInput& input) {
              ThesisVoxelizerOptions options;
              options.sign_angle = input.options.number("sign_angle");

@@ -8,7 +8,9 @@
 
 namespace hermesh {
 
+/// The extractors of our own, in the order in which they are listed; the table lives as long as the program.
 std::span<const Extractor> our_extractors();
+/// The voxelizers of our own, in the order in which they are listed; the table lives as long as the program.
 std::span<const Voxelizer> our_voxelizers();
 
 }  // namespace hermesh

@@ -19,7 +19,7 @@ class Cancelled : public std::exception {
   const char* what() const noexcept override { return "cancelled"; }
 };
 
-/// Puts the file before an Error of `work` that does not name it.
+/// Runs `work`; an Error of it that does not name `file` is thrown again with the name in front.
 template <class Work>
 auto about_file(const std::string& file, Work&& work) {
   try {

@@ -12,8 +12,8 @@
 
 namespace hermesh {
 
-/// Leaves new elements uninitialised, so that resizing touches no memory and the first to write a page is the thread
-/// that fills it, and asks for huge pages where an array is large: the first touch of a small page costs more than
+/// Allocator that leaves new elements uninitialized, so that resizing touches no memory and the first to write a page
+/// is the thread that fills it. Large arrays ask for huge pages: the first touch of a small page costs more than
 /// filling it.
 template <class T>
 class LargeArrayAllocator {
@@ -51,7 +51,7 @@ class LargeArrayAllocator {
   static constexpr std::size_t kLarge = 2 * kHugePage;  ///< below it what is left of the last page would weigh too much
 };
 
-/// T must have no default member initialiser that matters: resize() leaves it as the memory is.
+/// Vector whose resize() leaves new elements as the memory is: T must have no default member initializer that matters.
 template <class T>
 using LargeArray = std::vector<T, LargeArrayAllocator<T>>;
 

@@ -8,6 +8,7 @@
 
 namespace hermesh {
 
+// The transform may mirror, which makes the signed volume of a voxel negative: its magnitude counts.
 double LevelSet::voxel_size() const { return std::cbrt(std::abs(grid_->grid->transform().voxelVolume())); }
 
 double LevelSet::background() const { return grid_->grid->background(); }
@@ -23,6 +24,8 @@ std::array<int, 3> LevelSet::dimensions() const {
 
 void initialize_openvdb() {
   static std::once_flag once;
+  // Threads that come second wait until all types are there. Our own follow, because openvdb::initialize() clears the
+  // registry of grid types before it fills it.
   std::call_once(once, [] {
     openvdb::initialize();
     register_hermite_grids();

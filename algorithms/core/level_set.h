@@ -24,8 +24,8 @@ class LevelSet {
   double voxel_size() const;  ///< world units, cube root of the voxel's volume
   double background() const;  ///< world units
   std::size_t active_voxels() const;
-  std::size_t memory_bytes() const;       ///< of the tree, allocated
-  std::array<int, 3> dimensions() const;  ///< active box in voxels
+  std::size_t memory_bytes() const;       ///< bytes that the tree has allocated
+  std::array<int, 3> dimensions() const;  ///< sides of the box of the active voxels, in voxels
 
  private:
   std::shared_ptr<const LevelSetGrid> grid_;

@@ -8,10 +8,12 @@
 
 namespace hermesh {
 
+/// The grid behind a LevelSet: values in world units, placement by its transform.
 struct LevelSetGrid {
   openvdb::FloatGrid::ConstPtr grid;
 };
 
+/// Wraps a grid, which nobody may change from then on.
 inline LevelSet make_level_set(openvdb::FloatGrid::ConstPtr grid) {
   return LevelSet(std::make_shared<const LevelSetGrid>(LevelSetGrid{std::move(grid)}));
 }

@@ -17,15 +17,16 @@ enum class AttributeDomain {
   polygon  ///< each triangle, then each quad
 };
 
+/// One named attribute: a value for each element of its domain, in the order of the mesh.
 struct MeshAttribute {
   std::string name;
   AttributeDomain domain = AttributeDomain::point;
-  int components = 1;  ///< numbers an element, 1 to 4, which lie side by side in `values`
-  /// Floats, or whole numbers, which stay exact and are never interpolated; those have one component, and −1
-  /// stands for "none".
+  int components = 1;  ///< numbers for each element, 1 to 4, which lie side by side in `values`
+  /// Floats of any number of components, or whole numbers of one component, which stay exact and are never
+  /// interpolated; −1 among whole numbers stands for "none".
   std::variant<std::vector<float>, std::vector<std::int32_t>> values;
   std::vector<std::string>
-      labels;  ///< of the whole numbers from 0 on, such as the names of materials; may be empty
+      labels;  ///< names of the whole numbers from 0 on, such as those of materials; may be empty
 
   bool operator==(const MeshAttribute&) const = default;
 };

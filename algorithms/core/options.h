@@ -10,7 +10,7 @@
 
 namespace hermesh {
 
-/// One option. `choices` empty means a number from `minimum` to `maximum`.
+/// Declaration of one option. Where `choices` is empty, the value is a number from `minimum` to `maximum`.
 struct OptionSpec {
   std::string name;
   std::string fallback;  ///< value when the user gives none
@@ -23,6 +23,7 @@ struct OptionSpec {
   std::vector<std::string> only_with = {};
 };
 
+/// Values of a variant's options: all that it declares, checked.
 class Options {
  public:
   Options() = default;
@@ -32,11 +33,14 @@ class Options {
   Options(std::string_view variant, std::span<const OptionSpec> declared,
           const std::map<std::string, std::string>& given);
 
+  /// The value of a declared option as a number. @throws std::logic_error if it was not declared or is none.
   double number(std::string_view name) const;
+  /// The value of a declared option as text, numbers in their shortest form. @throws std::logic_error if it was not
+  /// declared.
   const std::string& text(std::string_view name) const;
   /// Whether the option was declared and has this value.
   bool is(std::string_view name, std::string_view value) const;
-  /// "key=value key=value" of all options in alphabetical order, the defaults included.
+  /// All options as "key=value key=value" in alphabetical order, the defaults included: equal for equal settings.
   std::string canonical() const;
 
  private:

@@ -26,7 +26,8 @@ void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
                     });
 }
 
-/// `n` copies, each written by whoever comes to it first. @throws Cancelled.
+/// Array of `n` copies of `value`, written in parallel, so that no thread alone touches all its pages.
+/// @throws Cancelled.
 template <class T>
 LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
   LargeArray<T> result(n);
@@ -34,15 +35,15 @@ LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
   return result;
 }
 
-/// @throws Error if as many cannot be numbered by 32 bits.
+/// Checks that indices of 32 bits can number `total` elements. `what` is their name in the plural. @throws Error
 inline void check_indices(std::uint64_t total, const std::string& what) {
   if (total > std::numeric_limits<std::uint32_t>::max())
     throw Error("the mesh would have " + std::to_string(total) + " " + what +
                 ", more than 32-bit indices can number; use larger voxels");
 }
 
-/// Replaces each count by the sum of those before it and returns the total.
-/// @throws Error if the total cannot be an index of 32 bits.
+/// Replaces each count by the sum of the counts before it and returns the total. @throws Error if the total cannot be
+/// an index of 32 bits; `what` names the counted things in the plural.
 inline std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what) {
   std::uint64_t total = 0;
   for (std::uint64_t& count : counts) {

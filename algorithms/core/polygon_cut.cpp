@@ -14,8 +14,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Twice the area that the polygon encloses, as a vector; about its first corner, so that rounding is
-/// relative to its size.
+/// Newell's normal: twice the area that the polygon encloses, as a vector. Taken about the first corner, so that
+/// rounding is relative to the polygon's size and not to its distance from the origin.
 Vector3d newell(std::span<const Vector3d> corners) {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t i = 2; i < corners.size(); ++i)
@@ -23,7 +23,7 @@ Vector3d newell(std::span<const Vector3d> corners) {
   return sum;
 }
 
-/// Twice the area, positive if counter-clockwise.
+/// Twice the area of the triangle abc, positive if counter-clockwise.
 double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
@@ -31,21 +31,23 @@ double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
 /// Some of the places of a polygon's corners, by a tree of boxes that halves them again and again (Bentley 1975).
 class PlaceTree {
  public:
-  /// Keeps a reference.
+  /// Keeps a reference to `places`; none of them is chosen yet.
   explicit PlaceTree(const std::vector<Vector2d>& places)
       : places_(places), order_(places.size()), slot_(places.size()), chosen_(places.size(), 0) {
     std::iota(order_.begin(), order_.end(), 0u);
+    // Node i has the children 2i and 2i + 1. So many levels of halves leave at most kLeaf places to each of the last.
     nodes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
     build(1, 0, places.size());
     for (std::uint32_t i = 0; i < order_.size(); ++i) slot_[order_[i]] = i;
   }
 
-  /// Puts a corner's place in or takes it out.
+  /// Puts the place of a corner into the set of chosen ones, or takes it out.
   void choose(std::uint32_t corner, bool is_chosen) {
     if (bool(chosen_[corner]) == is_chosen) return;
     chosen_[corner] = is_chosen;
     std::size_t node = 1, begin = 0, end = order_.size();
     while (true) {
+      // Every node counts the chosen places below it, so that any_in() leaves branches without any.
       nodes_[node].chosen += is_chosen ? 1 : -1;
       if (end - begin <= kLeaf) return;
       const std::size_t middle = begin + (end - begin) / 2;
@@ -55,7 +57,7 @@ class PlaceTree {
     }
   }
 
-  /// Whether f(corner) holds for one of those in the triangle abc, which is counter-clockwise, its border included.
+  /// Whether f(corner) holds for one of the chosen corners in the counter-clockwise triangle abc, border included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
     return any_in(1, 0, order_.size(), a, b, c, f);
@@ -74,6 +76,7 @@ class PlaceTree {
     if (end - begin <= kLeaf) return;
     const int axis = box.sizes().x() >= box.sizes().y() ? 0 : 1;
     const std::size_t middle = begin + (end - begin) / 2;
+    // Ties go by number: which places lie in a half then depends on nothing but the polygon.
     std::nth_element(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(middle),
                      order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i, std::uint32_t j) {
                        return std::pair(places_[i][axis], i) < std::pair(places_[j][axis], j);
@@ -100,7 +103,8 @@ class PlaceTree {
     return any_in(2 * node, begin, middle, a, b, c, f) || any_in(2 * node + 1, middle, end, a, b, c, f);
   }
 
-  /// Whether all of a box is. Rounding keeps order, so that no place in the box is found elsewhere by itself.
+  /// Whether all of a box lies to the right of a line: its corner farthest to the left does. Rounding keeps order, so
+  /// no place of the box is judged otherwise when it is looked at by itself.
   static bool is_right_of(const Vector2d& from, const Vector2d& to, const Eigen::AlignedBox2d& box) {
     const Vector2d way = to - from;
     const Vector2d most(way.y() > 0 ? box.min().x() : box.max().x(), way.x() > 0 ? box.max().y() : box.min().y());
@@ -113,18 +117,19 @@ class PlaceTree {
   std::vector<Node> nodes_;  ///< children of i: 2i and 2i + 1
 };
 
-/// Corners that are left to be looked at, in the order of the ring.
+/// Set of corners that are still to be looked at, as bits in the order of the ring.
 class Candidates {
  public:
   explicit Candidates(std::size_t corners) : words_((corners + 63) / 64, 0) {}
 
   void add(std::uint32_t i) { words_[i / 64] |= std::uint64_t(1) << i % 64; }
   void remove(std::uint32_t i) { words_[i / 64] &= ~(std::uint64_t(1) << i % 64); }
-  /// The first one from i on, around the ring; nothing if there is none.
+  /// The first member from i on, around the ring; nothing if the set is empty.
   std::optional<std::uint32_t> from(std::uint32_t i) const {
     const std::size_t start = i / 64;
     const std::uint64_t upper = ~std::uint64_t(0) << i % 64;
     for (std::size_t k = 0; k <= words_.size(); ++k) {
+      // The word of i is looked at twice: at first from i on, and at last before i.
       const std::size_t w = (start + k) % words_.size();
       const std::uint64_t bits = words_[w] & (k == 0 ? upper : k == words_.size() ? ~upper : ~std::uint64_t(0));
       if (bits) return std::uint32_t(64 * w + std::size_t(std::countr_zero(bits)));
@@ -136,6 +141,8 @@ class Candidates {
   std::vector<std::uint64_t> words_;
 };
 
+// Ears are cut off a ring of corners that shrinks. Invariant: a corner outside a set of candidates has kept its
+// neighbors since it was judged not to belong, so that on the whole few corners are judged again.
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
@@ -151,6 +158,7 @@ class Ring {
     }
     double extent = 0;
     for (const Vector2d& p : places_) extent = std::max(extent, p.cwiseAbs().maxCoeff());
+    // Areas are sums of products of coordinates; 1e-13 is about a thousand roundings of one (2⁻⁵³).
     constexpr double kRounding = 1e-13;
     flat_ = kRounding * extent * extent;
     for (std::uint32_t i = 0; i < corners.size(); ++i) look_at(i);
@@ -160,6 +168,7 @@ class Ring {
     std::vector<Triangle> triangles;
     triangles.reserve(places_.size() - 2);
     std::uint32_t at = 0;
+    // Each turn cuts one corner off, so that n corners give n − 2 triangles, the last of which is what is left.
     while (left() > 3) {
       if (cut_off_ % 1024 == 1023) {
         context.check();
@@ -171,13 +180,15 @@ class Ring {
       // Not the neighbour next, which would make a fan of slivers.
       at = next_[cut(*corner)];
     }
+    // What is left faces the other way: the border crosses itself.
     if (area_at(at) < -flat_) return {};
     triangles.push_back({before_[at], at, next_[at]});
     return triangles;
   }
 
  private:
-  /// Along the axis that the polygon faces most, counter-clockwise: nothing but signs of areas matters.
+  /// Places in the plane, seen along the axis that the polygon faces most and counter-clockwise. The projection scales
+  /// all areas alike, and nothing but their signs matters.
   static std::vector<Vector2d> placed(std::span<const Vector3d> corners) {
     const Vector3d normal = newell(corners);
     int axis;
@@ -218,7 +229,8 @@ class Ring {
     return flat_one();
   }
 
-  /// Forgets the candidates that are none.
+  /// The first candidate from a corner on that `is` one; candidates before it that are none are removed until they are
+  /// added again.
   template <class Is>
   static std::optional<std::uint32_t> first(Candidates& candidates, std::uint32_t at, const RunContext& context,
                                             Is&& is) {
@@ -231,6 +243,8 @@ class Ring {
   }
 
   bool is_ear(std::uint32_t at) const {
+    // A straight corner is no ear, for its triangle would have no area; next_to_cut() takes one only for want of an
+    // ear.
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
     return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {
@@ -247,7 +261,7 @@ class Ring {
     return area(a, b, p) > 0 && area(b, c, p) > 0;
   }
 
-  /// Returns the corner behind it.
+  /// Takes a corner out of the ring and returns the one behind it.
   std::uint32_t cut(std::uint32_t at) {
     const std::uint32_t before = before_[at], next = next_[at];
     next_[before] = next;
@@ -261,7 +275,7 @@ class Ring {
     return next;
   }
 
-  /// Whose neighbours have changed.
+  /// Judges a corner anew whose neighbors in the ring have changed.
   void look_at(std::uint32_t corner) {
     reflex_.choose(corner, area_at(corner) <= 0);
     perhaps_ears_.add(corner);
@@ -271,10 +285,10 @@ class Ring {
   std::vector<Vector2d> places_;
   std::vector<std::uint32_t> next_, before_;
   std::size_t cut_off_ = 0;       ///< corners
-  std::size_t all_asked_at_ = 0;  ///< how many were cut off then
-  PlaceTree reflex_;              ///< corners that are no convex ones, straight ones among them
+  std::size_t all_asked_at_ = 0;  ///< how many were cut off when all corners became candidates again
+  PlaceTree reflex_;              ///< corners that are not convex: if any lies in an ear, one of these does
   Candidates perhaps_ears_, perhaps_flat_;
-  double flat_;  ///< an area that is none
+  double flat_;  ///< twice the area, up to which a triangle counts as flat
 };
 
 }  // namespace

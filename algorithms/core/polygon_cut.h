@@ -10,8 +10,8 @@
 
 namespace hermesh {
 
-/// Whether the fan about the first corner is right: all triangles of it have an area and face as the polygon does, which
-/// is seen along its mean normal (Newell's: Tampieri 1992). So it is in every strictly convex polygon.
+/// Whether the fan about the first corner covers the polygon: each of its triangles has an area and faces as the
+/// polygon does, seen along its mean normal (Newell's: Tampieri 1992). The fan of every strictly convex polygon does.
 bool is_fan(std::span<const Eigen::Vector3d> corners);
 
 /// Triangles, two fewer than corners and by their numbers among these, that cover a polygon once, seen along

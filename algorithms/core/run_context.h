@@ -13,16 +13,18 @@
 
 namespace hermesh {
 
+/// What one run reports and obeys. Only cancelled() and check() may be called from any thread; the rest belongs to the
+/// thread that runs the stages.
 class RunContext {
  public:
-  /// Called with the stage's name and the share of it that is done, 0 to 1; only from the thread that runs
-  /// the stage.
+  /// Callback with the name of the stage and the share of it that is done, 0 to 1; only the thread that runs the stage
+  /// calls it.
   std::function<void(std::string_view stage, double fraction)> on_progress;
-  /// Set by somebody else (a signal handler, say) to ask for an early end; may be null.
+  /// Flag that somebody else (a signal handler, say) sets to ask for an early end; may be null.
   const std::atomic<bool>* cancel = nullptr;
 
   bool cancelled() const { return cancel && cancel->load(std::memory_order_relaxed); }
-  /// Throws Cancelled if somebody asked for it. Cheap enough for once a leaf, from any thread.
+  /// @throws Cancelled if somebody asked for an early end. Cheap enough for once a leaf, from any thread.
   void check() const {
     if (cancelled()) throw Cancelled();
   }
@@ -35,7 +37,7 @@ class RunContext {
   /// rounds.
   void note(std::string sentence) { notes.push_back(std::move(sentence)); }
 
-  std::vector<std::pair<std::string, double>> stage_seconds;  ///< in order of completion
+  std::vector<std::pair<std::string, double>> stage_seconds;  ///< stages in order of completion
   std::vector<std::string> notes;
   std::vector<std::pair<std::string, double>> figures;
 };

@@ -6,9 +6,10 @@
 
 namespace hermesh {
 
+/// Clock of the wall, which each reading starts anew.
 class Stopwatch {
  public:
-  /// Since it was made or asked last.
+  /// Seconds since construction or since the last call.
   double seconds() {
     const auto now = std::chrono::steady_clock::now(), before = std::exchange(start_, now);
     return std::chrono::duration<double>(now - before).count();

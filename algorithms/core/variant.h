@@ -27,25 +27,26 @@ struct EdgeCrossing;     // hermite/crossing.h
 template <class Crossing>
 struct SparseHermite;  // hermite/sparse_hermite.h
 
-/// Volume in, mesh out.
+/// Input of an extractor: a volume, and what else is known of its surface.
 struct ExtractionInput {
   const LevelSet& level_set;
   double isovalue = 0.0;  ///< in the units of the grid's values
   const PolygonMesh* source =
-      nullptr;  ///< the polygons that the volume was made from, where they are at hand
+      nullptr;  ///< the polygons that the volume was made from, where they are at hand; else null
   const Options& options;
   RunContext& context;
-  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform one
-  /// leaves it alone.
+  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform variant
+  /// ignores it.
   const AdaptivityField* field = nullptr;
-  /// Exact Hermite data of the surface at isovalue 0 on the level set's lattice and with its signs, where they are at hand
-  /// instead of polygons; null: they are not.
+  /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, where they are at
+  /// hand instead of polygons; else null.
   const SparseHermite<EdgeCrossing>* hermite = nullptr;
   /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a variant which
   /// proves something of its mesh proves it of the points as they will be written.
   bool written_in_single = false;
 };
 
+/// Entry of a table: a method that turns a volume into a mesh.
 struct Extractor {
   std::string name;
   std::string summary;  ///< one line
@@ -54,16 +55,17 @@ struct Extractor {
   PolygonMesh (*extract)(const ExtractionInput&);
 };
 
-/// Polygons in, level set out.
+/// Input of a voxelizer: polygons, and the lattice and band that are wanted.
 struct VoxelizationInput {
   const PolygonMesh& mesh;
   double voxel_size;           ///< world units
   double exterior_band = 3.0;  ///< voxels
   double interior_band = 3.0;  ///< voxels
   RunContext& context;
-  Options options = {};  ///< those that the variant declares, checked
+  Options options = {};  ///< the options that the variant declares, checked
 };
 
+/// Entry of a table: a method that turns polygons into a level set.
 struct Voxelizer {
   std::string name;
   std::string summary;
@@ -71,8 +73,9 @@ struct Voxelizer {
   LevelSet (*voxelize)(const VoxelizationInput&);
 };
 
-/// Entry of that name. @throws Error that lists the names there are.
+/// The table's entry of this name. @throws Error that lists the names there are.
 const Extractor& find_variant(std::span<const Extractor> table, const std::string& name);
+/// The table's entry of this name. @throws Error that lists the names there are.
 const Voxelizer& find_variant(std::span<const Voxelizer> table, const std::string& name);
 
 }  // namespace hermesh

@@ -35,6 +35,7 @@
 
 namespace hermesh {
 
+/// The union, the intersection and the difference of two operands.
 enum class Boolean { unite, intersect, subtract };
 
 /// A Boolean operation as an intersection of operands some of which are complemented, and of a result that may be.
@@ -55,14 +56,17 @@ class BooleanRule {
   std::uint64_t inside(std::uint64_t a, std::uint64_t b) const {
     return ((a ^ flip_a_) & (b ^ flip_b_)) ^ flip_result_;
   }
-  /// Where the second operand is uniform, the result is the first operand or uniform, too.
+  /// Whether the first operand's part of a place is kept where the second operand is uniform, with this sign;
+  /// otherwise the result is uniform there, too.
   bool keeps_a(bool b_inside) const { return b_inside != (flip_b_ != 0); }
+  /// Whether the second operand's part is kept where the first one is uniform.
   bool keeps_b(bool a_inside) const { return a_inside != (flip_a_ != 0); }
 
   // Which of two crossings of one edge in the same direction is taken; `b` is as its own grid has it. `Code` is a
   // crossing code, see below.
 
-  /// `first_inside` is the result's sign at the edge's first sample. False for equal offsets.
+  /// Whether the offset of `b` decides for it; false for equal offsets. `first_inside` is the result's sign at the
+  /// edge's first sample.
   template <class Code>
   bool prefers_offset_of_b(const typename Code::Crossing& a, const typename Code::Crossing& b,
                            bool first_inside) const {
@@ -73,7 +77,7 @@ class BooleanRule {
     return (static_cast<int>(offset_a < offset_b) & static_cast<int>(greater)) |
            (static_cast<int>(offset_a > offset_b) & static_cast<int>(!greater));
   }
-  /// For equal offsets. False if there is nothing to choose.
+  /// Whether the normal of `b` decides for it, where offsets are equal; false if there is nothing to choose.
   template <class Code>
   bool prefers_normal_of_b(const typename Code::Crossing& a, typename Code::Crossing b) const {
     if (turns_b_) b = Code::negated(b);
@@ -106,8 +110,8 @@ struct PackedCrossingCode {
   using Crossing = PackedCrossing;
   static std::int32_t offset(Crossing crossing) { return crossing.offset(); }
   static int normal_order(Crossing crossing) { return order<Normal>(crossing.normal); }
-  /// The tag; and the normal, for the sake of codes from outside that pack() does not return, two of which may have the
-  /// same opposite.
+  /// Tells apart crossings of equal offset and normal order: by the tag, and by the normal for the sake of codes from
+  /// outside that pack() does not return, two of which may have the same opposite.
   static std::uint32_t remainder(Crossing crossing) {
     return static_cast<std::uint32_t>(crossing.tag() << 16) | crossing.normal;
   }

@@ -32,13 +32,16 @@ void parallel_tasks(std::size_t n, const RunContext& context, F&& f) {
   });
 }
 
+// Leaves are in ascending order of (x, y, z), so those of a column along z follow one another.
 bool before(const SignLeaf& leaf, const Lower& lower) { return leaf.lower < lower; }
 
+/// Number of the first leaf that is not before `lower`, of all of them.
 std::size_t first_not_before(const Leaves& leaves, const Lower& lower) {
   return static_cast<std::size_t>(std::lower_bound(leaves.begin(), leaves.end(), lower, before) - leaves.begin());
 }
 
-/// The same from leaf `begin` to `end`, in a time that grows with the logarithm of the distance to the answer.
+/// Number of the first of the leaves `begin` to `end` that is not before `lower`, by doubling steps and then halving:
+/// the time grows with the logarithm of the distance to the answer.
 std::size_t first_not_before(const Leaves& leaves, std::size_t begin, std::size_t end, const Lower& lower) {
   std::size_t step = 1;
   while (begin + step < end && leaves[begin + step].lower < lower) {
@@ -72,17 +75,19 @@ void turn(SignLeaf& leaf) {
   for (std::uint64_t& word : leaf.beyond) word = ~word;
 }
 
-/// Sum of the set bits of 24 words, counted by byte: 8 a word make 192 at most.
+/// Number of crossed edges of a leaf: the sum of the set bits of 24 words, counted by byte: 8 a word make 192 at most.
 std::uint32_t count_crossings(const SignLeaf& leaf) {
   std::uint64_t bytes = 0;
   for (const BlockMask& axis : crossing_edges(leaf))
     for (std::uint64_t word : axis) {
+      // Bits are added in pairs, fours and bytes, side by side; bytes are not added across until all words are in.
       word -= (word >> 1) & 0x5555555555555555u;
       word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
       bytes += (word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu;
     }
   constexpr std::uint64_t kEvenBytes = 0x00ff00ff00ff00ffu;
   const std::uint64_t pairs = (bytes & kEvenBytes) + ((bytes >> 8) & kEvenBytes);
+  // The four sums of 16 bits, 384 at most, are added in the highest one.
   return static_cast<std::uint32_t>((pairs * 0x0001000100010001u) >> 48);
 }
 
@@ -101,8 +106,11 @@ class Combination {
     result.placement = a_.placement;
     result.normal_code = a_.normal_code;
     result.outermost_inside = (rule_.inside(a_.outermost_inside, b_.outermost_inside) & 1) != 0;
+    // Count: chunks are merged side by side. A chunk is whole columns, since what a missing leaf means is told by the
+    // leaf before it in its column and by no other.
     std::vector<Chunk> chunks = chunks_of_columns();
     parallel_tasks(chunks.size(), context, [&](std::size_t i) { merge(chunks[i]); });
+    // Scan: chunks are in order, so the sums of those before a chunk say where its part of the result begins.
     std::size_t leaves = 0, crossings = 0;
     for (Chunk& chunk : chunks) {
       leaves += std::exchange(chunk.leaves, leaves);
@@ -111,6 +119,7 @@ class Combination {
     if (crossings > std::numeric_limits<std::uint32_t>::max())
       throw Error("the combined Hermite data would have " + std::to_string(crossings) +
                   " crossings, more than 32 bits can number; use larger voxels");
+    // Fill: each chunk writes to places of its own, whatever thread does it.
     result.leaves.resize(leaves);
     result.crossings.resize(crossings);
     parallel_tasks(chunks.size(), context, [&](std::size_t i) { fill(chunks[i], result); });
@@ -127,20 +136,23 @@ class Combination {
   struct Chunk {
     std::size_t a_begin, a_end, b_begin, b_end;
     std::vector<Run> runs;
-    std::size_t leaves = 0, crossings = 0;  ///< of the result: counts, then the sums of those before
+    std::size_t leaves = 0, crossings = 0;  ///< sizes of its part of the result, then sums of the chunks before
   };
 
-  /// Cuts at the columns of every 512th leaf of either operand.
+  /// Chunks of both operands, cut at the columns of every 512th leaf of either operand.
   std::vector<Chunk> chunks_of_columns() const {
     std::vector<Lower> cuts;
     for (const Leaves* leaves : {&a_.leaves, &b_.leaves})
       for (std::size_t i = 0; i < leaves->size(); i += kLeavesPerChunk) {
         const Lower& lower = (*leaves)[i].lower;
+        // The least z, so that the cut is the beginning of the column.
         cuts.push_back({lower[0], lower[1], std::numeric_limits<std::int32_t>::min()});
       }
     std::sort(cuts.begin(), cuts.end());
     cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
     std::vector<Chunk> chunks(cuts.size());
+    // From the back, where the end of a chunk is the beginning of the next one. The first cut is at the first leaf of
+    // either operand, so no leaf is left out.
     std::size_t a_end = a_.leaves.size(), b_end = b_.leaves.size();
     for (std::size_t i = cuts.size(); i-- > 0;) {
       chunks[i].a_end = a_end, chunks[i].b_end = b_end;
@@ -154,6 +166,8 @@ class Combination {
     std::size_t i = chunk.a_begin, j = chunk.b_begin;
     while (i < chunk.a_end || j < chunk.b_end) {
       const bool a_ends = i == chunk.a_end, b_ends = j == chunk.b_end;
+      // Leaves at one place are combined sample by sample; a run of leaves of one operand, up to the next leaf of the
+      // other, is kept or dropped as a whole.
       if (!a_ends && !b_ends && a_.leaves[i].lower == b_.leaves[j].lower) {
         add_both(chunk, i++, j++);
       } else if (b_ends || (!a_ends && a_.leaves[i].lower < b_.leaves[j].lower)) {
@@ -180,9 +194,12 @@ class Combination {
       // No leaf starts at the greatest integer, which is no multiple of 8.
       end_of_column =
           first_not_before(own.leaves, begin, end, {lower[0], lower[1], std::numeric_limits<std::int32_t>::max()});
+      // Behind its last leaf in the column all samples of the other operand have one sign, the same over the whole
+      // layer.
       const bool sign = (last_of_other->beyond[2] & 1) != 0;
       if (keeps(from, sign)) add_run(chunk, from, own, begin, end_of_column);
     }
+    // In later columns the other operand has no leaf before these, so there its sign is that of infinity.
     if (end_of_column < end && keeps(from, outermost)) add_run(chunk, from, own, end_of_column, end);
   }
 
@@ -193,11 +210,13 @@ class Combination {
   void add_run(Chunk& chunk, From from, const Hermite& own, std::size_t begin, std::size_t end) const {
     append(chunk, {from, begin, begin, end - begin});
     chunk.leaves += end - begin;
+    // Counted by subtraction; no leaf of the run is looked at.
     chunk.crossings += first_crossing(own, end) - first_crossing(own, begin);
   }
 
   void add_both(Chunk& chunk, std::size_t i, std::size_t j) const {
     const std::uint32_t crossings = count_crossings(combined_signs(rule_, a_.leaves[i], b_.leaves[j]));
+    // A leaf without a crossing edge has no place in the result, or equal data could differ.
     if (crossings == 0) return;
     append(chunk, {From::both, i, j, 1});
     chunk.leaves += 1;
@@ -207,6 +226,7 @@ class Combination {
   static void append(Chunk& chunk, const Run& run) {
     if (!chunk.runs.empty()) {
       Run& last = chunk.runs.back();
+      // A run that goes on where the last one ended becomes part of it, so that fill() copies in one piece.
       if (last.from == run.from && last.a + last.count == run.a && last.b + last.count == run.b) {
         last.count += run.count;
         return;
@@ -234,6 +254,7 @@ class Combination {
   static std::size_t write_one(const Hermite& from, std::size_t begin, std::size_t count, bool turned, SignLeaf* leaf,
                                Crossing* crossings, std::size_t first) {
     const std::size_t source = first_crossing(from, begin), end = first_crossing(from, begin + count);
+    // Unless it is turned about, the run is copied as it is; the numbers of first crossings move by one constant.
     std::memcpy(leaf, from.leaves.data() + begin, count * sizeof(SignLeaf));
     // Modulo 2³²: the sum is right whichever of the two is greater.
     const auto shift = static_cast<std::uint32_t>(first - source);
@@ -266,15 +287,18 @@ class Combination {
     const Crossing *a, *b;
   };
 
-  /// The 64 edges of one word: crossed by `a`, by `b`, in the result; and the result's signs at their first samples.
+  /// Writes the crossings of the 64 edges of one word: crossed by `a`, by `b`, in the result; and the result's signs at
+  /// their first samples.
   Crossing* write_edges(Sources& from, std::uint64_t a, std::uint64_t b, std::uint64_t kept, std::uint64_t inside,
                         Crossing* to) const {
+    // No edge of the word is in the result: the crossings of both operands are passed over by their number.
     if (kept == 0) {
       from.a += std::popcount(a);
       from.b += std::popcount(b);
       return to;
     }
     for (std::uint64_t left = a | b; left != 0; left &= left - 1) {
+      // In order of the samples, so that both cursors move along with the bits and no rank is computed.
       const std::uint64_t bit = left & (~left + 1);
       const bool in_a = (a & bit) != 0, in_b = (b & bit) != 0;
       if (kept & bit) *to++ = taken(from, in_a, in_b, (inside & bit) != 0);
@@ -284,7 +308,8 @@ class Combination {
     return to;
   }
 
-  /// Which operands cross an edge is as good as random, so nothing is branched on but equal offsets.
+  /// The crossing that the result takes. Which operands cross an edge is as good as random, so nothing is branched on
+  /// but equal offsets.
   Crossing taken(const Sources& from, bool in_a, bool in_b, bool first_inside) const {
     // If one operand crosses the edge, its crossing stands for the other's, which is not looked at.
     const Crossing* const of_a = in_a ? from.a : from.b;
@@ -301,7 +326,7 @@ class Combination {
   const Hermite &a_, &b_;
 };
 
-/// f(crossing code) for the code of the grid's crossings.
+/// Calls f(crossing code) with the code of the grid's crossings.
 template <class Crossing, class F>
 auto with_crossing_code(const SparseHermite<Crossing>& hermite, F&& f) {
   if constexpr (std::is_same_v<Crossing, EdgeCrossing>)

@@ -66,7 +66,7 @@ TestLattice<Crossing> random_lattice(std::mt19937& random, int size, NormalCodeI
 
 struct OracleCrossing {
   double offset = 0;
-  std::array<double, 3> order{};  ///< of the normal; negation negates it about −½
+  std::array<double, 3> order{};  ///< order of the normal; negation mirrors it about −½
   int tag = 0;
 };
 
@@ -311,7 +311,7 @@ TYPED_TEST(Combine, PiecesOfACutShareItsCrossings) {
 
 // ---- Values by hand, and refusals. ----
 
-/// One sample inside, at the origin; all six crossings at `offset` from it outwards.
+/// Data with one sample inside, at the origin; all six crossings at `offset` from it outwards.
 PackedHermite one_sample(std::uint16_t up, std::uint16_t down, std::uint16_t normal, std::uint16_t tag) {
   TestLattice<PackedCrossing> lattice{-8, 16};
   lattice.sign(0, 0, 0) = 1;

@@ -25,8 +25,8 @@ namespace {
 using openvdb::Coord;
 using openvdb::Index;
 
-/// Calls f(slot) for every slot of an internal node, in parallel. 64 slots share a word of the node's masks, so that
-/// each word belongs to one task.
+/// Calls f(slot) for every slot of an internal node, in parallel. 64 slots share a word of the masks of the node, so a
+/// task gets whole words: no two threads write to one.
 template <class Node, class F>
 void for_each_slot(const RunContext& context, F&& f) {
   tbb::parallel_for(tbb::blocked_range<Index>(0, Node::NUM_VALUES / 64), [&](const tbb::blocked_range<Index>& words) {
@@ -97,6 +97,8 @@ struct Operand {
   bool alone;
 
   explicit Operand(DenseHermite<Voxel>&& hermite) {
+    // The operand was passed by value: if it was moved in, and was the only one that held the tree, nobody else can
+    // see a change.
     const auto dense = std::move(hermite.tree);
     tree = dense->grid->treePtr();
     // The pointers here are counted, too.
@@ -105,7 +107,7 @@ struct Operand {
   typename Tree::Ptr changeable() const { return alone ? tree : std::make_shared<Tree>(*tree); }
 };
 
-/// `Rules` is one of dense_voxel_rules.h.
+/// Turns a tree into its complement, in place. `Rules` is one of dense_voxel_rules.h.
 template <class Rules>
 class Complement {
  public:
@@ -114,6 +116,7 @@ class Complement {
   template <class Root>
   void turn_root(Root& root) const {
     using Voxel = typename Root::ValueType;
+    // The first argument is the new background; children are turned below and not by OpenVDB.
     root.setBackground(uniform_voxel<Voxel>(!root.background().inside()), false);
     for (auto tile = root.beginValueAll(); tile; ++tile) tile.setValue(uniform_voxel<Voxel>(!tile->inside()));
     for (auto child = root.beginChildOn(); child; ++child) turn(*child);
@@ -155,6 +158,8 @@ class Merge {
 
   void merge_roots(Root& a, Root& b) const {
     using Upper = typename Root::ChildNodeType;
+    // One after the other: the root is a map that no two threads may change. There are few places, and what lies below
+    // each is merged in parallel.
     for (const Coord& place : places(a, b)) {
       Upper *const of_a = a.template probeNode<Upper>(place), *const of_b = b.template probeNode<Upper>(place);
       const bool inside_a = !of_a && a.getValue(place).inside(), inside_b = !of_b && b.getValue(place).inside();
@@ -165,6 +170,7 @@ class Merge {
       else if (!of_a || !rule_.keeps_a(inside_b))
         a.addTile(place, uniform_voxel<Voxel>(inside(inside_a, inside_b)), false);
     }
+    // Last, because the places above were read with the old background.
     a.setBackground(uniform_voxel<Voxel>(inside(a.background().inside(), b.background().inside())), false);
   }
 
@@ -180,7 +186,7 @@ class Merge {
     return result;
   }
 
-  /// A branch of `b`, as the result has it.
+  /// A branch of `b` as the result has it: stolen or copied, and turned about for a difference.
   template <class Parent, class Node>
   std::unique_ptr<Node> taken(Parent& b, Node& branch) const {
     // What is left where it was is never read again.
@@ -190,8 +196,8 @@ class Merge {
     return result;
   }
 
-  /// Two internal nodes. Where one of them is uniform, its sign decides whether the other's branch is kept or the
-  /// result is uniform, too; in that case the sign that stands for the branch does not matter.
+  /// Merges an internal node of `b` into one of `a`. Where one of them is uniform, its sign decides whether the other's
+  /// branch is kept or the result is uniform, too; in that case the sign that stands for the branch does not matter.
   template <class Node>
   void merge(Node& a, Node& b) const {
     for_each_slot<Node>(context_, [&](Index slot) {
@@ -218,8 +224,9 @@ class Merge {
     }
   }
 
-  /// Voxels that are active in neither have signs only.
+  /// Merges a leaf of `b` into one of `a`. Voxels that are active in neither have signs only.
   void merge_leaves(Leaf& a, const Leaf& b) const {
+    // Signs 64 at a time, as one word of bits; voxels with crossings one at a time.
     Voxel* const to = a.buffer().data();
     const Voxel* const from = b.buffer().data();
     auto active = a.getValueMask();
@@ -227,12 +234,14 @@ class Merge {
       std::uint64_t& word = active.template getWord<std::uint64_t>(x);
       const std::uint64_t either = word | b.getValueMask().template getWord<std::uint64_t>(x);
       const std::uint64_t inside_a = signs(to + 64 * x), inside = rule_.inside(inside_a, signs(from + 64 * x));
+      // A voxel is active if an edge of it is still crossed.
       word = 0;
       for_each_bit(either, [&](Index i) {
         Voxel& voxel = to[64 * x + i];
         Rules::combine(rule_, voxel, from[64 * x + i]);
         word |= std::uint64_t{voxel.crosses(0) || voxel.crosses(1) || voxel.crosses(2)} << i;
       });
+      // Where neither operand has a crossing a voxel is nothing but its sign, and most signs stay.
       for_each_bit((inside ^ inside_a) & ~either, [&](Index i) { change_sign(to[64 * x + i]); });
     }
     a.setValueMask(active);
@@ -257,6 +266,7 @@ class Pruning {
   Pruning(Tree& tree, const RunContext& context) : tree_(tree), context_(context) {}
 
   void prune() {
+    // From the leaves up, as a node is uniform only when its children have become tiles.
     if constexpr (kLosesCrossings<Voxel>) prune_leaves();
     Root& root = tree_.root();
     std::vector<std::pair<Coord, bool>> uniform;
@@ -264,15 +274,19 @@ class Pruning {
       for (Index slot = 0; slot < Upper::NUM_VALUES; ++slot)
         if (const Lower* child = child_at(*upper, slot))
           if (const auto sign = uniform_sign(*child)) set_tile(*upper, slot, *sign);
+      // Sign and place are kept, since the node goes when its tile is set.
       if (const auto sign = uniform_sign(*upper)) uniform.emplace_back(upper.getCoord(), *sign);
     }
+    // After the loop, because it changes the map that the loop walks over.
     for (const auto& [place, sign] : uniform) root.addTile(place, uniform_voxel<Voxel>(sign), false);
     root.eraseBackgroundTiles();
   }
 
  private:
-  /// All leaves are judged before the first is removed, since the voxels beyond them matter.
+  /// Turns leaves that own no crossing edge into tiles. All are judged before the first is removed, since the voxels
+  /// beyond them matter.
   void prune_leaves() {
+    // Lowest internal nodes in parallel, each with a list of its own; the tree is changed when all lists are complete.
     std::vector<Lower*> nodes;
     tree_.getNodes(nodes);
     std::vector<std::vector<std::pair<Index, bool>>> tiles(nodes.size());
@@ -297,7 +311,7 @@ class Pruning {
   const RunContext& context_;
 };
 
-/// f(rules) for the layout, and for FixedVoxel the normal code.
+/// Calls f(rules) with the rules for the layout, and for FixedVoxel the normal code.
 template <class Voxel, class F>
 void with_rules(NormalCodeId id, F&& f) {
   if constexpr (std::is_same_v<Voxel, ThesisVoxel>)
@@ -320,11 +334,13 @@ template <DenseVoxel Voxel>
 DenseHermite<Voxel> combine(Boolean boolean, DenseHermite<Voxel> a, DenseHermite<Voxel> b, RunContext& context) {
   if (!same_lattice(a.placement, b.placement))
     throw Error("Hermite data on different lattices cannot be combined; sample both with the same voxels");
+  // Only FixedVoxel has a choice of codes; the other layouts have none or always the same one.
   if (std::is_same_v<Voxel, FixedVoxel> && a.normal_code != b.normal_code)
     throw Error("Hermite data with normals in the codes " + std::string(name(a.normal_code)) + " and " +
                 std::string(name(b.normal_code)) + " cannot be combined; pack both in the same code");
   Stage stage(context, "combine Hermite data");
   const Operand<Voxel> of_a(std::move(a)), of_b(std::move(b));
+  // The result is made in the tree of `a`.
   const auto tree = of_a.changeable();
   with_rules<Voxel>(a.normal_code, [&](auto rules) {
     Merge<decltype(rules)>(boolean, of_b.alone, context).merge_roots(tree->root(), of_b.tree->root());

@@ -32,8 +32,8 @@ namespace hermesh {
 template <DenseVoxel Voxel>
 DenseHermite<Voxel> combine(Boolean boolean, DenseHermite<Voxel> a, DenseHermite<Voxel> b, RunContext& context);
 
-/// What is outside becomes inside, at infinity, too; normals are turned about. In place if its argument is moved into
-/// it and shared with nobody. An involution, but for ThesisVoxel (see above).
+/// The complement: what is outside becomes inside, at infinity, too; normals are turned about. Works in place if its
+/// argument is moved into it and shared with nobody. An involution, but for ThesisVoxel (see above). @throws Cancelled.
 template <DenseVoxel Voxel>
 DenseHermite<Voxel> complement(DenseHermite<Voxel> hermite, RunContext& context);
 

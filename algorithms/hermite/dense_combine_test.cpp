@@ -74,7 +74,7 @@ DenseHermite<Voxel> expected(Boolean boolean, const FloatHermite& a, const Float
     return to_dense<Voxel>(combine(boolean, a, b, context), context);
 }
 
-/// Signs at random; offsets often equal, or at an end of the edge.
+/// Data with signs at random; offsets often equal, or at an end of the edge.
 FloatHermite random_voxels(std::mt19937& random, int size) {
   TestLattice<EdgeCrossing> lattice{-16, size, random() % 2 != 0};
   const std::uint32_t one_in = 2 + random() % 6;
@@ -297,7 +297,7 @@ Violations violations(const DenseHermite<Voxel>& hermite) {
   return result;
 }
 
-/// Voxels that are not the same in both.
+/// Number of voxels that are not the same in both.
 std::size_t differences(const ThesisDense& a, const ThesisDense& b, int lower = -8, int size = 40) {
   std::size_t result = 0;
   const auto &tree_a = a.tree->grid->tree(), &tree_b = b.tree->grid->tree();

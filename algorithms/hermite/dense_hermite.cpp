@@ -15,7 +15,8 @@ using TreeOf = typename DenseGrid<Voxel>::TreeType;
 template <class Voxel>
 using LeafOf = typename TreeOf<Voxel>::LeafNodeType;
 
-// One crossing into a voxel and out of it. `Code` is FixedVoxel's, or that of the packed crossing.
+// Four ways of one crossing into a voxel and out of it, by what is stored on either side. `Code` is the code of
+// FixedVoxel's normals, or of the packed crossing; codes that both sides have are passed on without decoding.
 
 template <NormalCode Code, class Voxel>
 void store(Voxel& voxel, int axis, const EdgeCrossing& crossing) {
@@ -46,6 +47,7 @@ void load(const FixedVoxel& voxel, int axis, PackedCrossing& crossing) {
 
 template <NormalCode Code, class Crossing>
 Crossing substitute(int axis, bool inside) {
+  // What to_sparse() puts in place of a lost crossing: the middle of the edge is off by half a voxel at most.
   EdgeCrossing crossing{0.5f, {}};
   crossing.normal[axis] = inside ? 1.0f : -1.0f;
   if constexpr (std::is_same_v<Crossing, PackedCrossing>)
@@ -54,7 +56,8 @@ Crossing substitute(int axis, bool inside) {
     return crossing;
 }
 
-/// Calls f(code) as with_normal_code() does, but with any code where it does not matter.
+/// Calls f(code) as with_normal_code() does, but with any code where it does not matter: then the compiler makes one
+/// copy of f and not five.
 template <bool kMatters, class F>
 auto with_code_if(NormalCodeId code, F&& f) {
   if constexpr (kMatters)
@@ -66,8 +69,10 @@ auto with_code_if(NormalCodeId code, F&& f) {
 template <class Voxel, NormalCode Code, class Crossing>
 LeafOf<Voxel>* make_leaf(const SparseHermite<Crossing>& hermite, std::size_t i) {
   const SignLeaf& signs = hermite.leaves[i];
+  // All voxels begin outside and without crossings. A voxel becomes active with its first crossing, and only then.
   auto leaf = std::make_unique<LeafOf<Voxel>>(sign_tree::coord(signs.lower), uniform_voxel<Voxel>(false));
   Voxel* const voxels = leaf->buffer().data();
+  // Voxels are outside until told otherwise, so only set bits are visited.
   for_each_bit(signs.inside, [&](int sample) { voxels[sample].set_inside(true); });
   for_each_crossing(hermite, i, [&](int axis, int sample, const Crossing& crossing) {
     store<Code>(voxels[sample], axis, crossing);
@@ -79,6 +84,7 @@ LeafOf<Voxel>* make_leaf(const SparseHermite<Crossing>& hermite, std::size_t i) 
 template <class Voxel, class Crossing>
 DenseHermite<Voxel> dense_of(const SparseHermite<Crossing>& hermite, NormalCodeId code, RunContext& context) {
   initialize_openvdb();
+  // Only where one side has codes and the other has not, codes must be read or made.
   constexpr bool kRecodes = std::is_same_v<Voxel, FixedVoxel> != std::is_same_v<Crossing, PackedCrossing>;
   auto tree = with_code_if<kRecodes>(code, [&](auto chosen) {
     return sign_tree::make_tree<TreeOf<Voxel>>(
@@ -87,6 +93,7 @@ DenseHermite<Voxel> dense_of(const SparseHermite<Crossing>& hermite, NormalCodeI
   });
   auto grid = DenseGrid<Voxel>::create(tree);
   grid->setTransform(transform_of(hermite.placement));
+  // The layout of the thesis has its own normals, whatever was asked for.
   if (std::is_same_v<Voxel, ThesisVoxel>) code = NormalCodeId::thesis;
   return {hermite.placement, code, std::make_shared<const DenseTree<Voxel>>(DenseTree<Voxel>{grid})};
 }
@@ -96,6 +103,8 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
   SparseHermite<Crossing> hermite;
   hermite.placement = dense.placement;
   if (std::is_same_v<Voxel, FixedVoxel>) hermite.normal_code = dense.normal_code;
+  // Signs first: they alone say which edges have a crossing and where its record goes. What voxels claim of their
+  // edges is asked only there.
   const auto sources = sign_tree::read_signs(dense.tree->grid->tree(), hermite, context,
                                              [](const Voxel& voxel) { return voxel.inside(); });
   std::atomic<std::size_t> missing = 0;
@@ -103,6 +112,8 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
     using Code = decltype(chosen);
     parallel_blocks(sources.size(), context, [&](std::size_t i) {
       const Voxel* const voxels = sources[i]->buffer().data();
+      // Leaves write to ranges of their own, so that the order of threads does not matter; the one shared number is a
+      // sum.
       std::size_t next = hermite.leaves[i].first, absent = 0;
       const std::array<BlockMask, 3> edges = crossing_edges(hermite.leaves[i]);
       for (int axis = 0; axis < 3; ++axis)
@@ -112,6 +123,7 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
           if (voxel.crosses(axis))
             load<Code>(voxel, axis, crossing);
           else
+            // Every crossing edge gets a record, or the ranks of all behind it would be off.
             crossing = substitute<Code, Crossing>(axis, voxel.inside()), ++absent;
         });
       missing += absent;
@@ -121,26 +133,28 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
   return hermite;
 }
 
-/// The voxel made anew from what it says of itself. It differs if a bit is set that never should be.
+/// A voxel made anew from what it says of itself. The copy differs if a bit is set that never should be.
 FloatVoxel remade(const FloatVoxel& voxel) {
   FloatVoxel result = uniform_voxel<FloatVoxel>(voxel.inside());
   for (int axis = 0; axis < 3; ++axis)
     if (voxel.crosses(axis)) result.set(axis, voxel.get(axis));
   return result;
 }
+/// A voxel made anew, as above; distances that are not those of set() or clear() do not come back.
 DirectedVoxel remade(const DirectedVoxel& voxel) {
   DirectedVoxel result = uniform_voxel<DirectedVoxel>(voxel.inside());
   for (int axis = 0; axis < 3; ++axis)
     if (voxel.crosses(axis)) result.set(axis, voxel.get(axis));
   return result;
 }
+/// A voxel made anew, as above; a normal without an offset, or bit 30, does not come back.
 FixedVoxel remade(const FixedVoxel& voxel) {
   FixedVoxel result = uniform_voxel<FixedVoxel>(voxel.inside());
   for (int axis = 0; axis < 3; ++axis)
     if (voxel.crosses(axis)) result.set_packed(axis, voxel.get_packed(axis));
   return result;
 }
-/// All bits have a meaning, though not on every edge, and nothing is out of range.
+/// The voxel itself: all bits have a meaning, though not on every edge, and nothing is out of range.
 ThesisVoxel remade(const ThesisVoxel& voxel) { return voxel; }
 
 template <class Voxel>
@@ -152,6 +166,7 @@ std::size_t crossings_of(const Voxel& voxel) {
 template <class Voxel>
 void check_voxels(const DenseHermite<Voxel>& dense) {
   for (auto it = dense.tree->grid->tree().cbeginValueAll(); it; ++it) {
+    // Also in inactive voxels: their signs count, and their crossings would be read.
     if (!(remade(*it) == *it))
       throw Error("the Hermite data hold a voxel that is none of theirs at " + std::to_string(it.getCoord().x()) +
                   ", " + std::to_string(it.getCoord().y()) + ", " + std::to_string(it.getCoord().z()));
@@ -164,6 +179,8 @@ void check_voxels(const DenseHermite<Voxel>& dense) {
 
 openvdb::math::Transform::Ptr transform_of(const IndexToWorld& placement) {
   const Eigen::Vector3d base(placement.base[0], placement.base[1], placement.base[2]);
+  // The parts of a placement keep small numbers apart from large ones; a transform has one translation, in double
+  // precision.
   const Eigen::Vector3d translation = placement.offset + placement.origin - placement.linear * base;
   openvdb::Mat4R matrix = openvdb::Mat4R::identity();  // OpenVDB multiplies rows from the left
   for (int row = 0; row < 3; ++row)
@@ -179,6 +196,7 @@ std::size_t DenseHermite<Voxel>::leaves() const {
 
 template <DenseVoxel Voxel>
 std::size_t DenseHermite<Voxel>::crossings() const {
+  // Of leaves alone: tiles have none, which check_voxels() makes sure of in data from outside.
   std::size_t sum = 0;
   for (auto leaf = tree->grid->tree().cbeginLeaf(); leaf; ++leaf)
     for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel) sum += crossings_of(*voxel);
@@ -192,6 +210,7 @@ std::size_t DenseHermite<Voxel>::memory_bytes() const {
 
 template <DenseVoxel Voxel>
 std::size_t DenseHermite<Voxel>::bytes_per_leaf() {
+  // Asked of a leaf, since OpenVDB adds masks, origin and alignment to the voxels.
   return LeafOf<Voxel>(openvdb::Coord(0), Voxel{}).memUsage();
 }
 
@@ -216,6 +235,7 @@ PackedHermite to_packed(const FixedDense& dense, RunContext& context, std::size_
 
 template <DenseVoxel Voxel>
 void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context) {
+  // From the small to the large: single voxels, then signs and crossings of leaves, then what lies between leaves.
   check_voxels(dense);
   std::size_t lost = 0;
   const FloatHermite hermite = to_sparse(dense, context, &lost);
@@ -229,6 +249,7 @@ void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context) {
     throw Error("the Hermite data have crossings where their signs do not change");
 }
 
+// OpenVDB trees take seconds to compile, so the four are made here and nowhere else.
 #define HERMESH_INSTANTIATE(Voxel)                                                              \
   template struct DenseHermite<Voxel>;                                                          \
   template DenseHermite<Voxel> to_dense<Voxel>(const FloatHermite&, RunContext&, NormalCodeId); \
@@ -241,6 +262,7 @@ HERMESH_INSTANTIATE(ThesisVoxel)
 HERMESH_INSTANTIATE(FixedVoxel)
 
 void register_hermite_grids() {
+  // Registering a type a second time is an error in OpenVDB.
   const auto once = []<class Grid>(Grid*) {
     if (!Grid::isRegistered()) Grid::registerGrid();
   };

@@ -27,7 +27,7 @@ Solid turned_box(double degrees, double radius) {
   };
 }
 
-/// The same leaf values and states, tiles and background.
+/// Whether two trees have equal leaf values and states, tiles and background.
 template <class Tree>
 testing::AssertionResult same_tree(const Tree& a, const Tree& b) {
   if (!a.hasSameTopology(b)) return testing::AssertionFailure() << "topology differs";

@@ -48,7 +48,8 @@ struct DenseTree {
   typename DenseGrid<Voxel>::Ptr grid;
 };
 
-/// As a grid has it: the map of index coordinates, without the split into parts near the base and the origin.
+/// A placement as a grid's transform: the map of index coordinates, without the split into parts near the base and the
+/// origin.
 openvdb::math::Transform::Ptr transform_of(const IndexToWorld& placement);
 
 /// A voxel without crossings, which all tiles and the background are.

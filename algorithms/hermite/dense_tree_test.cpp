@@ -19,7 +19,7 @@ const auto& tree_of(const DenseHermite<Voxel>& dense) {
   return dense.tree->grid->tree();
 }
 
-/// With another grid in it.
+/// Dense data with another grid in them.
 template <class Voxel>
 DenseHermite<Voxel> replaced(DenseHermite<Voxel> dense, typename DenseGrid<Voxel>::Ptr grid) {
   dense.tree = std::make_shared<const DenseTree<Voxel>>(DenseTree<Voxel>{std::move(grid)});
@@ -46,7 +46,7 @@ TYPED_TEST(DenseTreeOf, PruningChangesNoValue) {
   EXPECT_TRUE(same(to_sparse(replaced(dense, grid), this->context_), to_sparse(dense, this->context_)));
 }
 
-/// The same data, `offset` samples (a multiple of 8) further along x.
+/// Data moved by `offset` samples (a multiple of 8) further along x.
 FloatHermite moved(FloatHermite hermite, int offset) {
   for (SignLeaf& leaf : hermite.leaves) leaf.lower[0] += offset;
   return hermite;

@@ -86,7 +86,7 @@ struct PrintedVoxel {
   struct Codes : Voxel {
     explicit Codes(const Voxel& voxel) : Voxel(voxel) {}
     using Voxel::set_edge;
-    /// Along z the flag goes with the edge.
+    /// Copies an edge with its code and offset; along z the flag goes with it.
     void copy_edge(int axis, const Voxel& from) {
       set_edge(axis, from.normal(axis), from.offset(axis));
       if (axis == 2) set_word(from.crosses(2) ? word() | kBit30 : word() & ~kBit30);

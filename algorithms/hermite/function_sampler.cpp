@@ -11,7 +11,7 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// A leaf that may own crossings, and what it turned out to own.
+/// A leaf that may own crossings, and the crossings that it turned out to own.
 struct Candidate {
   SignLeaf leaf{};
   std::vector<EdgeCrossing> crossings;
@@ -22,12 +22,14 @@ class FunctionSampler {
   FunctionSampler(const AnalyticSurface& surface, const IndexToWorld& placement, const Lower& lower,
                   const Lower& upper, double tolerance)
       : surface_(surface), placement_(placement), lower_(lower), upper_(upper), tolerance_(tolerance) {
-    // A function of this slope does not reach from a leaf's centre beyond the layers next to the leaf.
+    // The farthest sample that a leaf looks at lies 4 voxels from its center along each axis, 4.5 to be sure. If the
+    // value at the center is larger than such a way times the slope, none of these samples can have the other sign.
     reach_ = surface.lipschitz * 4.5 * placement.linear.colwise().norm().sum();
   }
 
   bool may_cross(const Lower& leaf) const {
     const Eigen::Vector3d centre = world(leaf, Eigen::Vector3d::Constant(4.0));
+    // Negated, so that a value that is no number lets the leaf be sampled, where it is reported.
     return !(std::abs(surface_.value(centre)) > reach_);
   }
 
@@ -36,6 +38,8 @@ class FunctionSampler {
     for (int x = 0; x < 9; ++x)
       for (int y = 0; y < 9; ++y)
         for (int z = 0; z < 9; ++z) {
+          // Of the samples beyond the leaf only those of the three layers next to it, without the edges where layers
+          // meet: no edge of the leaf ends there.
           const int beyond = (x == 8) + (y == 8) + (z == 8);
           if (beyond > 1 || !is_inside({leaf.lower[0] + x, leaf.lower[1] + y, leaf.lower[2] + z})) continue;
           if (x == 8)
@@ -54,6 +58,7 @@ class FunctionSampler {
 
  private:
   Eigen::Vector3d world(const Lower& index, const Eigen::Vector3d& step) const {
+    // Differences of whole numbers come first, which are exact, so that a far lattice costs no precision.
     Eigen::Vector3d local = step;
     for (int a = 0; a < 3; ++a) local[a] += double(index[a]) - double(placement_.base[a]);
     return placement_.local(local) + placement_.origin;
@@ -62,6 +67,7 @@ class FunctionSampler {
   bool is_inside(const Lower& index) const {
     bool border = false;
     for (int a = 0; a < 3; ++a) {
+      // Samples beyond the box are outside, whatever the function says there.
       if (index[a] < lower_[a] || index[a] > upper_[a]) return false;
       border = border || index[a] == lower_[a] || index[a] == upper_[a];
     }
@@ -76,6 +82,8 @@ class FunctionSampler {
     const Lower start{leaf.lower[0] + (i >> 6), leaf.lower[1] + ((i >> 3) & 7), leaf.lower[2] + (i & 7)};
     const auto at = [&](double offset) { return world(start, offset * Eigen::Vector3d::Unit(axis)); };
     const auto value = [&](double offset) { return surface_.value(at(offset)); };
+    // TOMS 748 (Alefeld, Potra & Shi 1995) keeps a bracket: the ends of the edge have different signs, so it converges
+    // whatever the function is like. 200 steps are more than halving alone would need.
     std::uintmax_t steps = 200;
     const auto close = [&](double a, double b) { return b - a <= tolerance_; };
     const auto [a, b] = boost::math::tools::toms748_solve(value, 0.0, 1.0, close, steps);
@@ -101,6 +109,7 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
                              const Lower& upper, double tolerance, RunContext& context) {
   Stage stage(context, "Hermite data from a function");
   if (!(tolerance > 0) || !(surface.lipschitz > 0)) throw Error("the tolerance and the slope's bound must be positive");
+  // Blocks that the box touches, and those that own an edge into it.
   Lower first{}, leaves{};
   for (int a = 0; a < 3; ++a) {
     if (lower[a] > upper[a]) throw Error("the box to be sampled is empty");
@@ -108,6 +117,8 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
     leaves[a] = (((upper[a] & ~7) - first[a]) >> 3) + 1;
   }
   const FunctionSampler sampler(surface, placement, lower, upper, tolerance);
+  // A layer of leaves of one x for each task. Candidates come in ascending order within a layer, and layers are joined
+  // in order, whatever thread made them.
   std::vector<std::vector<Candidate>> layers(static_cast<std::size_t>(leaves[0]));
   parallel_blocks(layers.size(), context, [&](std::size_t x) {
     for (std::int32_t y = 0; y < leaves[1]; ++y)
@@ -123,6 +134,7 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
   });
   FloatHermite result;
   result.placement = placement;
+  // The sum is checked to be an index before the records are copied.
   std::vector<std::uint64_t> counts;
   for (const auto& layer : layers)
     for (const Candidate& candidate : layer) counts.push_back(candidate.crossings.size());

@@ -22,7 +22,7 @@ IndexToWorld lattice(double voxel_size) {
   return placement;
 }
 
-/// Calls f(world position, normal).
+/// Calls f(world position, normal) for every crossing.
 template <class F>
 void for_each_hit(const FloatHermite& hermite, F&& f) {
   for_each_normal(hermite, [&](const Vector3d& place, const Vector3d& normal) {

@@ -19,6 +19,7 @@ using openvdb::Coord;
 using openvdb::Index;
 using openvdb::Int32Tree;
 
+// A reader refuses any other version: what bits mean is not guessed.
 constexpr std::int32_t kVersion = 1;
 constexpr const char *kDense = "hermite", *kSigns = "hermite_signs", *kCrossings = "hermite_crossings";
 constexpr const char* kNormals = "unit vectors in index space, towards the outside";
@@ -44,7 +45,8 @@ void describe(openvdb::GridBase& grid, const char* name, const IndexToWorld& pla
   grid.insertMeta(kBaseKey, openvdb::Vec3IMetadata({placement.base[0], placement.base[1], placement.base[2]}));
 }
 
-/// The transform is what counts, for other programs may have changed it; the metadata only divide its translation.
+/// Placement of a grid that was read. The transform is what counts, for other programs may have changed it; the
+/// metadata only divide its translation.
 IndexToWorld placement_of(const openvdb::GridBase& grid) {
   if (!grid.transform().isLinear()) throw Error("the Hermite data have a perspective transform");
   const openvdb::Mat4R matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
@@ -53,6 +55,7 @@ IndexToWorld placement_of(const openvdb::GridBase& grid) {
     for (int column = 0; column < 3; ++column) plain.linear(row, column) = matrix(column, row);
   plain.origin = {matrix(3, 0), matrix(3, 1), matrix(3, 2)};
   const double volume = std::abs(plain.linear.determinant());
+  // Normals of index space have no direction in the world under such a transform.
   if (!std::isfinite(volume) || volume == 0.0 || !plain.origin.allFinite())
     throw Error("the Hermite data have a transform that cannot be inverted");
   const auto offset = grid.getMetadata<openvdb::Vec3DMetadata>(kOffsetKey);
@@ -62,6 +65,7 @@ IndexToWorld placement_of(const openvdb::GridBase& grid) {
   const openvdb::Vec3i& at = base->value();
   const IndexToWorld divided{
       plain.linear, to_eigen(offset->value()), to_eigen(origin->value()), {at.x(), at.y(), at.z()}};
+  // Metadata that no longer fit the transform are out of date, and are left aside.
   return same_lattice(divided, plain) ? divided : plain;
 }
 
@@ -82,11 +86,13 @@ std::string check_description(const openvdb::GridBase& grid) {
   if (version->value() != kVersion)
     throw Error("the Hermite data are of version " + std::to_string(version->value()) +
                 ", this program reads version " + std::to_string(kVersion));
+  // The words themselves are compared: a later version may store normals of world space.
   if (normals->value() != kNormals) throw Error("the Hermite data have normals of another kind");
   return code->value();
 }
 
 BoolTree::LeafNodeType* make_sign_leaf(const SignLeaf& signs) {
+  // Owners of a crossing edge are active, so that OpenVDB does not prune a leaf that has one.
   auto leaf = std::make_unique<BoolTree::LeafNodeType>(sign_tree::coord(signs.lower));
   for_each_bit(signs.inside, [&](int sample) { leaf->setValueOnly(static_cast<Index>(sample), true); });
   for (const BlockMask& axis : crossing_edges(signs))
@@ -94,14 +100,17 @@ BoolTree::LeafNodeType* make_sign_leaf(const SignLeaf& signs) {
   return leaf.release();
 }
 
+// Crossings are a list, laid out as a row of leaves along x, for OpenVDB has no grid of one dimension.
 Coord leaf_of_crossings(std::size_t leaf) { return Coord(static_cast<std::int32_t>(8 * leaf), 0, 0); }
 
 Int32Tree::Ptr make_crossing_tree(const LargeArray<PackedCrossing>& crossings, RunContext& context) {
+  // Leaves in parallel, each by one thread; the tree takes them one after the other.
   std::vector<std::unique_ptr<Int32Tree::LeafNodeType>> leaves((crossings.size() + kPerLeaf - 1) / kPerLeaf);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     leaves[i] = std::make_unique<Int32Tree::LeafNodeType>(leaf_of_crossings(i), 0);
     const std::size_t begin = i * kPerLeaf, end = std::min(begin + kPerLeaf, crossings.size());
     for (std::size_t n = begin; n < end; ++n) {
+      // The 32 bits of a record as an integer; they mean nothing as a number.
       const std::uint32_t bits = crossings[n].normal | (std::uint32_t{crossings[n].offset_and_tag} << 16);
       leaves[i]->setValueOn(static_cast<Index>(n - begin), std::bit_cast<std::int32_t>(bits));
     }
@@ -118,6 +127,7 @@ void read_crossings(const Int32Tree& tree, LargeArray<PackedCrossing>& crossings
     return Error("the Hermite data have " + std::to_string(held) + " crossings, but their signs have " +
                  std::to_string(crossings.size()) + " crossing edges, or other crossings than the first");
   };
+  // As many as the signs ask for, and below each at its place: so no other place can hold one.
   if (held != crossings.size()) throw wrong();
   parallel_blocks((crossings.size() + kPerLeaf - 1) / kPerLeaf, context, [&](std::size_t i) {
     const auto* leaf = tree.probeConstLeaf(leaf_of_crossings(i));  // none where all are equal and were pruned
@@ -125,6 +135,7 @@ void read_crossings(const Int32Tree& tree, LargeArray<PackedCrossing>& crossings
     for (std::size_t n = begin; n < end; ++n) {
       const auto place = static_cast<Index>(n - begin);
       std::int32_t value = 0;
+      // A leaf whose records are all equal may have become a tile on its way through another program.
       const bool active =
           leaf ? leaf->probeValue(place, value)
                : tree.probeValue(leaf_of_crossings(i) + Int32Tree::LeafNodeType::offsetToLocalCoord(place), value);
@@ -149,8 +160,11 @@ PackedHermite read_packed(VdbReader& file, RunContext& context) {
   PackedHermite hermite;
   const std::string code = check_description(*signs);
   hermite.normal_code = parse_normal_code(code);
+  // Both grids say it, so that each is known for what it is by itself.
   if (check_description(*crossings) != code) throw Error("the Hermite data name two codes of normals");
   hermite.placement = placement_of(*signs);
+  // The signs come first and decide how many crossings there are; then the crossings; then all is held against itself,
+  // as for any data from outside.
   sign_tree::read_signs(signs->tree(), hermite, context, is_inside);
   read_crossings(crossings->tree(), hermite.crossings, context);
   check_consistent(hermite);
@@ -166,7 +180,9 @@ bool read_dense_as(const openvdb::GridBase::Ptr& grid, RunContext& context, std:
   DenseHermite<Voxel> hermite{
       placement_of(*typed), {}, std::make_shared<const DenseTree<Voxel>>(DenseTree<Voxel>{typed})};
   const std::string code = check_description(*typed);
+  // A code that voxels have no use for is the default, as in data that were never written.
   hermite.normal_code = code == "none" ? NormalCodeId::octahedral : parse_normal_code(code);
+  // The voxels decide what codes there can be: floats have none, and the layout of the thesis its own.
   if (code != code_name<Voxel>(hermite.normal_code))
     throw Error("the Hermite data name a code of normals that does not fit their voxels");
   check_consistent(hermite, context);
@@ -177,6 +193,7 @@ bool read_dense_as(const openvdb::GridBase::Ptr& grid, RunContext& context, std:
 AnyHermite read_dense(VdbReader& file, RunContext& context) {
   const openvdb::GridBase::Ptr grid = file.read(kDense);
   std::optional<AnyHermite> result;
+  // The type of the grid tells which layout it is; the first that fits reads it.
   if (!(read_dense_as<FixedVoxel>(grid, context, result) || read_dense_as<ThesisVoxel>(grid, context, result) ||
         read_dense_as<DirectedVoxel>(grid, context, result) || read_dense_as<FloatVoxel>(grid, context, result)))
     throw Error("the grid '" + std::string(kDense) + "' has values of another type");
@@ -184,8 +201,10 @@ AnyHermite read_dense(VdbReader& file, RunContext& context) {
 }
 
 AnyHermite read_any(VdbReader& file, RunContext& context) {
+  // A file has one form or the other; the dense one is a single grid.
   if (file.has(kDense)) return read_dense(file, context);
   if (file.has(kSigns) && file.has(kCrossings)) return read_packed(file, context);
+  // What is there instead is the help that can be given.
   const std::string names = file.joined_names();
   throw Error("there are no Hermite data, but " + (names.empty() ? "nothing" : "the grids " + names));
 }
@@ -195,11 +214,13 @@ AnyHermite read_any(VdbReader& file, RunContext& context) {
 void write_hermite(const fs::path& path, const PackedHermite& hermite, RunContext& context) {
   Stage stage(context, "write Hermite data");
   initialize_openvdb();
+  // A leaf for each sign leaf, and tiles where the sign is not that of infinity; the rest is background.
   const auto signs = openvdb::BoolGrid::create(sign_tree::make_tree<BoolTree>(
       hermite, {false, true}, context, [&](std::size_t i) { return make_sign_leaf(hermite.leaves[i]); }));
   const auto crossings = openvdb::Int32Grid::create(make_crossing_tree(hermite.crossings, context));
   const std::string code(name(hermite.normal_code));
   describe(*signs, kSigns, hermite.placement, code);
+  // A list lies nowhere: its grid has the identity for a transform.
   describe(*crossings, kCrossings, IndexToWorld{}, code);
   write_grids(path, {signs, crossings});
 }
@@ -226,6 +247,7 @@ AnyHermite read_hermite(const fs::path& path, RunContext& context) {
   return about_vdb_file(path, [&] {
     VdbReader file(path);
     try {
+      // What is thrown below speaks of the data; the name of the file goes in front here, once.
       return read_any(file, context);
     } catch (const Error& e) {
       throw Error(path.string() + ": " + e.what());

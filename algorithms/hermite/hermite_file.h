@@ -24,11 +24,11 @@ namespace hermesh {
 
 using AnyHermite = std::variant<PackedHermite, FixedDense, ThesisDense, DirectedDense, FloatDense>;
 
-/// Writes aside, then renames. @throws Error if the path cannot be written.
+/// Writes the data aside, then renames. @throws Error if the path cannot be written.
 void write_hermite(const std::filesystem::path& path, const PackedHermite& hermite, RunContext& context);
 template <DenseVoxel Voxel>
 void write_hermite(const std::filesystem::path& path, const DenseHermite<Voxel>& hermite, RunContext& context);
-/// As FloatVoxel, which loses nothing.
+/// Writes the data as FloatVoxel, which loses nothing. @throws Error if the path cannot be written.
 void write_hermite(const std::filesystem::path& path, const FloatHermite& hermite, RunContext& context);
 
 /// Reads what write_hermite() wrote, bit by bit the same. @throws Error, in one sentence about the file, for one that
@@ -36,6 +36,7 @@ void write_hermite(const std::filesystem::path& path, const FloatHermite& hermit
 /// themselves as check_consistent() tells.
 AnyHermite read_hermite(const std::filesystem::path& path, RunContext& context);
 
+/// What Hermite data take, and in what form.
 struct HermiteSummary {
   std::string representation;  ///< "packed" or the name of the voxel type
   std::string normal_code;     ///< "none" where normals are not coded
@@ -43,7 +44,7 @@ struct HermiteSummary {
 };
 HermiteSummary summary_of(const AnyHermite& hermite);
 
-/// For what works on crossings in single precision, whatever a file has. `lost` as in to_sparse().
+/// The data in single precision, whatever representation a file has. `lost` as in to_sparse().
 FloatHermite to_float(const AnyHermite& hermite, RunContext& context, std::size_t* lost = nullptr);
 
 }  // namespace hermesh

@@ -9,8 +9,8 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// Directions, of which bit 1 << (|dx| + 2|dy| + 4|dz|) is set, of the blocks below a leaf that hold a cell with one of its
-/// crossing edges: the cells around an edge begin at its own sample and one step down each axis that is not the edge's.
+/// Which blocks below a leaf hold a cell with one of its crossing edges: bit |dx| + 2|dy| + 4|dz| for each direction.
+/// The cells around an edge begin at its own sample and one step down each axis that is not the edge's.
 unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
   constexpr std::uint64_t kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
   // Whether an edge along `axis` starts in the first layers along the axes whose bits are set in `down`.
@@ -20,6 +20,7 @@ unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
       if (edges[axis][x] & bits) return true;
     return false;
   };
+  // Six directions: an edge moves down along two axes at most, so never along all three.
   unsigned wanted = 0;
   for (int down = 1; down < 7; ++down)
     for (int axis = 0; axis < 3; ++axis)
@@ -38,9 +39,11 @@ std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunCont
     // The crossing edges are found anew for the blocks: to keep them would take longer.
     const unsigned wanted = blocks_below(crossing_edges(leaves[i]));
     for (int down = 1; down < 7; ++down)
+      // A block below comes before this one, so only the leaves before it are searched.
       if (wanted >> down & 1 && !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
         missing[i] = static_cast<std::uint8_t>(missing[i] | 1u << down);
   });
+  // Several leaves may want the same block; sorted, its doubles lie side by side.
   std::vector<Lower> found;
   for (std::size_t i = 0; i < leaves.size(); ++i)
     for (int down = 1; down < 7; ++down)
@@ -77,6 +80,7 @@ void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
       const std::size_t end = found ? (there + 1)->first : 0;
       for (std::size_t i = columns[c].first; i < columns[c + 1].first; ++i) {
         const std::int32_t z = blocks[i].lower[2];
+        // Both columns ascend, so one sweep over them finds all neighbors, in time that grows with their lengths.
         while (next < end && blocks[next].lower[2] < z - 8) ++next;
         for (std::size_t slot = 0, at = next; slot < 3; ++slot) {
           const bool hit = at < end && blocks[at].lower[2] == z + 8 * (static_cast<int>(slot) - 1);
@@ -97,6 +101,7 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
   }
   blocks_.resize(leaves.size() + added.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
+    // Leaves and added blocks are merged in order: an added block stands before the leaf that follows it.
     const auto added_before = std::ranges::upper_bound(leaves_before, i) - leaves_before.begin();
     Block& block = blocks_[i + static_cast<std::size_t>(added_before)];
     block.lower = leaves[i].lower;

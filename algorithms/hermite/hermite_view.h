@@ -14,26 +14,27 @@
 
 namespace hermesh {
 
-/// There is a block for every cell with a crossing edge and for every owner of one. The view refers to the data that it
-/// was made of, which must outlive it.
+/// Hermite data as blocks: there is one for every cell with a crossing edge and for every owner of one. The view refers
+/// to the data that it was made of, which must outlive it.
 class HermiteView {
  public:
   struct Block {
     std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample
     std::int32_t leaf;                  ///< number among the leaves that own crossings; −1 for none
     BlockMask inside;
-    std::array<BlockMask, 3> crossing;  ///< by axis: samples whose up-wind edge is crossed
-    std::array<std::array<std::uint16_t, 8>, 3> before;  ///< by axis and word: crossing edges of the block before it
-    /// By neighbour_slot(); a block's number, or −1 where there is none.
+    std::array<BlockMask, 3> crossing;  ///< samples whose up-wind edge is crossed, by axis
+    std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
+    /// Numbers of the blocks around, by neighbour_slot(); −1 where there is none.
     std::array<std::int32_t, 27> neighbours;
 
-    /// Of a crossing edge among those of the block, by axis and then by sample.
+    /// Rank of a crossing edge among those of the block, by axis and then by sample.
     std::uint32_t rank(int axis, int sample) const {
       const int word = sample >> 6;
       return before[axis][word] +
              static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
     }
     int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
+    /// Fills in `before` from `crossing`.
     void count_before() {
       int sum = 0;
       for (int axis = 0; axis < 3; ++axis)
@@ -44,19 +45,19 @@ class HermiteView {
     }
   };
 
-  using Blocks = LargeArray<Block>;  ///< no member of theirs is set before it is written
+  using Blocks = LargeArray<Block>;  ///< members of a new block are undefined until they are written
 
   virtual ~HermiteView() = default;
   const Blocks& blocks() const { return blocks_; }
   const IndexToWorld& placement() const { return placement_; }
 
-  /// Of an edge that is crossed.
+  /// The crossing of an edge, which must be crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
-  /// Of all of a block, in the order of Block::rank(). @param out room for as many, 1536 at most
+  /// All crossings of a block, in the order of Block::rank(). `out` has room for as many, 1536 at most.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const = 0;
 
  protected:
-  /// `leaves` in ascending order; all of them own a crossing edge.
+  /// Makes the blocks of `leaves`, which come in ascending order and all own a crossing edge. @throws Cancelled.
   HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context);
 
  private:
@@ -67,7 +68,7 @@ class HermiteView {
 /// Sets `neighbours` of blocks in ascending order of (x, y, z).
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
 
-/// `Read` turns a crossing of the data into an EdgeCrossing.
+/// View of sparse data. `Read` turns a crossing of the data into an EdgeCrossing.
 template <class Crossing, class Read>
 class SparseView : public HermiteView {
  public:

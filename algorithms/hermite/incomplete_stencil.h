@@ -23,10 +23,10 @@ struct SampledVolume {
   float data_below;  ///< samples of no less than this magnitude are no data
 };
 
-/// Near the surface at 0 of a level set all that is no data has the background's magnitude, and nothing else
-/// is asked. Where the band is narrower inside it has less there; at other isovalues the band may be wider on
-/// that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
-/// the active samples are data. Nothing if tiles do not tell and the samples must be looked at.
+/// Which samples are data. Near the surface at 0 of a level set all that is no data has the background's magnitude,
+/// and nothing else is asked. Where the band is narrower inside it has less there; at other isovalues the band may be
+/// wider on that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
+/// the active samples are data. Nothing is returned if tiles do not tell and the samples must be looked at.
 inline std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set) {
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
   const float background = std::fabs(grid.background());
@@ -43,7 +43,7 @@ inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& leve
   return {table, false, background};
 }
 
-/// One edge: where a sample is no data, differences to one side, or none.
+/// The crossing of one edge: where a sample is no data, differences are taken to one side, or none.
 class IncompleteStencil {
  public:
   IncompleteStencil(const SampledVolume& volume, std::size_t leaf)
@@ -81,7 +81,7 @@ class IncompleteStencil {
     return {value, active && std::fabs(value) < volume_.data_below};
   }
 
-  /// Derivative along each axis; 0 along an axis without data.
+  /// Gradient of the signed value, which points outwards; 0 along an axis without data.
   Eigen::Vector3d gradient(const std::array<int, 3>& p) const {
     Eigen::Vector3d result = Eigen::Vector3d::Zero();
     const Sample here = at(p);

@@ -10,7 +10,7 @@
 
 namespace hermesh {
 
-/// One leaf's. It must outlive the input that it fills.
+/// Stencils of one leaf's edges. They must outlive the input that they fill.
 class LeafStencils final : public edge_kernels::PlainCrossing {
  public:
   LeafStencils(const SampledVolume& volume, std::size_t leaf)
@@ -43,7 +43,7 @@ class LeafStencils final : public edge_kernels::PlainCrossing {
  private:
   const SampledVolume& volume_;
   std::size_t leaf_;
-  std::array<std::int32_t, 27> around_;  ///< as LeafPlaces::surroundings()
+  std::array<std::int32_t, 27> around_;  ///< numbers of the leaves around, as LeafPlaces::surroundings() gives them
   std::array<BlockMask, 27> active_;
 };
 

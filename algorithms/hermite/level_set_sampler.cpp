@@ -19,11 +19,11 @@
 namespace hermesh {
 namespace {
 
-/// Room for as many crossings as a thread finds; what was taken stays where it is.
+/// Memory for as many crossings as a thread finds; what was taken stays where it is.
 template <class Crossing>
 class CrossingStore {
  public:
-  /// Room for `count` and a kernel's kOutRoom behind.
+  /// Room for `count` crossings and for kOutRoom of a kernel behind.
   Crossing* room_for(std::size_t count) {
     if (used_ + count + edge_kernels::kOutRoom > kBlock) {
       // This allocator keeps what it is given back. Pages that the system has to clear each time cost as much as a fifth
@@ -51,8 +51,9 @@ class LeafSigns {
  public:
   explicit LeafSigns(const LeafPlaces& leaves) : leaves_(leaves) {}
 
-  /// Writes `inside` and `beyond`.
+  /// Writes the leaf's `inside` and `beyond` to `signs`.
   void read(std::size_t leaf, SignLeaf& signs) {
+    // Leaves of a column follow one another along z, so the signs above one leaf are the own signs of the next.
     if (leaf_above_ == static_cast<std::int64_t>(leaf))
       signs.inside = above_;
     else
@@ -75,7 +76,7 @@ class LeafSigns {
 
  private:
   static std::uint64_t uniform(std::int32_t tile) { return tile == kUniformInside ? ~std::uint64_t{0} : 0; }
-  /// Of eight rows that start so many samples apart.
+  /// Signs of eight rows that start `stride` samples apart, in a leaf or a tile.
   std::uint64_t first_rows(std::int32_t there, std::size_t stride) const {
     return there < 0 ? uniform(there) : reader_.rows(leaves_.values(there), stride, leaves_.rule());
   }
@@ -109,6 +110,7 @@ class Sampler {
       context_.check();
       sample_leaves(range.begin(), range.end());
     });
+    // Errors are thrown here, by one thread: which sample was found first must not matter.
     beside.wait();
     if (not_finite_) throw_not_finite();
     if (incomplete_ || tiles_meet) return false;
@@ -158,6 +160,7 @@ class Sampler {
     std::size_t count = 0;
     for (std::size_t i = 0; i < batch.size; ++i) {
       const std::size_t leaf = batch.leaf[i];
+      // Only leaves with crossings get a place, and stencils are gathered for no others.
       const openvdb::Coord lower = leaves_.lower(leaf);
       signs_[leaf].lower = {lower.x(), lower.y(), lower.z()};
       batch.stencils[i].emplace(volume_, leaf).fill(batch.inputs[i]);
@@ -165,6 +168,7 @@ class Sampler {
     }
     CrossingStore<Crossing>& store = stores_.local();
     Crossing* out = store.room_for(count);
+    // In the order of the leaves of the batch, so each gets the next `count` records.
     sample_(batch.inputs.data(), static_cast<int>(batch.size), out);
     store.take(count);
     for (std::size_t i = 0; i < batch.size; ++i) {
@@ -186,7 +190,8 @@ class Sampler {
     for (int i = 0; i < 8; ++i) __builtin_prefetch(y + 64 * i);
   }
 
-  /// To their places in the result, which are in order of (x, y, z).
+  /// Copies the crossings to their places in the result, which are in order of (x, y, z): count, scan and fill by
+  /// slabs of one x.
   void copy(SparseHermite<Crossing>& result) {
     const std::vector<LeafPlaces::Slab> slabs = leaves_.slabs();
     std::vector<std::uint64_t> live(slabs.size()), crossings(slabs.size());
@@ -214,6 +219,7 @@ class Sampler {
         const Found found = found_[leaf];
         if (found.count == 0) return;
         SignLeaf& to = result.leaves[number++] = signs_[leaf];
+        // From here on the leaf knows where its crossings are, whichever thread made them.
         to.first = static_cast<std::uint32_t>(first);
         std::copy_n(found.crossings, found.count, result.crossings.data() + first);
         first += found.count;
@@ -227,8 +233,8 @@ class Sampler {
   edge_kernels::Sample<Crossing>* sample_;
   RunContext& context_;
   const edge_kernels::Kernels& kernels_ = edge_kernels::chosen();
-  LargeArray<SignLeaf> signs_;  ///< by leaf; where no edge is crossed, without a place
-  LargeArray<Found> found_;     ///< by leaf
+  LargeArray<SignLeaf> signs_;  ///< signs by leaf; without a place where no edge is crossed
+  LargeArray<Found> found_;     ///< crossings by leaf
   tbb::enumerable_thread_specific<CrossingStore<Crossing>> stores_;
   std::atomic<bool> not_finite_{false}, incomplete_{false};
 };
@@ -239,6 +245,8 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
   SparseHermite<Crossing> result;
   const Stage stage(context, "Hermite data from the level set");
   {
+    // First on the assumption that all crossed edges start in leaves, as they do where a band encloses the surface:
+    // then signs and crossings are made in one sweep over the samples.
     const LeafPlaces leaves(level_set, isovalue, context);
     const std::optional<SampledVolume> volume = sampled_volume(leaves, level_set);
     if (volume && Sampler<Crossing>(level_set, *volume, sample_leaves, context).run(result)) return result;

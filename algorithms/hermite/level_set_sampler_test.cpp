@@ -286,7 +286,7 @@ TEST_F(LevelSetSamplerTest, LeavesAllOfWhoseEdgesAreCrossed) {
   expect_as_plain(grid, 0.0, 3 * 23 * 23 * 79);
 }
 
-/// That the data of a volume are the same bytes however they are made, packed in any code or not.
+/// Expects that the data of a volume are the same bytes however they are made, packed in any code or not.
 void expect_same_bytes(const openvdb::FloatGrid::Ptr& grid) {
   const LevelSet volume = make_level_set(grid);
   RunContext context;

@@ -13,15 +13,15 @@ namespace hermesh {
 /// or a difference slivers of material that are lost, of a union gaps that are filled. No sample lies in
 /// them.
 struct LostSlivers {
-  std::size_t edges = 0;  ///< with such a part
+  std::size_t edges = 0;  ///< number of edges with such a part
   double volume = 0.0;    ///< cubic voxels, about: what the lattice lines along that axis find that find most
   double longest =
-      0.0;  ///< voxels, of the longest part: the thickness there if the edge is at right angles to it
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< of the longest part's middle, world units
+      0.0;  ///< length of the longest part, voxels: the thickness there if the edge is at right angles to it
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< middle of the longest part, world units
 };
 
-/// Of two operands on one lattice, as combine() takes them. Parts of less than a thousandth of a voxel are
-/// taken for rounding, and do not count. Symmetric in the operands of a union and an intersection.
+/// What the combination of two operands on one lattice loses, as combine() takes them. Parts of less than a thousandth
+/// of a voxel are taken for rounding, and do not count. Symmetric in the operands of a union and an intersection.
 LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b);
 
 }  // namespace hermesh

@@ -55,7 +55,7 @@ inline constexpr std::array kNormalCodes = {NormalCodeId::thesis, NormalCodeId::
                                             NormalCodeId::rounded, NormalCodeId::octahedral,
                                             NormalCodeId::nearest};
 
-/// f(code) with an empty object of the code's type: with_normal_code(id, [](auto code) { using Code =
+/// Calls f(code) with an empty object of the code's type: with_normal_code(id, [](auto code) { using Code =
 /// decltype(code); … }).
 template <class Function>
 decltype(auto) with_normal_code(NormalCodeId id, Function&& f) {
@@ -78,7 +78,7 @@ inline std::string_view name(NormalCodeId id) {
   return with_normal_code(id, [](auto code) { return std::string_view(decltype(code)::name); });
 }
 
-/// @throws Error that lists the names there are.
+/// The code of a name. @throws Error that lists the names there are.
 inline NormalCodeId parse_normal_code(std::string_view text) {
   std::string known;
   for (const NormalCodeId id : kNormalCodes) {

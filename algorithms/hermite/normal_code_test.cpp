@@ -23,7 +23,8 @@ Normal opposite(const Normal& n) { return {-n[0], -n[1], -n[2]}; }
 
 double length(const Normal& n) { return std::hypot(double(n[0]), double(n[1]), double(n[2])); }
 
-/// By the arc tangent, because the arc cosine loses half of the digits of a small angle.
+/// Angle between two vectors in degrees, by the arc tangent, because the arc cosine loses half of the digits of a small
+/// angle.
 double degrees_between(const Normal& p, const Normal& q) {
   const double x = double(p[1]) * q[2] - double(p[2]) * q[1], y = double(p[2]) * q[0] - double(p[0]) * q[2],
                z = double(p[0]) * q[1] - double(p[1]) * q[0];
@@ -79,7 +80,7 @@ using AllCodes = testing::Types<ThesisNormalCode, BaptistaNormalCode, RoundedNor
                                 NearestNormalCode>;
 TYPED_TEST_SUITE(NormalCodes, AllCodes);
 
-/// What holds of codes that round to the nearest step, and not of those that floor.
+/// Properties of codes that round to the nearest step, and not of those that floor.
 template <class Code>
 class RoundingNormalCodes : public testing::Test {};
 using RoundingCodes = testing::Types<RoundedNormalCode, OctahedralNormalCode, NearestNormalCode>;
@@ -145,7 +146,7 @@ TYPED_TEST(RoundingNormalCodes, ComeBackFromTheirNormals) {
   EXPECT_EQ(normals.size(), packed_codes<TypeParam>().size()) << "two codes are the same normal";
 }
 
-/// A step further than Baptista's rounding error could take it.
+/// Normals a step further into their cells than Baptista's rounding error could take them.
 TEST(BaptistaNormalCode, ComesBackFromANormalJustInsideOfItsCell) {
   for (const std::uint16_t code : packed_codes<BaptistaNormalCode>()) {
     Normal n = BaptistaNormalCode::unpack(code);
@@ -267,7 +268,7 @@ TEST(OctahedralNormalCode, ByHand) {
   EXPECT_EQ(OctahedralNormalCode::pack({-1e-9f, -20.0f, -107.0f}), 107 << 8 | (256 - 127));
 }
 
-/// On the face the nearest point of the lattice; judged by trying all that are near.
+/// The code of `nearest` is the nearest point of the lattice on the face, judged by trying all that are near.
 TEST(NearestNormalCode, IsNearestOnTheFace) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> coordinate(0.0, 127.0);

@@ -33,9 +33,9 @@ struct KeyHash {
   }
 };
 
-/// Whether the triangles, their normals twice as long as they are large, are wound inside out: the volume is negative, that
-/// of an open mesh, which is that of the cone to it, wherever in the mesh's box the cone's apex is. (It is linear in the
-/// apex.) A flat sheet's is rounding, and says nothing.
+/// Whether the triangles, whose normals have twice their areas as lengths here, are wound inside out: their signed
+/// volume is negative. The volume of an open mesh is that of the cone from an apex, and must be negative wherever in
+/// the mesh's box the apex is. (It is linear in the apex.) The volume of a flat sheet is rounding, and says nothing.
 bool is_inside_out(const std::vector<IndexTriangle>& triangles) {
   if (triangles.empty()) return false;
   Eigen::AlignedBox3d box;
@@ -60,6 +60,7 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
   std::vector<IndexTriangle> result(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     IndexTriangle& t = result[i];
+    // In double precision, relative to the base of the placement, so that coordinates are small.
     for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
     t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
   }
@@ -67,6 +68,7 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
   const double turn = is_inside_out(result) ? -1.0 : 1.0;
   for (IndexTriangle& t : result) {
     const double length = t.normal.norm();
+    // A triangle without an area keeps a normal of 0: it is met by no line, and faces no way.
     if (length > 0) t.normal /= turn * length;
   }
   return result;
@@ -102,6 +104,7 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
                            RunContext& context) {
   const auto& blocks = hermite.leaves;
   const auto& base = hermite.placement.base;
+  // Blocks of crossing edges by place. Nothing walks over the map, so that its order is of no account.
   std::unordered_map<Key, std::uint32_t, KeyHash> index;
   index.reserve(blocks.size());
   Key lowest{}, highest{};
@@ -130,6 +133,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
         from[a] = std::max(from[a], lowest[a]);
         to[a] = std::min(to[a], highest[a]);
       }
+      // The box of a large slanting triangle holds many blocks that its plane does not come near: half the block and
+      // kNearby along the normal.
       const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kNearby);
       for (int x = from[0]; x <= to[0]; ++x)
         for (int y = from[1]; y <= to[1]; ++y)
@@ -141,6 +146,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
           }
     }
   });
+  // Count – scan – fill. Chunks are taken in order, so each block lists its triangles in ascending order, whatever the
+  // threads did: equal hits go to the lowest number.
   TriangleBins bins;
   bins.first.assign(blocks.size() + 1, 0);
   for (const auto& pairs : found)
@@ -180,6 +187,8 @@ class LeafHits {
       return std::array<int, 2>{static_cast<int>(std::ceil(std::clamp(low, 0.0, 100.0))),
                                 static_cast<int>(std::floor(std::clamp(high, -1.0, double(limit))))};
     };
+    // Lattice lines along the axis that pass through the box of the triangle. A leaf owns edges that start at samples
+    // 0 to 7.
     const auto [u0, u1] = range(u, 7);
     const auto [v0, v1] = range(v, 7);
     const double shift = place == EdgePlace::of_sides ? 1.0 : 0.0;
@@ -191,6 +200,8 @@ class LeafHits {
     for (int pu = u0; pu <= u1; ++pu)
       for (int pv = v0; pv <= v1; ++pv) {
         const double x = lower_[u] + pu, y = lower_[v] + pv;
+        // Barycentric weights of the line in the projection of the triangle along the axis; all of one sign where it
+        // is met.
         const Eigen::Vector3d w = weights(x + shift * kSideShift[std::size_t(u)], y + shift * kSideShift[std::size_t(v)]);
         const double area = w.sum();
         if (area == 0 || (w / area).minCoeff() < -kTolerance) continue;
@@ -239,7 +250,7 @@ class LeafHits {
     int hits = 0;  ///< at different places
   };
 
-  /// For an edge that no polygon hits: the plane of the polygon nearest to the level set's crossing, if it
+  /// Gives an edge that no polygon hits a crossing: the plane of the polygon nearest to the level set's crossing, if it
   /// faces the way that the signs say, met as near to the edge as the edge's ends allow.
   bool take_nearest(int axis, int sample, const std::vector<IndexTriangle>& triangles,
                     std::span<const std::uint32_t> nearby) const {
@@ -267,6 +278,7 @@ class LeafHits {
   void offer(int axis, int u, int v, int pu, int pv, double met, double hit, const Eigen::Vector3d& normal,
              EdgePlace place) {
     if (!(met >= -kTolerance && met <= 8.0 + kTolerance)) return;
+    // A hit within the tolerance of a sample is offered to the edges on both sides.
     const int middle = static_cast<int>(std::floor(met));
     for (int k = std::max(0, middle - 1); k <= std::min(7, middle + 1); ++k) {
       if (met - k < -kTolerance || met - k > 1.0 + kTolerance) continue;
@@ -276,11 +288,14 @@ class LeafHits {
       const int sample = sample_index(local[0], local[1], local[2]);
       if (!test(edges_[axis], sample)) continue;
       Best& best = best_[axis][sample];
+      // Hits at the places of sides win: the second pass is for edges that got none.
       if (place == EdgePlace::of_samples && best.hits > 0 && !best.of_samples) continue;
       const bool consistent = (normal[axis] > 0) == test(leaf_.inside, sample);
       const double away = std::abs(offset - crossing_[axis][sample]->offset);
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
+      // A hit that passes the way that the signs say beats one that does not; among equals the one nearer to the level
+      // set's own crossing wins, and of those the first.
       const bool better = consistent != best.consistent ? consistent : away < best.away;
       if (first || better) best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
     }
@@ -289,7 +304,7 @@ class LeafHits {
   const SignLeaf& leaf_;
   const std::array<BlockMask, 3> edges_;
   std::array<double, 3> lower_{};
-  std::array<std::array<EdgeCrossing*, 512>, 3> crossing_;  ///< of crossing edges
+  std::array<std::array<EdgeCrossing*, 512>, 3> crossing_;  ///< records of the crossing edges
   std::array<std::array<Best, 512>, 3> best_{};
 };
 
@@ -312,6 +327,7 @@ FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const P
       for (const std::uint32_t t : nearby)
         for (int axis = 0; axis < 3; ++axis) hits->add(triangles[t], axis, place);
     };
+    // A leaf's hits are chosen by one thread and written to crossings of its own.
     add_all(LeafHits::EdgePlace::of_sides);
     if (hits->misses_some()) add_all(LeafHits::EdgePlace::of_samples);
     hits->write(triangles, nearby, counts[b]);

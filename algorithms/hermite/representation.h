@@ -24,12 +24,13 @@ Representation parse_representation(const std::string& name);
 
 struct Represented {
   FloatHermite hermite;       ///< what the representation gives back
-  std::size_t bytes = 0;      ///< that it takes, allocated
-  std::size_t crossings = 0;  ///< that there were before
-  std::size_t lost = 0;       ///< crossings that it lost; they came back as edges cut in the middle
+  std::size_t bytes = 0;      ///< bytes that it has allocated
+  std::size_t crossings = 0;  ///< number of crossings before
+  std::size_t lost = 0;       ///< number of crossings that it lost; they came back as edges cut in the middle
 };
 
-/// Its bytes, in all, a crossing and an active voxel of the level set, and what it lost, as figures of the run.
+/// Adds figures to the run: the bytes of the representation, in all, for each crossing and for each active voxel of
+/// the level set, and what it lost.
 void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context);
 
 /// Stores the data in a representation, with normals in `code` where it packs them, and reads them again.

@@ -8,8 +8,9 @@
 
 namespace hermesh {
 
-/// 104 bytes. An edge belongs to the sample that it starts from, so the leaf owns the edges that lead from its last
-/// layers into its three upper neighbours; their first layers' signs are kept here, and no neighbour is looked up.
+/// Signs of a leaf, in 104 bytes. An edge belongs to the sample that it starts from, so the leaf owns the edges that
+/// lead from its last layers into its three upper neighbors; the signs of their first layers are kept here, so that no
+/// neighbor is looked up.
 struct SignLeaf {
   std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample, multiples of 8
   std::uint32_t first;                ///< number of the leaf's first crossing
@@ -40,7 +41,7 @@ inline BlockMask successors(const SignLeaf& leaf, int axis) {
   return result;
 }
 
-/// By axis, the samples whose up-wind edge is crossed.
+/// For each axis the samples whose up-wind edge is crossed.
 inline std::array<BlockMask, 3> crossing_edges(const SignLeaf& leaf) {
   std::array<BlockMask, 3> result;
   for (int axis = 0; axis < 3; ++axis) {

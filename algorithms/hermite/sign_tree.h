@@ -55,7 +55,7 @@ void for_each_gap(const Root& root, const SparseHermite<Crossing>& hermite, F&& 
 /// Numbers of elements by the node of `width` samples that they lie in: runs of the result with equal nodes.
 struct Grouped {
   std::vector<std::pair<openvdb::Coord, std::uint32_t>> members;  ///< origin of the node, number of the element
-  std::vector<std::size_t> starts;                                ///< of the runs, and the end of the last
+  std::vector<std::size_t> starts;                                ///< first member of each run, and the end of the last
 };
 
 template <class Lower>

@@ -13,7 +13,8 @@
 namespace hermesh {
 namespace {
 
-/// A sample at 0 is outside, and so has to be in the complement's inside, which negation alone would deny it.
+/// A copy of a grid with the least positive number in place of zeros. A sample at 0 is outside, and so has to be in
+/// the inside of the complement, which negation alone would deny it.
 openvdb::FloatGrid::Ptr without_zeros(const openvdb::FloatGrid& grid) {
   const openvdb::FloatGrid::Ptr result = grid.deepCopy();
   for (auto value = result->beginValueAll(); value; ++value)
@@ -39,6 +40,7 @@ openvdb::FloatGrid::Ptr combined_values(Boolean boolean, const openvdb::FloatGri
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size) {
   Bounds both = bounds(a);
   const Bounds other = bounds(b);
+  // Minimum and maximum do not ask which mesh comes first.
   both.lower = both.lower.cwiseMin(other.lower);
   both.upper = both.upper.cwiseMax(other.upper);
   return {voxel_size, choose_origin(both)};
@@ -46,6 +48,8 @@ SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double 
 
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
                           RunContext& context) {
+  // The frame is a lattice without rotation; the mesh is voxelized near its zero, and what comes of it is moved back
+  // by whole blocks.
   const GridFrame frame{lattice.voxel_size, Eigen::Matrix3d::Identity(), lattice.origin};
   FramedMesh framed = into_frame(mesh, frame);
   // The lattice stays where it is, and what is said of places is said of the world's.
@@ -53,6 +57,7 @@ SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice,
                                                                              framed.first[2]);
   const LevelSet about_itself = voxelize(framed.mesh);
   SampledSolid solid;
+  // Before the grid is moved: crossings are relative to their leaves and move along with these.
   solid.hermite = sample_polygons(about_itself, 0.0, framed.mesh, context, &solid.sampling);
   if (solid.hermite.leaves.empty())
     throw Error(
@@ -79,6 +84,8 @@ CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     result.level_set = make_level_set(grid);
   }
+  // Signs of values and of Hermite data follow the same rule, sample by sample, so that both have the same crossing
+  // edges.
   result.hermite = combine(boolean, a.hermite, b.hermite, context);
   result.hermite.placement = placement_of(*result.level_set.grid().grid);
   return result;

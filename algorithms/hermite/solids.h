@@ -11,19 +11,19 @@
 
 namespace hermesh {
 
-/// The samples of a lattice at origin + voxel_size · (i, j, k), world units.
+/// A lattice with its samples at origin + voxel_size · (i, j, k), world units.
 struct SharedLattice {
   double voxel_size = 1.0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
-/// About choose_origin() of the box about both, so that it does not matter which comes first, and near the
-/// world's zero samples lie at multiples of the voxel size.
+/// The lattice of two meshes, about choose_origin() of the box about both, so that it does not matter which comes
+/// first, and near the zero of the world samples lie at multiples of the voxel size.
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size);
 
 struct SampledSolid {
   LevelSet level_set;    ///< on the shared lattice
-  FloatHermite hermite;  ///< of its crossing edges, from the polygons
+  FloatHermite hermite;  ///< crossings of its edges, from the polygons
   PolygonSampling sampling;
 };
 
@@ -36,14 +36,15 @@ using VoxelizeMesh = std::function<LevelSet(const PolygonMesh&)>;
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
                           RunContext& context);
 
-/// Signs and crossings of the result, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
-/// operands' signs, and the edges with crossings are those whose ends differ. The level set's values are the
-/// minima (maxima) of the operands'. Of a union and an intersection the same bytes whichever operand comes
-/// first.
+/// Signs and crossings of a combination, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
+/// operands' signs, and the edges with crossings are those whose ends differ. The values of the level set are the
+/// minima (maxima) of the operands'.
 struct CombinedSolid {
   LevelSet level_set;
   FloatHermite hermite;
 };
+/// Combines two solids on one lattice. The bytes of a union and an intersection do not depend on which operand comes
+/// first. @throws Error as combine() of the Hermite data does.
 CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid& b, RunContext& context);
 
 }  // namespace hermesh

@@ -15,7 +15,7 @@
 
 namespace hermesh {
 
-/// `Crossing` is EdgeCrossing (16 bytes) or PackedCrossing (4).
+/// Hermite data, leaf by leaf. `Crossing` is EdgeCrossing (16 bytes) or PackedCrossing (4).
 ///
 /// Only leaves that own a crossing edge are there, in ascending order of (x, y, z), so that two grids with the same
 /// signs and crossings are equal member by member, however they were made. A sample without a leaf has the sign that
@@ -25,9 +25,9 @@ template <class Crossing>
 struct SparseHermite {
   IndexToWorld placement;
   bool outermost_inside = false;  ///< sign at infinity; true after a complement
-  NormalCodeId normal_code = NormalCodeId::octahedral;  ///< of PackedCrossing's normals; else without meaning
+  NormalCodeId normal_code = NormalCodeId::octahedral;  ///< code of PackedCrossing's normals; else without meaning
   LargeArray<SignLeaf> leaves;
-  LargeArray<Crossing> crossings;  ///< by leaf, in it by axis, in that by sample
+  LargeArray<Crossing> crossings;  ///< ordered by leaf, in it by axis, in that by sample
 
   std::size_t memory_bytes() const {
     return leaves.capacity() * sizeof(SignLeaf) + crossings.capacity() * sizeof(Crossing);
@@ -36,12 +36,12 @@ struct SparseHermite {
     const std::size_t end = leaf + 1 < leaves.size() ? leaves[leaf + 1].first : crossings.size();
     return std::span(crossings).subspan(leaves[leaf].first, end - leaves[leaf].first);
   }
-  /// The leaf with its first sample there, or null.
+  /// The leaf whose first sample is `lower`, or null.
   const SignLeaf* find(const std::array<std::int32_t, 3>& lower) const {
     const auto at = lower_bound(lower);
     return at != leaves.end() && at->lower == lower ? &*at : nullptr;
   }
-  /// Sign of all samples of a leaf that is not there.
+  /// Sign of all samples of the block at `lower`, where there is no leaf.
   bool sign_without_leaf(const std::array<std::int32_t, 3>& lower) const {
     const auto at = lower_bound(lower);
     if (at == leaves.begin()) return outermost_inside;
@@ -70,7 +70,9 @@ void for_each_crossing(const SparseHermite<Crossing>& hermite, std::size_t leaf,
     for_each_bit(masks[axis], [&](int sample) { f(axis, sample, crossings[next++]); });
 }
 
+/// The data with offsets of 10 bits and normals in `code`, with tags of 0. @throws Cancelled.
 PackedHermite pack(const FloatHermite& hermite, NormalCodeId code, RunContext& context);
+/// What the codes stand for, without the tags. @throws Cancelled.
 FloatHermite unpack(const PackedHermite& hermite, RunContext& context);
 
 /// True if both place the same index coordinates at the same point of the world, up to rounding.

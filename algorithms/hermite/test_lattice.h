@@ -15,14 +15,14 @@
 
 namespace hermesh {
 
-/// Samples from `lower` (a multiple of 8) to `lower + size - 1` along each axis; all others have the sign `outermost`,
-/// as must those of the cube's own outermost layers.
+/// Signs and crossings of the samples from `lower` (a multiple of 8) to `lower + size - 1` along each axis; all others
+/// have the sign `outermost`, as must those of the cube's own outermost layers.
 template <class Crossing>
 struct TestLattice {
   int lower = -8, size = 40;
   bool outermost = false;
   std::vector<char> signs = std::vector<char>(static_cast<std::size_t>(size) * size * size, outermost);
-  std::map<std::tuple<int, int, int, int>, Crossing> crossings{};  ///< by axis, x, y, z
+  std::map<std::tuple<int, int, int, int>, Crossing> crossings{};  ///< crossings by axis, x, y, z
 
   bool within(int x, int y, int z) const { return std::min({x, y, z}) >= lower && std::max({x, y, z}) < lower + size; }
   char& sign(int x, int y, int z) {
@@ -85,7 +85,8 @@ SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice, NormalCo
   return result;
 }
 
-/// Signs sample by sample and crossings edge by edge, as the sparse data's own look-ups tell them.
+/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as the sparse data's own look-ups
+/// tell them.
 template <class Crossing>
 TestLattice<Crossing> to_lattice(const SparseHermite<Crossing>& sparse, int lower, int size) {
   TestLattice<Crossing> result{lower, size, sparse.outermost_inside};
@@ -130,7 +131,7 @@ inline EdgeCrossing bisect(const Solid& solid, int axis, std::array<double, 3> a
   return crossing;
 }
 
-/// Samples less than zero are inside.
+/// A lattice of a solid, of which samples less than zero are inside.
 inline TestLattice<EdgeCrossing> sample_solid(const Solid& solid, int lower = -8, int size = 40) {
   TestLattice<EdgeCrossing> lattice{lower, size};
   lattice.for_each_sample([&](int x, int y, int z) { lattice.sign(x, y, z) = solid(x, y, z) < 0; });
@@ -178,7 +179,7 @@ bool same_bytes(const LargeArray<Element>& a, const LargeArray<Element>& b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Element)) == 0);
 }
 
-/// Member by member and byte by byte.
+/// Whether two data are equal member by member and byte by byte.
 template <class Crossing>
 testing::AssertionResult same(const SparseHermite<Crossing>& a, const SparseHermite<Crossing>& b) {
   if (a.outermost_inside != b.outermost_inside) return testing::AssertionFailure() << "infinity differs in sign";

@@ -49,7 +49,7 @@ struct VdbValue {
   bool operator==(const VdbValue&) const = default;
 };
 
-/// In single precision.
+/// A voxel in single precision, which loses nothing.
 class FloatVoxel : public VdbValue<FloatVoxel> {
  public:
   static constexpr const char* type_name = "hermite_float";
@@ -62,7 +62,7 @@ class FloatVoxel : public VdbValue<FloatVoxel> {
     edges_[axis] = crossing;
   }
   EdgeCrossing get(int axis) const { return edges_[axis]; }
-  /// Leaves zeros, so that voxels that mean the same are equal.
+  /// Takes a crossing away and leaves zeros, so that voxels that mean the same are equal.
   void clear(int axis) {
     flags_ &= ~(1u << axis);
     edges_[axis] = {};
@@ -88,7 +88,7 @@ class DirectedVoxel : public VdbValue<DirectedVoxel> {
   void set_inside(bool inside) {
     for (float& distance : distances_) distance = std::copysign(distance, inside ? -1.0f : 1.0f);
   }
-  /// Keeps the offset only. One that is not a number becomes 0, as in pack_offset().
+  /// Keeps the offset of a crossing only. An offset that is not a number becomes 0, as in pack_offset().
   void set(int axis, const EdgeCrossing& crossing) {
     const float offset = crossing.offset > 0.0f ? std::min(crossing.offset, 1.0f) : 0.0f;
     distances_[axis] = std::copysign(offset, distances_[axis]);
@@ -100,11 +100,11 @@ class DirectedVoxel : public VdbValue<DirectedVoxel> {
     return crossing;
   }
   void clear(int axis) { distances_[axis] = std::copysign(kNone, distances_[axis]); }
-  /// As they are stored; a reader of files looks for what clear() and set() do not make.
+  /// The distances as they are stored; a reader of files looks for what clear() and set() do not make.
   const std::array<float, 3>& distances() const { return distances_; }
   static constexpr float kNone = 2.0f;
 
-  /// By bits, for zeros of both signs are different voxels.
+  /// Equality of the bits, for zeros of both signs are different voxels.
   bool operator==(const DirectedVoxel& other) const {
     using Bits = std::array<std::uint32_t, 3>;
     return std::bit_cast<Bits>(distances_) == std::bit_cast<Bits>(other.distances_);
@@ -157,8 +157,8 @@ class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
   static constexpr const char* type_name = "hermite_thesis";
   ThesisVoxel() : TenByteVoxel(0) {}
 
-  /// 1023 levels, rounded down. Offsets must be below 1; one of 1 gets the last code, 1022/1023. So the error is a
-  /// whole level at most and half of one in the mean, towards the edge's first sample (trap T4).
+  /// Code of an offset: 1023 levels, rounded down. Offsets must be below 1; one of 1 gets the last code, 1022/1023. So
+  /// the error is a whole level at most and half of one in the mean, towards the edge's first sample (trap T4).
   static std::uint16_t quantize(float offset) {
     const float held = offset > 0.0f ? offset : 0.0f;
     return held < 1.0f ? static_cast<std::uint16_t>(static_cast<int>(held * kLevels)) : std::uint16_t{1022};
@@ -183,18 +183,18 @@ class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
 };
 static_assert(sizeof(ThesisVoxel) == 10);
 
-/// The same ten bytes without the losses: an offset's code says whether there is a crossing (crossing.h), so all
-/// normals can be told from none, and offsets are rounded to the nearest of levels that include 0 and 1. The grid says
-/// what code its normals are in. Bit 30 is free. Combining grids works on the codes and needs no unpacking.
+/// The ten bytes of ThesisVoxel without its losses: an offset's code says whether there is a crossing (crossing.h), so
+/// all normals can be told from none, and offsets are rounded to the nearest of levels that include 0 and 1. The grid
+/// says what code its normals are in. Bit 30 is free. Combining grids works on the codes and needs no unpacking.
 class FixedVoxel : public TenByteVoxel, public VdbValue<FixedVoxel> {
  public:
   static constexpr const char* type_name = "hermite_fixed";
   FixedVoxel() : TenByteVoxel(kNoOffset | (kNoOffset << 10) | (std::uint32_t{kNoOffset} << 20)) {}
 
   bool crosses(int axis) const { return offset(axis) != kNoOffset; }
-  /// `offset` is at most kLastOffset.
+  /// Sets both codes of an edge; `offset` is at most kLastOffset.
   void set_raw(int axis, std::uint16_t normal, std::uint16_t offset) { set_edge(axis, normal, offset); }
-  /// The tag of a packed crossing has no room here.
+  /// Sets an edge as it is packed, but for the tag, which has no room here.
   void set_packed(int axis, PackedCrossing crossing) { set_raw(axis, crossing.normal, crossing.offset()); }
   PackedCrossing get_packed(int axis) const { return {normal(axis), offset(axis)}; }
 

@@ -36,9 +36,9 @@ Unfinished& unfinished() {
   return *files;
 }
 
-/// Whatever other threads do meanwhile. One may be filling a folder: that is moved aside first, so that no
-/// more files get into it. One may be removing it, and what it takes away first is an error to this one: so
-/// it tries until nothing is left.
+/// Removes a file or folder whatever other threads do meanwhile. One may be filling a folder: that is moved aside
+/// first, so that no more files get into it. One may be removing it, and what that one takes away first is an error to
+/// this one: so it tries until nothing is left.
 void remove_for_good(const fs::path& path) {
   std::error_code ignored;
   const fs::path aside = path.string() + "~";
@@ -51,8 +51,8 @@ void remove_for_good(const fs::path& path) {
   }
 }
 
-/// Hidden, in the same folder (a rename does not cross file systems), and with the same ending, which some
-/// libraries choose their format by.
+/// A name that is hidden, in the same folder (a rename does not cross file systems), and with the same ending, which
+/// some libraries choose their format by.
 fs::path temporary_name(const fs::path& target) {
   static std::atomic<unsigned> counter = 0;
   const std::string name = target.filename().string();
@@ -73,8 +73,8 @@ fs::path make_beside(const fs::path& target, int& error, Make&& make) {
   }
 }
 
-/// What to write instead of `target`: through a link to the file itself, which a rename would otherwise leave
-/// behind.
+/// What to write instead of `target`: where it is a link, the file behind it, for a rename would replace the link
+/// itself.
 fs::path checked_target(const fs::path& target) {
   std::error_code error;
   const fs::file_status status = fs::status(target, error);
@@ -155,6 +155,8 @@ void AtomicFolder::commit() {
 void commit_together(AtomicFile& first, AtomicFile& second) {
   // Held all the time, so that a signal's end of the process comes before or after both.
   const std::lock_guard lock(unfinished().mutex);
+  // A second name, or where the file system knows no hard links a copy, keeps the old first file until both are
+  // renamed.
   const bool replaces = fs::exists(first.target_);
   fs::path older;
   if (replaces) {

@@ -5,8 +5,8 @@
 
 namespace hermesh {
 
-/// Reserves a temporary path beside `target`. The destructor removes the temporary file unless commit()
-/// renamed it. Temporary files of a process that is being cancelled are removed by remove_unfinished_files().
+/// A temporary file beside `target`, reserved by the constructor. The destructor removes it unless commit() renamed
+/// it; remove_unfinished_files() does so when the process is being cancelled.
 class AtomicFile {
  public:
   /// @throws Error if the folder does not exist or cannot be written.
@@ -15,8 +15,9 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
+  /// The temporary file, to be written by the caller.
   const std::filesystem::path& path() const { return temporary_; }
-  /// @throws Error if the rename fails.
+  /// Renames what was written to the target. @throws Error if that fails.
   void commit();
 
  private:
@@ -26,7 +27,7 @@ class AtomicFile {
   bool committed_ = false;
 };
 
-/// The same for a folder of files: write into path(), then commit().
+/// A folder of files that is there whole or not at all: write into path(), then commit().
 class AtomicFolder {
  public:
   /// @throws Error if the parent folder does not exist or cannot be written, or if `target` is there and is no empty folder.
@@ -36,7 +37,7 @@ class AtomicFolder {
   AtomicFolder& operator=(const AtomicFolder&) = delete;
 
   const std::filesystem::path& path() const { return temporary_; }
-  /// @throws Error if the rename fails.
+  /// Renames what was written to the target. @throws Error if that fails.
   void commit();
 
  private:
@@ -44,12 +45,12 @@ class AtomicFolder {
   bool committed_ = false;
 };
 
-/// Both or neither: if the second cannot be renamed, the first target holds again what it held, or nothing.
-/// @throws Error as commit() does.
+/// Commits both files or neither: if the second cannot be renamed, the first target holds again what it held, or
+/// nothing. @throws Error as commit() does.
 void commit_together(AtomicFile& first, AtomicFile& second);
 
-/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open. For the moment before a process ends
-/// itself.
+/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open: for the moment before a
+/// process ends itself.
 void remove_unfinished_files() noexcept;
 
 }  // namespace hermesh

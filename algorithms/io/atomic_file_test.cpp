@@ -27,7 +27,7 @@ class CommitTogetherTest : public testing::Test {
   ~CommitTogetherTest() override { fs::remove_all(folder); }
 
   static void write(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
-  /// All plain files, hidden ones too.
+  /// Names of all plain files, hidden ones among them.
   std::map<std::string, std::string> files() const {
     std::map<std::string, std::string> all;
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -38,7 +38,7 @@ class CommitTogetherTest : public testing::Test {
     }
     return all;
   }
-  /// A folder takes the second one's name before it is renamed.
+  /// Commits two files while a folder takes the name of the second one before it is renamed.
   void fail_to_commit() {
     AtomicFile first(folder / "first"), second(folder / "second");
     write(first.path(), "new");
@@ -88,7 +88,7 @@ TEST_F(AtomicFileTest, TheTargetAppearsOnCommitOnly) {
   EXPECT_EQ(files().size(), 1u);
 }
 
-/// A process that was killed had this one's number, as in a container, where all have the same.
+/// A process that was killed may have had the number of this one, as in a container, where all have the same.
 TEST_F(AtomicFileTest, WhatAKilledProcessLeftIsNotInTheWay) {
   std::string name;
   { name = AtomicFile(folder / "a.txt").path().filename().string(); }

@@ -19,6 +19,7 @@ constexpr int kTop = 4096;
 
 Vector3d to_eigen(const openvdb::Vec3d& v) { return {v[0], v[1], v[2]}; }
 
+/// Moves a node and all below it. Values and masks stay: within its node a voxel keeps its place.
 template <class Node>
 void move_node(Node& node, const openvdb::Coord& by) {
   node.setOrigin(node.origin() + by);
@@ -30,6 +31,8 @@ template <class Tree>
 void move_tree(Tree& tree, const openvdb::Coord& by) {
   using Root = typename Tree::RootNodeType;
   Root& root = tree.root();
+  // The root is a map from places to nodes and tiles, so all of them are taken out and entered anew. Below it only
+  // origins change.
   std::vector<std::tuple<openvdb::Coord, typename Root::ValueType, bool>> tiles;
   for (auto tile = root.cbeginValueAll(); tile; ++tile)
     tiles.emplace_back(tile.getCoord(), *tile, tile.isValueOn());
@@ -44,6 +47,7 @@ void move_tree(Tree& tree, const openvdb::Coord& by) {
 }
 
 openvdb::math::Transform::Ptr transform_of(const GridFrame& frame) {
+  // OpenVDB multiplies rows from the left: the matrix is the transpose of the usual one.
   openvdb::Mat4d matrix = openvdb::Mat4d::identity();  // of row vectors
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) matrix(i, j) = frame.voxel_size * frame.rotation(j, i);
@@ -64,6 +68,8 @@ GridFrame grid_frame(const openvdb::math::Transform& transform) {
   Eigen::Matrix3d linear;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) linear(i, j) = matrix(j, i);
+  // If all axes have one scale and right angles, the cube root of the volume is that scale, and what is left is a
+  // rotation; whether it is one is judged by how far its columns are from orthonormal.
   frame.voxel_size = std::cbrt(std::abs(linear.determinant()));
   frame.rotation = linear / frame.voxel_size;
   frame.offset = zero;
@@ -82,6 +88,7 @@ GridFrame read_grid_frame(const std::filesystem::path& path) {
     VdbReader file(path);
     for (const std::string& name : file.names()) {
       const openvdb::GridBase::Ptr grid = file.read_metadata(name);
+      // Metadata and transform are enough; the tree is not read.
       if (!grid->isType<openvdb::FloatGrid>()) continue;
       return about_file(path.string(), [&] { return grid_frame(grid->transform()); });
     }
@@ -90,6 +97,7 @@ GridFrame read_grid_frame(const std::filesystem::path& path) {
 }
 
 FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame) {
+  // The inverse of a rotation is its transpose.
   const Eigen::Matrix3d back = frame.rotation.transpose();
   const Vector3d start = back * (mesh.origin - frame.offset);
   const auto place = [&](const Eigen::Vector3f& p) { return Vector3d(start + back * p.cast<double>()); };
@@ -98,6 +106,9 @@ FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame) {
   FramedMesh result{mesh, {}};
   Vector3d moved = Vector3d::Zero();
   for (int a = 0; a < 3; ++a) {
+    // The middle of the mesh in multiples of kTop voxels. Rounded to a whole number it becomes the new origin, at most
+    // half a top node from the middle, so that points in single precision stay fine, and a tree can be moved back by
+    // whole top nodes.
     const double middle = box.empty() ? 0.0 : 0.5 * (box.lower[a] + box.upper[a]) / frame.voxel_size / kTop;
     if (!(std::abs(middle) < (1 << 30) / kTop))
       throw Error(
@@ -118,6 +129,8 @@ void out_of_frame(const std::vector<openvdb::GridBase::Ptr>& grids, const GridFr
     if (const auto zero = grid->getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions)) {
       const auto points = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
       for (auto value = points->beginValueOn(); value; ++value) {
+        // Closest points are relative to their zero, so they are only turned; the zero itself is turned, moved and
+        // offset, in double precision.
         const Vector3d turned = frame.rotation * to_eigen(*value);
         value.setValue(openvdb::Vec3s(openvdb::Vec3d(turned.x(), turned.y(), turned.z())));
       }

@@ -12,22 +12,22 @@
 
 namespace hermesh {
 
-/// World position of sample (i, j, k): offset + voxel_size · rotation · (i, j, k).
+/// Placement of a lattice. World position of sample (i, j, k): offset + voxel_size · rotation · (i, j, k).
 struct GridFrame {
   double voxel_size = 1.0;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
 };
 
-/// @throws Error for a transform in which a distance would depend on its direction (scaled differently along
-/// different axes, sheared, perspective), and for one that mirrors.
+/// The frame of a transform. @throws Error for one in which a distance would depend on its direction (scaled
+/// differently along different axes, sheared, perspective), and for one that mirrors.
 GridFrame grid_frame(const openvdb::math::Transform& transform);
 
-/// That of the first float grid in the file. @throws Error as grid_frame(), and if the file cannot be read or
+/// The frame of the first float grid in the file. @throws Error as grid_frame(), and if the file cannot be read or
 /// holds none.
 GridFrame read_grid_frame(const std::filesystem::path& path);
 
-/// A mesh as a frame sees it.
+/// A mesh in the coordinates of a frame, near their zero.
 struct FramedMesh {
   PolygonMesh mesh;          ///< sample (i, j, k) lies at voxel_size · ((i, j, k) − first)
   std::array<int, 3> first;  ///< multiples of 4096, which keep the coordinates small

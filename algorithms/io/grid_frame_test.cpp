@@ -38,7 +38,7 @@ Transform::Ptr turned(double voxel_size, const Vector3d& offset) {
   return transform;
 }
 
-/// Made on the lattice of the transform; every value is checked against the box.
+/// A level set of a box, made on the lattice of the transform; every value is checked against the box.
 std::vector<openvdb::GridBase::Ptr> voxelized(const Vector3d& low, const Vector3d& high,
                                               const Transform::Ptr& transform, double tolerance) {
   const GridFrame frame = grid_frame(*transform);

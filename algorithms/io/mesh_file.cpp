@@ -22,7 +22,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// To the first word that is not in a comment.
+/// A cursor at the first word that is not in a comment.
 TextCursor to_first_word(std::string_view bytes) {
   TextCursor cursor(bytes, "");
   cursor.skip_to_word([](std::string_view) {});
@@ -31,6 +31,8 @@ TextCursor to_first_word(std::string_view bytes) {
 
 /// The format that the content shows for certain, whatever the file is called.
 std::optional<Format> format_of_content(std::string_view bytes) {
+  // From the surest sign to the weakest: an exact length, then a first line, then words that text of other kinds may
+  // begin with, too.
   if (is_binary_stl(bytes)) return Format::stl;
   if (begins_like_ply(bytes)) return Format::ply;
   TextCursor cursor = to_first_word(bytes);
@@ -47,7 +49,7 @@ std::optional<Format> format_of_content(std::string_view bytes) {
   return std::nullopt;
 }
 
-/// As OFF files without their keyword do.
+/// Whether the content may be an OFF file without its keyword: such a file begins with a count.
 bool begins_with_digit(std::string_view bytes) {
   const char first = to_first_word(bytes).peek();
   return first >= '0' && first <= '9';
@@ -58,7 +60,8 @@ bool is_utf16(std::string_view bytes) {
                                (bytes.starts_with("\xFE\xFF") && bytes[2] == '\0'));
 }
 
-/// @throws Error where the content shows that the file is of another format than its name says.
+/// @throws Error where the content shows that the file is of another format than its name says. The name decides what
+/// is read; content that tells nothing is believed, but for formats that always tell.
 void check_format(std::string_view bytes, Format named, const std::string& file) {
   const std::optional<Format> content = format_of_content(bytes);
   const std::string is_named =
@@ -108,12 +111,15 @@ std::uint64_t hash_of(const Eigen::Vector3d& point) {
 }  // namespace
 
 std::size_t PointMerger::slot_of(const Eigen::Vector3d& point, std::uint64_t hash) const {
+  // Linear probing; grow() keeps at least half of the slots free, so that a free one ends every search.
   std::size_t slot = hash & (slots_.size() - 1);
   while (slots_[slot] != 0 && points_[slots_[slot] - 1] != point) slot = (slot + 1) & (slots_.size() - 1);
   return slot;
 }
 
 void PointMerger::grow() {
+  // Sizes are powers of two, since slots are taken by the low bits. Growing enters all points anew; their numbers do
+  // not change.
   slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
   for (std::size_t i = 0; i < points_.size(); ++i)
     slots_[slot_of(points_[i], hash_of(points_[i]))] = static_cast<std::uint32_t>(i + 1);
@@ -126,6 +132,7 @@ std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
   std::uint32_t& recent = recent_[hash & (recent_.size() - 1)];
   if (recent != 0 && points_[recent - 1] == canonical) return recent - 1;
   const std::size_t slot = slot_of(canonical, hash);
+  // A new point gets the next number, so that numbers depend on the order of the file alone and not on hashes.
   if (slots_[slot] == 0) {
     points_.push_back(canonical);
     slots_[slot] = static_cast<std::uint32_t>(points_.size());
@@ -143,6 +150,8 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   const std::size_t polygon = polygons_++;
   if (attributes_) attributes_->add_polygon(corners.size());
   for (const std::int64_t corner : corners) {
+    // Points may come after the polygons that name them (in PLY and OBJ), so here it is only checked that an index
+    // fits, and the largest is kept for finish().
     if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
     if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
   }
@@ -152,6 +161,8 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   } else if (corners.size() == 4) {
     mesh.quads.push_back({at(0), at(1), at(2), at(3)});
   } else {
+    // A fan for now: whether it covers the polygon is known when the points are. Either way there are as many
+    // triangles as corners less two, so numbers and places stay.
     if (corners.size() > 4) fans_.push_back({polygon, mesh.triangles.size(), corners.size()});
     for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
   }
@@ -161,7 +172,7 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
 }
 
 void MeshBuilder::number_triangles() {
-  // Where one kind of polygon comes first, or is all there is, nothing is out of order.
+  // Where all triangles come before the first quad, or one kind is all there is, the order is that of triangulated().
   if (numbers_of_quads_.empty() || numbers_of_quads_.front() == numbers_of_triangles_.size()) return;
   mesh.triangle_numbers = std::move(numbers_of_triangles_);
   mesh.triangle_numbers.insert(mesh.triangle_numbers.end(), numbers_of_quads_.begin(),
@@ -174,12 +185,14 @@ void MeshBuilder::cut_concave_polygons() {
   std::vector<Eigen::Vector3d> corners;
   for (const Fan& fan : fans_) {
     context_.check();
+    // The corners, read back from the fan: its first two, then the last of each triangle.
     const std::span triangles = std::span(mesh.triangles).subspan(fan.first_triangle, fan.corners - 2);
     numbers = {triangles[0][0], triangles[0][1]};
     for (const Triangle& triangle : triangles) numbers.push_back(triangle[2]);
     corners.clear();
     for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
     if (is_fan(corners)) continue;
+    // Ears take the places of the triangles of the fan; if none are found the fan stays.
     std::vector<Triangle> cut = clip_ears(corners, context_);
     left += cut.empty();
     for (std::size_t i = 0; i < cut.size(); ++i)
@@ -209,6 +222,8 @@ void MeshBuilder::add_comment(std::string_view text) {
 
 void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   std::vector<std::size_t> kept;
+  // Points move down within their array, in order; only those left out have numbers that mean nothing, and no polygon
+  // names them.
   std::vector<std::uint32_t> numbers(mesh.points.size());
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     numbers[i] = static_cast<std::uint32_t>(kept.size());
@@ -226,13 +241,16 @@ void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   if (attributes_) attributes_->keep_points(std::move(kept));
 }
 
-/// Points that no polygon uses must not stop the work, nor spoil what is computed of all points in single
-/// precision.
+/// Looks for points beyond single precision. Those that no polygon uses are left out: they must not stop the work, nor
+/// spoil what is computed of all points in single precision. @throws Error for a polygon's point that is not finite.
 void MeshBuilder::check_points() {
+  // Beyond single precision a point is as useless as one that is not finite, since meshes are single precision about
+  // an origin.
   const auto fits = [](const Eigen::Vector3d& point) {
     return (point.array().abs() <= double(std::numeric_limits<float>::max()))
         .all();  // false for what is no number, too
   };
+  // Nearly always nothing is wrong, and this one pass is all.
   if (std::ranges::all_of(mesh.points, fits)) return;
   std::vector<bool> left_out;
   for (const Eigen::Vector3d& point : mesh.points) left_out.push_back(!fits(point));
@@ -254,6 +272,7 @@ void MeshBuilder::check_points() {
 }
 
 MeshFile MeshBuilder::finish() {
+  // Indices come first, because all that follows looks points up by them.
   if (mesh.points.size() > 0xffffffff) fail("it has more than 2^32 points");
   if (largest_ >= static_cast<std::int64_t>(mesh.points.size())) fail_index(polygon_of_largest_, largest_);
   if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
@@ -300,6 +319,7 @@ bool is_mesh_path(const std::filesystem::path& path) {
 MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
   const Stage stage(context, "read");
   const std::optional<mesh_formats::MeshPath> named = mesh_formats::parse_mesh_path(path);
+  // A file that is not there, or a folder, gets a complaint about that instead, from load_bytes().
   if (!named && std::filesystem::is_regular_file(path)) mesh_formats::throw_unknown_extension(path);
   const std::string bytes = mesh_formats::load_bytes(path, context);
   return mesh_formats::parse_mesh(bytes, named->format, path.string(), context, options);
@@ -313,18 +333,22 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
 PolygonMesh to_polygon_mesh(const MeshFile& file) { return to_polygon_mesh(MeshFile(file)); }
 
 PolygonMesh to_polygon_mesh(MeshFile&& file) {
+  // Bounds of the polygons and not of the points: a stray point far away would move the origin, and cost all others
+  // precision.
   Bounds box;
   for (const Triangle& triangle : file.triangles)
     for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
   for (const Quad& quad : file.quads)
     for (const std::uint32_t corner : quad) box.add(file.points[corner]);
   PolygonMesh mesh;
+  // The origin that the writer stored gives back the same single-precision numbers.
   mesh.origin = file.origin ? *file.origin : choose_origin(box);
   mesh.triangles = std::move(file.triangles);
   mesh.quads = std::move(file.quads);
   mesh.attributes = std::move(file.attributes);
   mesh.points.reserve(file.points.size());
   for (const Eigen::Vector3d& point : file.points) {
+    // The difference is taken in double precision, so that a far origin costs nothing but the rounding of the result.
     const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();
     if (!relative.allFinite())
       throw Error("the mesh has coordinates that are too large for single precision; scale it down");

@@ -18,7 +18,7 @@ struct MeshFile {
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
   std::vector<MeshAttribute> attributes;  ///< only where ReadOptions asked for them
-  bool attributes_left_out = false;       ///< some were asked for, but could not be read; notes say why
+  bool attributes_left_out = false;       ///< whether some that were asked for could not be read; notes say why
   /// Where the writer centred single precision; hermesh stores it as a comment `origin x y z` so that reading
   /// back gives the same points.
   std::optional<Eigen::Vector3d> origin;
@@ -51,11 +51,13 @@ struct MeshFile {
 /// with an index out of range, or with a list of another length than the polygon's.
 struct ReadOptions {
   bool attributes = false;
-  /// Names of attributes that are an Error where they cannot be read.
+  /// Names of attributes for which it is an Error that they cannot be read.
   std::vector<std::string> required = {};
-  bool triangle_numbers = false;  ///< MeshFile::triangle_numbers
+  bool triangle_numbers = false;  ///< whether to fill in MeshFile::triangle_numbers
 };
 
+/// Reads a mesh file of any of the formats, told by its name and checked against its content.
+///
 /// What programs write although the format says otherwise is read wherever it can mean one thing only, with a note: a
 /// wrong count in a binary STL file whose size says how many triangles it holds, no `endsolid`, words behind an element of
 /// an ASCII PLY file, unknown lines of a PLY header, an OFF file without its keyword or with the count glued to it, points
@@ -65,13 +67,15 @@ struct ReadOptions {
 /// index out of range, a coordinate of a polygon that is not finite, or no polygon; the sentence names the file.
 MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options = {});
 
-/// Single precision relative to the file's own origin, or to choose_origin() of its bounds.
+/// The mesh in single precision relative to the file's own origin, or to choose_origin() of its bounds.
 /// @throws Error for coordinates beyond single precision.
 PolygonMesh to_polygon_mesh(const MeshFile& file);
+/// The mesh as above, from a file whose arrays it takes over. @throws Error as above.
 PolygonMesh to_polygon_mesh(MeshFile&& file);
-/// Double precision world coordinates of a mesh, what write_mesh() would put into a file.
+/// A mesh's points in world coordinates and double precision: what write_mesh() puts into a file.
 MeshFile to_mesh_file(const PolygonMesh& mesh);
 
+/// read_mesh_file() and to_polygon_mesh() in one. @throws Error as these do.
 PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, const ReadOptions& options = {});
 
 /// Writes beside the path and renames, so that no half-written file stands there. Every point is stored as
@@ -84,7 +88,7 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
 /// @throws Error for an unknown extension or a path that cannot be written.
 void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
 
-/// True for .ply .obj .off .stl, also with .gz behind.
+/// Whether the path ends in .ply, .obj, .off or .stl, in letters of either case, also with .gz behind.
 bool is_mesh_path(const std::filesystem::path& path);
 
 }  // namespace hermesh

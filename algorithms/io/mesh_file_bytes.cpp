@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 
 std::string read_whole(const fs::path& path) {
   const std::string name = in_quotes(path.string());
+  // What is wrong is told by what stands there, for a stream only says that it failed.
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) throw Error(name + " cannot be read: there is no such file");
@@ -30,9 +31,11 @@ std::string read_whole(const fs::path& path) {
   return bytes;
 }
 
+// The first two bytes decide and not the name, for packed files come without .gz at the end, too.
 bool is_gzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
 
-/// A file of a few megabytes may unpack to terabytes, so half of the machine's memory is the limit.
+/// Half of the machine's memory, in bytes: the limit of what a file may unpack to, since one of a few megabytes may
+/// unpack to terabytes.
 std::size_t memory_limit() {
   return static_cast<std::size_t>(sysconf(_SC_PHYS_PAGES)) / 2 *
          static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
@@ -46,6 +49,7 @@ class Inflater {
   ~Inflater() { inflateEnd(&stream_); }
 
   std::string unpack(const RunContext& context) {
+    // Members are unpacked into one string, one behind the other, as gzip itself does.
     std::string bytes;
     do {
       int status = Z_OK;
@@ -55,6 +59,7 @@ class Inflater {
       }
       inflateReset(&stream_);
     } while (is_gzip(rest_));  // a gzip file may have several members, one behind the other
+    // Zeros up to the end of a block may follow, which gzip itself ignores.
     if (rest_.find_first_not_of('\0') != std::string_view::npos)
       throw Error(name_ + " has bytes behind its gzip data; it is damaged");
     return bytes;
@@ -63,19 +68,24 @@ class Inflater {
  private:
   int step(std::string& bytes) {
     constexpr std::size_t most = std::size_t(1) << 30;  // zlib counts in 32 bits
+    // Room doubles when it is used up, so that the bytes are moved but a few times; before each doubling the limit is
+    // asked.
     if (used_ == bytes.size()) {
       if (bytes.size() > memory_limit())
         throw Error(name_ + " unpacks to more than half of the memory there is");
       bytes.resize(std::max<std::size_t>(2 * bytes.size(), 4 * rest_.size() + 4096));
     }
+    // Both pointers are set anew for each step, because the bytes move when their room grows.
     stream_.next_in = reinterpret_cast<const Bytef*>(rest_.data());
     stream_.avail_in = static_cast<uInt>(std::min(rest_.size(), most));
     stream_.next_out = reinterpret_cast<Bytef*>(bytes.data() + used_);
     stream_.avail_out = static_cast<uInt>(std::min(bytes.size() - used_, most));
+    // What was used is told by what is left of the two lengths.
     const uInt in = stream_.avail_in, out = stream_.avail_out;
     const int status = inflate(&stream_, Z_NO_FLUSH);
     rest_.remove_prefix(in - stream_.avail_in);
     used_ += out - stream_.avail_out;
+    // No progress, or no end although room is left: the data break off.
     if (status == Z_BUF_ERROR || (status == Z_OK && rest_.empty() && stream_.avail_out > 0))
       throw Error(name_ + " is truncated: its gzip data breaks off");
     if (status != Z_OK && status != Z_STREAM_END)
@@ -96,10 +106,12 @@ std::string load_bytes(const fs::path& path, const RunContext& context) {
   const std::string name = in_quotes(path.string());
   const std::optional<MeshPath> named = parse_mesh_path(path);
   try {
+    // A length of the file or a room that memory has no place for ends here as bad_alloc, and becomes a sentence.
     std::string bytes = read_whole(path);
     if (bytes.empty()) throw Error(name + " is empty");
     if (is_gzip(bytes))
       bytes = Inflater(bytes, path).unpack(context);
+    // A file that claims to be packed and is not was damaged on its way, or renamed; what it holds is anybody's guess.
     else if (named && named->gzipped)
       throw Error(name + " is named .gz but is not compressed by gzip");
     if (bytes.empty()) throw Error(name + " is empty once unpacked");

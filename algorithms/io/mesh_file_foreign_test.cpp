@@ -63,7 +63,7 @@ std::string binary_stl(std::uint32_t count, std::string header = "exported") {
 
 class ForeignFileTest : public MeshFileTest {
  protected:
-  /// The file is the tetrahedron; one note holds `note`, or there is none where that is empty.
+  /// Expects the tetrahedron from the file, and one note that holds `note`, or none where that is empty.
   void expect_read(const std::string& name, const std::string& bytes, const std::string& note = "") {
     SCOPED_TRACE(name + ": " + bytes.substr(0, 120));
     context.notes.clear();
@@ -160,7 +160,7 @@ TEST_F(ForeignFileTest, OffKeywords) {
   expect_refused("a.off", "OFFICE\n4 4 0\n", "does not begin like OFF");
 }
 
-/// Geomview's and CGAL's, PMP's and OpenMesh's ways; without normals and with.
+/// OFF BINARY as Geomview and CGAL, PMP and OpenMesh write it, without normals and with.
 TEST_F(ForeignFileTest, BinaryOff) {
   for (const bool big : {true, false})
     for (const bool counted : {true, false})
@@ -334,7 +334,7 @@ TEST_F(ForeignFileTest, Obj) {
               "curves, surfaces or calls of other files on 2 lines");
 }
 
-/// No control character, no megabytes of a word.
+/// Complaints quote a file without control characters and without megabytes of a word.
 TEST_F(ForeignFileTest, SentencesAreCleanAndShort) {
   const std::string evil = "\x1b[31m\x1b]0;pwned\x07" + std::string(3000000, 'a');
   const std::vector<std::pair<std::string, std::string>> files = {

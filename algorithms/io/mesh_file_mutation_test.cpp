@@ -41,7 +41,7 @@ struct Ring {
   std::vector<Triangle> triangles;
 };
 
-/// Two tips and a ring between them.
+/// A mesh of two tips and a ring between them.
 Ring ring(std::uint32_t n) {
   Ring result{{{0, 0, 1}, {0, 0, -1.25f}}, {}};
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -212,7 +212,7 @@ class Damager {
           static_cast<char>(below(2) ? random_() : bytes[below(bytes.size())] ^ (1 << below(8)));
   }
 
-  /// A piece of another file, or of the same one, in between or in place of what is there.
+  /// Puts a piece of another file, or of the file itself, in between or in place of what is there.
   void splice(std::string& bytes) {
     const Kind& other = below(2) ? kind_ : kinds_[below(kinds_.size())];
     const std::string& from = other.files[below(other.files.size())];
@@ -256,7 +256,7 @@ class Damager {
 
 // ---- What must hold of each.
 
-/// Empty, or what is wrong with a sentence.
+/// What is wrong with the sentence of an error; empty if nothing is.
 std::string fault_of_sentence(const std::string& sentence) {
   if (sentence.rfind("'damaged.file'", 0) != 0) return "does not name the file";
   if (sentence.size() >= 300) return "is long";
@@ -328,7 +328,7 @@ std::string fault_of(const std::string& bytes, const Kind& kind, bool& refused) 
   return "";
 }
 
-/// What the child tells.
+/// What the child process tells its parent.
 struct Account {
   std::uint32_t trial, refused, read;
   char fault[600];

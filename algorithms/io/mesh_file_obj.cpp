@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int64_t kNone = -1;
 
-/// A list that corners refer to by number, vt or vn: which of its values each corner of the file has.
+/// A list that corners refer to by number, vt or vn, and which of its values each corner of the file has.
 struct CornerList {
   const char* attribute;
   const char* what;  ///< for complaints
@@ -36,6 +36,7 @@ class ObjReader {
       builder_.tick(cursor_.offset(), bytes_.size());
       read_line();
     }
+    // What is no polygon is left out with a note: a mesh that lacks half of the model should not pass for whole.
     if (left_out_ > 0)
       builder_.note("it holds curves, surfaces or calls of other files on " + std::to_string(left_out_) +
                     " lines, which are not read; the mesh lacks them");
@@ -53,6 +54,7 @@ class ObjReader {
     const std::size_t start = cursor_.offset();
     const std::string_view keyword = cursor_.word();
     const char first = keyword[0];
+    // From the commonest line to the rarest. Attributes that nobody asked for are skipped like any other line.
     if (keyword == "v") {
       read_point();
     } else if (keyword == "f" || keyword == "fo") {  // fo is what f was called at first
@@ -64,6 +66,8 @@ class ObjReader {
     } else if (builder_.attributes() && keyword == "usemtl") {
       read_material();
     } else if ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z')) {
+      // A word of letters may be a keyword of some program; anything else shows that the file is damaged, or no OBJ
+      // file.
       left_out_ += is_other_geometry(keyword);
       skip_continued_line();
     } else {
@@ -83,7 +87,7 @@ class ObjReader {
     }
   }
 
-  /// What follows the three coordinates is a weight or a colour.
+  /// A point. What follows its three coordinates is a weight or a colour.
   void read_point() {
     Eigen::Vector3d point;
     for (double& x : point) {
@@ -95,7 +99,7 @@ class ObjReader {
     skip_continued_line();
   }
 
-  /// Three numbers, or the last three of four: the first is then a weight.
+  /// The colour of the newest point: three numbers, or the last three of four, of which the first is then a weight.
   void read_colour() {
     AttributeBuilder& attributes = *builder_.attributes();
     attributes.begin(AttributeDomain::point);
@@ -107,13 +111,15 @@ class ObjReader {
       good = good && number;
       numbers[count++] = number.value_or(0.0);
     }
+    // A lone number is the weight of a rational curve, two are nothing known: no colour, and no complaint.
     if (count < 3 && good) return;
+    // The attribute begins with the first point that has a colour; points before it get 0.
     if (!colour_) colour_ = attributes.add("colour", AttributeDomain::point, 3, false);
     if (!good) return attributes.spoil_value(*colour_, "is no number");
     for (int i = 0; i < 3; ++i) attributes.set(*colour_, i, numbers[count - 3 + static_cast<std::size_t>(i)]);
   }
 
-  /// A line of vt or vn, of which `least` numbers must be there.
+  /// Reads a line of vt or vn, of which `least` numbers must be there.
   void read_value(CornerList& list, int least) {
     skip_blanks();
     for (int i = 0; i < list.components; ++i, skip_blanks()) {
@@ -122,11 +128,13 @@ class ObjReader {
       const std::optional<float> number = missing ? 0.0f : cursor_.number_if_any<float>();
       if (!number || (missing && i < least))
         spoil(list, start, "a " + std::string(list.what) + (missing ? " is incomplete" : " is no number"));
+      // A place is kept for a bad value, too, for the numbers of those behind it count it.
       list.values.push_back(number.value_or(0.0f));
     }
     skip_continued_line();
   }
 
+  /// Marks a list as one that cannot be read. The polygons are read all the same.
   void spoil(CornerList& list, std::size_t offset, const std::string& reason) {
     if (list.spoiled.empty())
       list.spoiled = "line " + std::to_string(cursor_.line_at(offset)) + ": " + reason;
@@ -139,12 +147,13 @@ class ObjReader {
     if (name.ends_with('\\')) skip_continued_line();
     if (!material_attribute_)
       material_attribute_ = attributes.add("material", AttributeDomain::polygon, 1, true);
+    // Materials are numbered in the order in which they are first used; one that comes again keeps its number.
     const auto [entry, added] = material_numbers_.emplace(name, static_cast<int>(materials_.size()));
     if (added) materials_.push_back(name);
     material_ = entry->second;
   }
 
-  /// Corners are v, v/vt, v//vn or v/vt/vn; a negative v counts back from the latest point.
+  /// Reads a polygon, whose corners are v, v/vt, v//vn or v/vt/vn; a negative v counts back from the latest point.
   void read_polygon() {
     corners_.clear();
     for (skip_blanks(); !cursor_.at_line_end() && cursor_.peek() != '#'; skip_blanks()) {
@@ -154,24 +163,29 @@ class ObjReader {
       if (index < -points)
         cursor_.fail("a polygon refers to point " + std::to_string(index) + ", but there are only " +
                      std::to_string(points) + " points before it");
+      // What counts back must be resolved here; a number from the front may name a point that is still to come, and is
+      // checked at the end.
       corners_.push_back(index > 0 ? index - 1 : points + index);
       if (builder_.attributes()) {
         read_corner_value(uvs_);
         read_corner_value(normals_);
       }
+      // What is left of the corner, such as its normal where nobody asked for attributes.
       if (cursor_.peek() == '/')
         while (!cursor_.ends_word()) cursor_.advance();
       if (!cursor_.ends_word()) cursor_.fail("a corner of a polygon is not a number");
     }
+    // What is left is a comment.
     cursor_.rest_of_line();
     builder_.add_polygon(corners_);
     if (AttributeBuilder* attributes = builder_.attributes()) {
       attributes->begin(AttributeDomain::polygon);
+      // Polygons before the first usemtl have no material, which is −1.
       if (material_ >= 0) attributes->set(*material_attribute_, 0, material_);
     }
   }
 
-  /// The number behind the next slash, if there is one, counted as that of a point is.
+  /// Reads the number behind the next slash, if there is one, counted as the number of a point is.
   void read_corner_value(CornerList& list) {
     list.corners.push_back(kNone);
     if (cursor_.peek() != '/') return;
@@ -196,6 +210,8 @@ class ObjReader {
     AttributeBuilder& attributes = *builder_.attributes();
     if (material_attribute_) attributes.set_labels(*material_attribute_, materials_);
     std::vector<std::pair<std::size_t, const CornerList*>> lists;
+    // Corners are given their values when all lists are complete, because a vt or vn may stand behind the polygon that
+    // names it.
     for (const CornerList* list : {&uvs_, &normals_}) {
       if (!list->used) continue;
       lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),
@@ -213,6 +229,7 @@ class ObjReader {
   void set_corner(AttributeBuilder& attributes, std::size_t attribute, const CornerList& list,
                   std::int64_t index) {
     if (index == kNone) return;
+    // Only now the length of the list is known.
     if (index >= list.size()) return attributes.spoil(attribute, wrong_index(list, index + 1));
     for (int i = 0; i < list.components; ++i)
       attributes.set(attribute, i, list.values[static_cast<std::size_t>(index * list.components + i)]);

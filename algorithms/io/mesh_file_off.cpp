@@ -15,6 +15,7 @@ class OffReader {
       : cursor_(std::move(cursor)), builder_(builder), total_(bytes.size()) {}
 
   void read() {
+    // Declarators are initialized from left to right: the first count in the file is that of the points.
     const auto points = count(), polygons = count();
     read_edge_count();
     // Before anything is allocated: a point takes three digits and three spaces, a polygon one of each; the
@@ -40,9 +41,12 @@ class OffReader {
     return cursor_.number<std::uint64_t>("a count");
   }
 
-  /// Nobody fills it in, and some leave it out; where each count has a line of its own, so has this one.
+  /// Passes over the number of edges. Nobody fills it in, and some leave it out; where each count has a line of its
+  /// own, so has this one.
   void read_edge_count() {
     if (cursor_.rest_of_line().find_first_not_of(" \t\r,") != std::string_view::npos) return;
+    // A copy of the cursor looks ahead: a line of one whole number alone is the count of edges, for the line of a
+    // point has three numbers.
     TextCursor ahead = cursor_;
     ahead.skip_to_word([](std::string_view) {});
     std::string_view line = ahead.rest_of_line();
@@ -55,7 +59,7 @@ class OffReader {
     cursor_.skip_to_word([this](std::string_view comment) { builder_.add_comment(comment); });
   }
 
-  /// What follows the three coordinates on the line is a normal, a colour or a texture coordinate.
+  /// Reads a point. What follows the three coordinates on the line is a normal, a colour or a texture coordinate.
   void read_point() {
     builder_.tick(cursor_.offset(), total_);
     Eigen::Vector3d point;
@@ -67,11 +71,12 @@ class OffReader {
     cursor_.rest_of_line();
   }
 
-  /// What follows the corners on the line is a colour.
+  /// Reads a polygon. What follows the corners on the line is a colour.
   void read_polygon() {
     builder_.tick(cursor_.offset(), total_);
     skip_space();
     const auto size = cursor_.number<std::uint64_t>("the number of corners");
+    // Before anything is allocated: each corner takes a character at least.
     if (size > cursor_.remaining())
       cursor_.fail("the file is truncated: a polygon has more corners than are left");
     corners_.resize(size);
@@ -97,12 +102,13 @@ struct BinaryLayout {
   std::size_t point_floats;
 };
 
-/// Words of 32 bits, one behind the other.
+/// Reads OFF BINARY: words of 32 bits, one behind the other.
 class BinaryOffReader {
  public:
   BinaryOffReader(std::string_view bytes, BinaryLayout layout) : bytes_(bytes), layout_(layout) {}
 
-  /// Whether the file ends where its last polygon does, or in padding. Takes no memory.
+  /// Whether the file ends where its last polygon does, or in padding. The walk keeps nothing, so that a wrong layout,
+  /// whose counts are nonsense, takes no memory.
   bool fits() {
     const auto no_point = [](const Eigen::Vector3d&) {};
     const auto no_polygon = [](std::span<const std::int64_t>) {};
@@ -133,13 +139,16 @@ class BinaryOffReader {
   }
   void skip(std::uint64_t words) { at_ += 4 * words; }
 
-  /// False where the bytes end too early.
+  /// Walks over the file, with the values of points and corners or without. @returns false where the bytes end too
+  /// early.
   template <class Point, class Polygon>
   bool walk(Point&& point, Polygon&& polygon, bool with_values) {
     if (!has(3)) return false;
     const std::uint64_t points = word(), polygons = word();
     skip(1);  // the number of edges, which nobody fills in
+    // Less than 2³² points of a dozen numbers: the product cannot overflow.
     if (!has(points * layout_.point_floats)) return false;
+    // Numbers behind the coordinates, such as a normal, are stepped over.
     for (std::uint64_t i = 0; with_values && i < points; ++i) {
       const std::size_t start = at_;
       Eigen::Vector3d position;
@@ -155,6 +164,7 @@ class BinaryOffReader {
       if (!has(size)) return false;
       if (with_values) {
         corners.resize(size);
+        // With a sign, so that a corner of −1 is refused rather than taken for the last of four billion.
         for (std::int64_t& corner : corners) corner = static_cast<std::int32_t>(word());
         polygon(corners);
       } else {
@@ -174,9 +184,10 @@ class BinaryOffReader {
   std::size_t at_ = 0;
 };
 
-/// Geomview and CGAL write big-endian words and count the numbers of colours; OpenMesh and PMP write neither,
-/// and OpenMesh's colours may lack the alpha. Only the length of the file tells.
+/// Tries the layouts that programs write. Geomview and CGAL write big-endian words and count the numbers of colours;
+/// OpenMesh and PMP write neither, and OpenMesh's colours may lack the alpha. Only the length of the file tells.
 void read_binary_off(std::string_view bytes, const OffKeyword& keyword, MeshBuilder& builder) {
+  // What the format says comes first; where several layouts fit, it wins.
   for (const bool little_endian : {false, true})
     for (const bool counted_colours : {true, false})
       for (const std::size_t colour : {4, 3}) {
@@ -209,9 +220,11 @@ std::optional<OffKeyword> parse_off_keyword(std::string_view word) {
           std::pair("4", &keyword.four), std::pair("n", &keyword.any_dimension)})
       if (!*flag && take(prefix)) *flag = found = true;
   }
+  // In small letters the keyword stands alone, without prefixes.
   if (!take("OFF") && !(rest.size() == word.size() && (take("off") || take("Off")))) return std::nullopt;
   keyword.length = word.size() - rest.size();
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  // Digits that follow at once are the count of points, glued to the keyword.
   if (!std::ranges::all_of(rest, is_digit)) return std::nullopt;
   return keyword;
 }
@@ -240,6 +253,7 @@ void read_off(std::string_view bytes, MeshBuilder& builder) {
   } else {
     builder.note("it lacks the keyword OFF; it was read as OFF all the same");
   }
+  // A new cursor, since the count may begin within the word that this one has passed.
   OffReader(bytes, TextCursor(bytes, builder.file(), start + (keyword ? keyword->length : 0), '#'), builder)
       .read();
   builder.note_padding(bytes);

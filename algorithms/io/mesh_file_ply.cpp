@@ -11,8 +11,8 @@ using namespace ply;
 
 namespace {
 
-/// Where the elements' values come from, when they are text: an element a line, whatever else the line may
-/// hold. A float is rounded as the header declares it.
+/// Source of the elements' values when they are text: an element a line, whatever else the line may hold. A float is
+/// rounded as the header declares it.
 class AsciiValues {
  public:
   AsciiValues(std::string_view bytes, std::size_t start, const MeshBuilder& builder)
@@ -22,8 +22,8 @@ class AsciiValues {
     const char first = cursor_.peek();
     if (first < '+' || first > '9') skip_comments();  // it is no number
   }
-  /// Words behind the last value are passed over, unless the element began on an earlier line: then it cannot
-  /// be told whether they belong to it or to the next.
+  /// Ends an element. Words behind its last value are passed over, unless it began on an earlier line: then nobody can
+  /// tell whether they belong to it or to the next one.
   void end_element() {
     if (!cursor_.skip_blanks_to_word()) return cursor_.skip_line_end();
     if (wrapped_at_ > 0) cursor_.fail_at(wrapped_at_, "the line has fewer values than the header declares");
@@ -38,7 +38,7 @@ class AsciiValues {
     to_value();
     return cursor_.number<std::int64_t>("a whole number");
   }
-  /// Nothing where the value is not of its type.
+  /// The next value as one of an attribute; nothing where it is not of its type.
   std::optional<double> attribute(Type type) {
     to_value();
     if (cursor_.at_end()) fail_truncated();
@@ -71,14 +71,14 @@ class AsciiValues {
   [[noreturn]] void fail_truncated() const { cursor_.fail("the file is truncated: values are missing"); }
 
  private:
-  /// White space, and lines that begin as comments do in the header or in other formats.
+  /// Passes over white space, and over lines that begin as comments do in the header or in other formats.
   void skip_comments() {
     for (cursor_.skip_space(); cursor_.peek() == '#' || cursor_.peek() == 'c'; cursor_.skip_space()) {
       if (cursor_.peek() == 'c' && TextCursor(cursor_).word() != "comment") return;
       cursor_.rest_of_line();
     }
   }
-  /// Long lists may go on on the next line.
+  /// Moves to the next value, which may be on the next line: long lists go on there.
   [[gnu::always_inline]] void to_value() {
     if (!cursor_.skip_blanks_to_word()) to_next_line();
   }
@@ -88,11 +88,12 @@ class AsciiValues {
   }
 
   TextCursor cursor_;
-  std::size_t wrapped_at_ = 0;  ///< where the first line of an element of several ends; 0 is in the header
+  std::size_t wrapped_at_ = 0;  ///< where the first line ends of an element that has several; 0: it has one
   std::size_t long_lines_ = 0, first_long_line_ = 0;
 };
 
-/// Where the elements' values come from, when they are binary.
+/// Source of the elements' values when they are binary. `swapped` is known to the compiler, so that the loops ask
+/// nothing.
 template <bool swapped>
 class BinaryValues {
  public:
@@ -122,6 +123,7 @@ class BinaryValues {
       default:
         break;
     }
+    // Some programs write indices as floating-point numbers.
     const double value = real(type);
     // Also false for what is not a number; 2^53 is far beyond any index.
     if (!(std::abs(value) < 9007199254740992.0) || value != std::trunc(value))
@@ -129,17 +131,21 @@ class BinaryValues {
     return static_cast<std::int64_t>(value);
   }
   std::optional<double> attribute(Type type) {
+    // All whole numbers of up to 32 bits are doubles without loss.
     return type >= Type::float32 ? real(type) : static_cast<double>(integer(type));
   }
   void skip(Type type) {
     if (remaining() < size_of[static_cast<std::size_t>(type)]) fail_truncated();
     at_ += size_of[static_cast<std::size_t>(type)];
   }
+  /// Whether this many elements of so many bytes can still be there. A quotient, because the product may overflow.
   bool has(std::uint64_t count, std::size_t bytes) const {
     return bytes == 0 || count <= remaining() / bytes;
   }
   std::size_t offset() const { return at_; }
   void finish(std::string_view, MeshBuilder& builder) const {
+    // Padding is told from data by its bytes, so a file that ends in zeros of its own cannot be mistaken: these belong
+    // to values that were read.
     const std::string_view rest = bytes_.substr(at_);
     if (!without_padding(rest).empty())
       builder.fail("it has " + std::to_string(rest.size()) +
@@ -170,7 +176,7 @@ class BinaryValues {
   const MeshBuilder& builder_;
 };
 
-/// The parameter keeps all thought of attributes out of the loops of those who want none.
+/// Reads all elements. `with_attributes` keeps all thought of attributes out of the loops for those who want none.
 template <class Values, bool with_attributes>
 class ElementReader {
  public:
@@ -180,6 +186,7 @@ class ElementReader {
   void read() {
     for (const Element& element : header_.elements) {
       reserve(element);
+      // An element without properties takes no bytes, however often it is said to be there.
       if (element.properties.empty()) continue;
       for (std::uint64_t i = 0; i < element.count; ++i) {
         builder_.tick(values_.offset(), bytes_.size());
@@ -192,10 +199,11 @@ class ElementReader {
   }
 
  private:
-  /// Before anything is allocated: a header may claim any count, but the file must be long enough for it.
+  /// Makes room for an element, once the file is known to be long enough for it: a header may claim any count.
   void reserve(const Element& element) {
     std::size_t least = 0;
     for (const Property& property : element.properties) {
+      // A list may be empty, so only its length counts.
       const Type type = property.list_count.value_or(property.type);
       least += header_.encoding == Encoding::ascii ? 1 : size_of[static_cast<std::size_t>(type)];
     }
@@ -226,9 +234,12 @@ class ElementReader {
           builder_.attributes()->spoil_value(property.attribute,
                                              "is not of the type that the header declares");
       } else {
+        // The roles x, y and z follow one another.
         point[static_cast<int>(property.role) - static_cast<int>(Role::x)] = values_.real(property.type);
       }
     }
+    // An element that declares no coordinate stands at 0; check_roles() has seen that x, y and z are declared
+    // somewhere.
     if (element.name == "vertex") builder_.mesh.points.push_back(point);
     if (with_attributes && element.has_polygons) end_corners();
   }
@@ -236,14 +247,17 @@ class ElementReader {
   void begin_attributes(const Element& element) {
     if (element.name == "vertex") builder_.attributes()->begin(AttributeDomain::point);
     if (element.has_polygons) builder_.attributes()->begin(AttributeDomain::polygon);
+    // What an earlier polygon left must not pass for a list of this one.
     corners_.clear();
     for (auto& [property, values] : corner_values_) values.clear();
   }
 
-  /// The lists of a polygon may stand before its corners, so they are looked at when all have been read.
+  /// Gives the corners of a polygon their values. Lists of values may stand before that of the corners, so they are
+  /// looked at when the whole element has been read.
   void end_corners() {
     if (!header_.has_corner_values) return;
     for (auto& [property, values] : corner_values_) {
+      // No list at all is a polygon without values; a list of a wrong length cannot be divided among the corners.
       if (values.empty() || values.size() == corners_.size() * static_cast<std::size_t>(property->component))
         continue;
       builder_.attributes()->spoil(property->attribute,
@@ -262,14 +276,16 @@ class ElementReader {
     }
   }
 
-  /// The corners of each triangle are those two before and the next one; every other one is turned over. −1
-  /// ends a strip, and a triangle with the same corner twice only leads to the next one.
+  /// Adds the triangles of a strip. Each has the two corners before and the next one, and every other one is turned
+  /// over. −1 ends a strip, and a triangle with the same corner twice only leads to the next one.
   void add_strips() {
     std::size_t first = 0;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       if (corners_[i] == -1 || corners_[i] == kUnsignedEndOfStrip) first = i + 1;
       if (i < first + 2) continue;
       std::array<std::int64_t, 3> corners = {corners_[i - 2], corners_[i - 1], corners_[i]};
+      // By its place in the strip and not by how many triangles were added: one that is left out turns the next one,
+      // too.
       if ((i - first) % 2 == 1) std::swap(corners[0], corners[1]);
       if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
       builder_.add_polygon(corners);
@@ -282,9 +298,11 @@ class ElementReader {
 
   void read_list(const Property& property) {
     const std::int64_t count = values_.integer(*property.list_count);
+    // Lengths may have a type with a sign.
     if (count < 0) builder_.fail("a list has a negative length");
     const std::size_t item =
         header_.encoding == Encoding::ascii ? 1 : size_of[static_cast<std::size_t>(property.type)];
+    // A count is believed only as far as the file reaches.
     if (!values_.has(static_cast<std::uint64_t>(count), item)) values_.fail_truncated();
     if (property.role == Role::ignored) {
       for (std::int64_t i = 0; i < count; ++i) values_.skip(property.type);
@@ -308,6 +326,7 @@ class ElementReader {
       const std::optional<double> value = values_.attribute(property.type);
       if (!value)
         builder_.attributes()->spoil(property.attribute, "a value in the list of a polygon is no number");
+      // A place is kept for a bad value, so that the length of the list stays what it was.
       values.push_back(value.value_or(0.0));
     }
   }
@@ -318,11 +337,12 @@ class ElementReader {
   Values values_;
   MeshBuilder& builder_;
   std::string_view bytes_;
-  std::vector<std::int64_t> corners_;  ///< of the latest polygon
+  std::vector<std::int64_t> corners_;  ///< corners of the latest polygon
   std::map<const Property*, std::vector<double>> corner_values_;
 };
 
 void check_roles(const Header& header, const MeshBuilder& builder) {
+  // Only what no mesh can do without is asked for; all else is an attribute, or ignored.
   std::array<bool, role_count> found{};
   for (const Element& element : header.elements)
     for (const Property& property : element.properties) found[static_cast<std::size_t>(property.role)] = true;
@@ -343,6 +363,7 @@ void read_elements(std::string_view bytes, const Header& header, MeshBuilder& bu
 }  // namespace
 
 void read_ply(std::string_view bytes, MeshBuilder& builder) {
+  // Byte order and whether attributes are wanted become template parameters here, once for the whole file.
   const Header header = parse_header(bytes, builder);
   check_roles(header, builder);
   constexpr bool big_machine = std::endian::native == std::endian::big;

@@ -7,9 +7,12 @@ namespace hermesh::mesh_formats {
 
 namespace {
 
+// Bytes: 80 of text and a count of 32 bits; then a normal and three corners of single precision, and two bytes of
+// attributes, for each triangle.
 constexpr std::size_t header_size = 84, triangle_size = 50;
 
 std::uint32_t little_endian_word(const char* at) {
+  // Words lie at any address, so they are copied and not read in place.
   std::uint32_t word;
   std::memcpy(&word, at, sizeof word);
   return std::endian::native == std::endian::big ? __builtin_bswap32(word) : word;
@@ -23,6 +26,7 @@ class StlReader {
       : bytes_(bytes), builder_(builder), merger_(builder.mesh.points) {}
 
   void read_binary() {
+    // The count is settled against the size of the file first, so the loop reads no byte beyond it.
     const std::uint64_t end = header_size + triangle_size * count_triangles();
     builder_.mesh.triangles.reserve((end - header_size) / triangle_size);
     for (std::size_t at = header_size; at < end; at += triangle_size) {
@@ -46,6 +50,8 @@ class StlReader {
     for (skip_space(); !cursor.at_end(); skip_space()) {
       builder_.tick(cursor.offset(), bytes_.size());
       const std::size_t start = cursor.offset();
+      // Only "vertex" and "endloop" make polygons, and nothing but more corners may come between them; all other
+      // keywords are asked for to see where the file breaks off.
       const Keyword keyword = read_keyword(cursor);
       if (keyword == Keyword::vertex) {
         read_vertex(cursor);
@@ -73,14 +79,15 @@ class StlReader {
  private:
   enum class Keyword { none, solid, facet, outer, vertex, end_loop, end_facet, end_solid };
 
-  /// If the size of the file is that of a whole number of triangles, it decides: programs that write as they
-  /// go leave a count of 0 or −1, and others count wrong.
+  /// Number of triangles of a binary file. If the size of the file is that of a whole number of triangles, it decides:
+  /// programs that write as they go leave a count of 0 or −1, and others count wrong.
   std::uint64_t count_triangles() {
     if (bytes_.size() < header_size)
       builder_.fail("the file is truncated: an STL file has at least 84 bytes");
     const std::uint64_t declared = declared_triangles(bytes_),
                         whole = (bytes_.size() - header_size) / triangle_size;
     if (declared == whole && bytes_.size() == header_size + triangle_size * whole) return declared;
+    // The size speaks for another number of triangles than the count: that number is read, with a note.
     if (whole > 0 && bytes_.size() == header_size + triangle_size * whole) {
       builder_.note("it declares " + std::to_string(declared) + " triangles but has the length of " +
                     std::to_string(whole) + ", which were read; if there were more, it was cut off");
@@ -90,6 +97,7 @@ class StlReader {
       builder_.fail("the file is truncated: it has " + std::to_string(bytes_.size()) +
                     " bytes, but a binary STL file of its declared number of triangles has " +
                     std::to_string(header_size + triangle_size * declared));
+    // What is longer than it declares, and by no whole number of triangles, may only be padded.
     const std::string_view rest = bytes_.substr(header_size + triangle_size * declared);
     if (!without_padding(rest).empty())
       builder_.fail("it declares " + std::to_string(declared) + " triangles, but " +
@@ -99,6 +107,8 @@ class StlReader {
     return declared;
   }
 
+  /// A text that ends behind a facet may be cut off between two facets, which nobody can tell; one that ends within a
+  /// facet is refused.
   void check_end() {
     if (last_ != Keyword::end_solid && last_ != Keyword::end_facet)
       builder_.fail("the file is truncated: it does not end in 'endsolid'");
@@ -116,7 +126,7 @@ class StlReader {
                       [](char a, char b) { return a == b || a == b - 'a' + 'A'; });
   }
 
-  /// "end loop" is written for "endloop", too.
+  /// Reads a keyword, in letters of either case; "end loop" is written for "endloop", too.
   static Keyword read_keyword(TextCursor& cursor) {
     constexpr std::pair<std::string_view, Keyword> keywords[] = {
         {"vertex", Keyword::vertex},     {"facet", Keyword::facet},        {"outer", Keyword::outer},
@@ -144,9 +154,11 @@ class StlReader {
   }
 
   void add_corner(const Eigen::Vector3d& point) {
+    // Before the point is merged, because NaN equals nothing.
     if (!point.allFinite())
       builder_.fail("point " + std::to_string(corners_.size()) + " of triangle " + std::to_string(polygons_) +
                     " (both count from 0) has a coordinate that is not a finite number");
+    // STL repeats a point for each of its triangles; equal coordinates make them one again.
     corners_.push_back(merger_.add(point));
   }
 
@@ -171,8 +183,8 @@ bool is_binary_stl(std::string_view bytes) {
          bytes.size() == header_size + triangle_size * declared_triangles(bytes);
 }
 
-/// Binary files that begin with "solid" exist, so that word alone does not decide. Text has no zero byte but
-/// as padding, and the count of a binary file has one.
+/// Reads an STL file of either kind. Binary files that begin with "solid" exist, so that word alone does not decide.
+/// Text has no zero byte but as padding, and the count of a binary file has one.
 void read_stl(std::string_view bytes, MeshBuilder& builder) {
   const auto has_zero = [](std::string_view part) { return part.find('\0') != std::string_view::npos; };
   const bool text = !is_binary_stl(bytes) && !has_zero(without_padding(bytes).substr(0, 1000)) &&

@@ -41,7 +41,7 @@ std::string raw(T value, bool big_endian) {
   return bytes;
 }
 
-/// With an element before the points, properties of other types among them, and a list behind the corners.
+/// A PLY file with an element before the points, properties of other types among them, and a list behind the corners.
 std::string binary_ply(bool big) {
   std::string ply =
       std::string("ply\nformat binary_") + (big ? "big" : "little") +
@@ -345,7 +345,7 @@ TEST_F(MeshFileTest, RefusesAMeshWithoutPolygons) {
             "'a.ply': it holds no polygon: there is no element 'face' with a list 'vertex_indices'");
 }
 
-/// The test would run out of memory or time if the counts were believed.
+/// Counts that nothing in the file bears out: if they were believed, the test would run out of memory or time.
 TEST_F(MeshFileTest, DoesNotBelieveCountsThatTheFileIsTooShortFor) {
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
     for (const char* element : {"vertex", "face", "other"}) {

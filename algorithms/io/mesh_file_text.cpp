@@ -8,6 +8,7 @@
 namespace hermesh::mesh_formats {
 
 std::string quoted_word(std::string_view word) {
+  // Enough to find the word in the file, and no line on the terminal.
   constexpr std::size_t most = 40;
   std::string text(word.substr(0, most));
   for (char& c : text)
@@ -19,16 +20,19 @@ std::string quoted_word(std::string_view word) {
 std::string clean_name(std::string_view name) {
   std::string text(name.substr(0, 100));
   for (char& c : text)
+    // Bytes of UTF-8 are let through: names in other scripts are names.
     if ((c >= '\0' && c < ' ') || c == '\x7f') c = '?';
   return text;
 }
 
 bool has_odd_padding(std::string_view text) {
+  // White space alone is what every editor leaves, and worth no note.
   const std::string_view padding = text.substr(without_padding(text).size());
   return !std::ranges::all_of(padding, is_space);
 }
 
 std::size_t TextCursor::line_at(std::size_t offset) const {
+  // Counted from the front only for a complaint. "\r\n" counts once, at its second character.
   std::size_t line = 1;
   for (const char* at = begin_; at != begin_ + offset; ++at)
     line += *at == '\n' || (*at == '\r' && (at + 1 == end_ || at[1] != '\n'));
@@ -40,10 +44,12 @@ void TextCursor::fail_at(std::size_t offset, const std::string& what) const {
 }
 
 void TextCursor::fail_number(const char* what) {
+  // The end of the file, the end of the line and a wrong word are three different mistakes.
   if (at_end()) fail(std::string("the file is truncated: it ends where ") + what + " should be");
   if (at_line_end()) fail(std::string("the line ends where ") + what + " should be");
   const std::size_t here = offset();
   const std::string_view found = word();
+  // A number as many countries write it is the likeliest reason, and deserves its own advice.
   const std::size_t comma = found.find(',');
   const bool decimal = comma != std::string_view::npos && comma + 1 < found.size() && found[comma + 1] >= '0' &&
                        found[comma + 1] <= '9' && found.find('.') == std::string_view::npos;
@@ -53,10 +59,12 @@ void TextCursor::fail_number(const char* what) {
 std::optional<double> TextCursor::take_windows_name(bool negative) {
   constexpr double infinity = std::numeric_limits<double>::infinity(),
                    nan = std::numeric_limits<double>::quiet_NaN();
+  // printf() of old Windows libraries: 1.#INF, -1.#IND, 1.#QNAN. from_chars() has taken the "1." before.
   constexpr std::pair<std::string_view, double> names[] = {
       {"#INF", infinity}, {"#IND", nan}, {"#QNAN", nan}, {"#SNAN", nan}, {"#NAN", nan}};
   const std::string_view rest(at_, remaining());
   for (const auto& [name, value] : names)
+    // `negative` is the sign of the number that was taken already.
     if (rest.starts_with(name)) {
       skip_word();  // printf() may have put digits behind the name
       return negative ? -value : value;

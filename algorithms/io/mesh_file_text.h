@@ -1,5 +1,5 @@
 // The lexer that the text formats share: words, numbers and lines as programs really write them. Private to
-// algorithms/core/mesh_file*.cpp.
+// algorithms/io/mesh_file*.cpp.
 #pragma once
 
 #include <charconv>
@@ -13,7 +13,7 @@
 
 namespace hermesh::mesh_formats {
 
-/// In quotation marks, for sentences.
+/// The text in quotation marks, for sentences.
 inline std::string in_quotes(std::string_view text) {
   std::string result = "'";
   result += text;
@@ -22,7 +22,7 @@ inline std::string in_quotes(std::string_view text) {
 /// A word of a file for a sentence: in quotation marks, short, with '?' for all that is not printable ASCII,
 /// so that no file can write to the terminal.
 std::string quoted_word(std::string_view word);
-/// '?' in place of control characters, at most 100 bytes.
+/// The name with '?' in place of control characters, cut to 100 bytes.
 std::string clean_name(std::string_view name);
 
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
@@ -39,7 +39,7 @@ inline std::string_view without_padding(std::string_view text) {
 }
 /// Whether the padding at the end of the text is more than white space.
 bool has_odd_padding(std::string_view text);
-/// Without the byte order mark that some editors put before text in UTF-8.
+/// The text without the byte order mark that some editors put before UTF-8.
 inline std::string_view without_byte_order_mark(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   return text;
@@ -79,7 +79,8 @@ class TextCursor {
   void skip_blanks() {
     while (at_ != end_ && is_blank(*at_)) ++at_;
   }
-  /// Over blanks; whether the line goes on behind them. For the innermost loops: mostly one blank, then a word.
+  /// Passes over blanks and tells whether the line goes on behind them. For the innermost loops: mostly one blank,
+  /// then a word.
   [[gnu::always_inline]] bool skip_blanks_to_word() {
     for (; at_ != end_; ++at_) {
       if (*at_ > ' ') return true;
@@ -92,7 +93,7 @@ class TextCursor {
   void skip_word() {
     while (at_ != end_ && !is_space(*at_)) ++at_;
   }
-  /// White space, and comments from '#' to the end of the line, which go to `comment`.
+  /// Passes over white space, and over comments from `#` to the end of the line, whose text goes to `comment`.
   template <class Comment>
   void skip_to_word(Comment&& comment) {
     for (skip_space(); peek() == '#'; skip_space()) {
@@ -100,7 +101,7 @@ class TextCursor {
       comment(rest_of_line());
     }
   }
-  /// Blanks, and line ends behind a character that continues the line on the next one.
+  /// Passes over blanks, and over line ends behind a character that continues the line on the next one.
   void skip_blanks_and_continuations() {
     for (skip_blanks(); at_ != end_ && *at_ == continuation_; skip_blanks()) {
       const char* const start = at_++;
@@ -117,12 +118,12 @@ class TextCursor {
     skip_word();
     return {start, static_cast<std::size_t>(at_ - start)};
   }
-  /// Behind the end of the line, if the cursor stands before it.
+  /// Moves behind the end of the line, if the cursor stands before it.
   void skip_line_end() {
     if (at_ != end_ && *at_ == '\r') ++at_;
     if (at_ != end_ && *at_ == '\n') ++at_;
   }
-  /// What is left of the line, without its end and the blanks before that; moves behind it.
+  /// What is left of the line, without its end and the blanks before that; the cursor moves behind it.
   std::string_view rest_of_line() {
     const char* const start = at_;
     if (at_ == end_ || *at_ != '\n') at_ = end_of_line();
@@ -139,8 +140,8 @@ class TextCursor {
     if (!take(value)) fail_number(what);
     return value;
   }
-  /// The same where there may be none, or something behind it; then all up to the next slash or the end of
-  /// the word is passed over.
+  /// The number that starts here, if there is one and a slash or the end of the word follows. All up to these is passed
+  /// over in any case.
   template <class T>
   std::optional<T> leading_number_if_any() {
     T value{};
@@ -159,7 +160,8 @@ class TextCursor {
     }
     return value;
   }
-  /// The same where the word may be something else; then it is passed over. There must be a word.
+  /// The number that is the next word, or nothing if that is something else, which is passed over. There must be a
+  /// word.
   template <class T>
   std::optional<T> number_if_any() {
     const char* const start = at_;
@@ -171,9 +173,9 @@ class TextCursor {
   }
 
   [[noreturn]] void fail(const std::string& what) const { fail_at(offset(), what); }
-  /// `offset` is that of the place that is complained about.
+  /// @throws Error that names the line of `offset`, the place that is complained about.
   [[noreturn]] void fail_at(std::size_t offset, const std::string& what) const;
-  /// Counting from 1.
+  /// Number of the line at `offset`, counting from 1. It looks at all lines before, so it is for complaints only.
   std::size_t line_at(std::size_t offset) const;
 
  private:
@@ -196,8 +198,8 @@ class TextCursor {
     at_ = stop;
     return true;
   }
-  /// What stands behind a number and is no space: what else may end a word, or the rest of a name that old C
-  /// libraries of Windows give to what is not finite, such as 1.#IND.
+  /// Whether what stands behind a number ends it although it is no space: another character that may end a word, or the
+  /// rest of a name that old C libraries of Windows give to what is not finite, such as `1.#IND`.
   template <class T>
   [[gnu::noinline]] bool take_odd_end(T& value) {
     if constexpr (std::is_floating_point_v<T>)
@@ -208,8 +210,8 @@ class TextCursor {
     return ends_word();
   }
   std::optional<double> take_windows_name(bool negative);
-  /// The next "\n" is remembered, or each line of a text without any would be searched to the end of the
-  /// text.
+  /// End of the line that the cursor is in. The next "\n" is remembered, or each line of a text without any would be
+  /// searched to the end of the text.
   const char* end_of_line() {
     if (!newline_ || newline_ < at_) {
       const void* const found = std::memchr(at_, '\n', remaining());

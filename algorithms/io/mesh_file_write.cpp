@@ -37,14 +37,14 @@ class Output {
     buffer_.append(text);
     if (buffer_.size() >= capacity) flush();
   }
-  /// Little-endian, whatever the machine.
+  /// Writes a number little-endian, whatever the machine.
   template <class T>
   void binary(T value) {
     std::array<char, sizeof(T)> bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
     if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
     text({bytes.data(), bytes.size()});
   }
-  /// The shortest text that reads back as the same number.
+  /// Writes the shortest text that reads back as the same number.
   template <class T>
   void number(T value) {
     char digits[32];
@@ -52,6 +52,8 @@ class Output {
   }
   void close() {
     flush();
+    // The last bytes go out only here, and a disk may be full of them. The destructor must not close the file a second
+    // time, even after an Error.
     const gzFile file = std::exchange(file_, nullptr);
     errno = 0;
     if (gzclose(file) != Z_OK) fail();
@@ -61,6 +63,7 @@ class Output {
   static constexpr std::size_t capacity = 1 << 20;
 
   void flush() {
+    // Once a megabyte: a cancelled run ends before the file is whole, and AtomicFile removes what there is.
     context_.check();
     errno = 0;
     if (!buffer_.empty() && gzwrite(file_, buffer_.data(), static_cast<unsigned>(buffer_.size())) <= 0)
@@ -87,8 +90,8 @@ void write_numbers(Output& out, std::string_view lead, const Eigen::Vector3d& nu
   out.text("\n");
 }
 
-/// The nearest float. Volatile because GCC 12 drops the rounding from a vector's
-/// `.cast<float>().cast<double>()` when it vectorises straight-line code.
+/// The nearest point in single precision. Volatile because GCC 12 drops the rounding from a vector's
+/// `.cast<float>().cast<double>()` when it vectorizes straight-line code.
 Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& point) {
   volatile float x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
                  z = static_cast<float>(point.z());
@@ -117,16 +120,19 @@ std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
   if (is("normal", 3, 3)) names = {"nx", "ny", "nz"};
   if (is("colour", 3, 4)) names = {"red", "green", "blue", "alpha"};
   if (is("uv", 2, 2)) names = {"u", "v"};
+  // Names that readers know; all others are made of the attribute's own.
   names.resize(static_cast<std::size_t>(attribute.components));
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (!names[i].empty()) continue;
     names[i] = attribute.name + (attribute.components == 1 ? "" : "_" + std::string(1, "xyzw"[i]));
+    // A blank would end the name in the header.
     std::ranges::replace_if(names[i], is_space, '_');
   }
   return names;
 }
 
-/// By the element that they are properties of. Of corners PLY as others read it has a place for texture coordinates alone.
+/// The attributes of a file by the element that they are properties of. For corners, PLY as others read it has a place
+/// for texture coordinates alone.
 struct PlyAttributes {
   std::vector<PlyAttribute> points, polygons;
   const MeshAttribute* corner_uv = nullptr;
@@ -139,6 +145,8 @@ PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunC
                                                polygons};
   for (const MeshAttribute& attribute : mesh.attributes) {
     const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
+    // An attribute that was not carried along with a change of the mesh has a wrong length; its values would go to the
+    // wrong elements.
     const bool fits = values == elements[static_cast<std::size_t>(attribute.domain)] *
                                     static_cast<std::size_t>(attribute.components);
     const bool uv = attribute.name == "uv" && attribute.components == 2 && attribute.values.index() == 0;
@@ -146,6 +154,7 @@ PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunC
       context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name + ", which was left out");
       continue;
     }
+    // Only colours as floats from 0 to 1 become bytes; whole numbers are written as they are.
     const bool bytes = attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
     if (attribute.domain == AttributeDomain::corner)
       result.corner_uv = &attribute;
@@ -160,6 +169,7 @@ void write_ply_value(Output& out, const PlyAttribute& from, std::size_t i) {
   if (from.attribute.values.index() == 1) return out.binary(std::get<1>(from.attribute.values)[i]);
   const float value = std::get<0>(from.attribute.values)[i];
   if (!from.bytes) return out.binary(value);
+  // To the nearest of 256 levels, as read_mesh_file() divides by 255.
   out.binary(static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f))));
 }
 
@@ -177,6 +187,7 @@ void write_ply_values(Output& out, const std::vector<PlyAttribute>& attributes, 
 }
 
 void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attributes) {
+  // One type for all points of the file: single precision only if no point loses a bit.
   const bool single = fits_single_precision(mesh);
   const std::string type = single ? "float" : "double";
   out.text("ply\nformat binary_little_endian 1.0\n");
@@ -195,6 +206,7 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
     for (const double x : mesh.points[i]) single ? out.binary(static_cast<float>(x)) : out.binary(x);
     write_ply_values(out, attributes.points, i);
   }
+  // Triangles first, then quads, in the order that the attributes of polygons and corners have in memory.
   std::size_t number = 0, uv = 0;
   const auto write_polygons = [&](const auto& polygons) {
     for (const auto& polygon : polygons) {
@@ -220,6 +232,7 @@ void write_obj(Output& out, const MeshFile& mesh) {
       out.text("f");
       for (const std::uint32_t corner : polygon) {
         out.text(" ");
+        // In 64 bits, since OBJ counts from 1 and the last index would overflow 32.
         out.number(std::uint64_t(corner) + 1);
       }
       out.text("\n");
@@ -255,6 +268,7 @@ void write_off(Output& out, const MeshFile& mesh) {
 }
 
 std::vector<bool> used_points(const MeshFile& mesh) {
+  // STL has no list of points: what no triangle uses is lost.
   std::vector<bool> used(mesh.points.size(), false);
   for (const Triangle& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle) used[corner] = true;
@@ -268,12 +282,14 @@ void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContex
   const std::vector<bool> used = used_points(mesh);
   std::size_t unused = 0, moved = 0;
   double largest_shift = 0.0;
+  // Points that become equal are counted by merging twice, before and after rounding, as a reader of STL merges them.
   std::vector<Eigen::Vector3d> before, after;
   PointMerger merge_before(before), merge_after(after);
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     unused += !used[i];
     if (!used[i]) continue;
     const Eigen::Vector3d rounded = rounded_to_single(mesh.points[i]);
+    // Refused before a byte is written.
     if (!rounded.allFinite())
       throw Error("cannot write " + in_quotes(name) + ": a coordinate is too large for STL");
     moved += rounded != mesh.points[i];
@@ -281,6 +297,7 @@ void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContex
     merge_before.add(mesh.points[i]);
     merge_after.add(rounded);
   }
+  // Two losses, of places and of points; both notes are about the file and not about the work.
   if (moved > 0) {
     char shift[32];
     const std::string_view shift_text(
@@ -295,17 +312,21 @@ void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContex
 }
 
 void write_stl_triangle(Output& out, const std::array<Eigen::Vector3d, 3>& corners) {
+  // The normal is that of the rounded corners, which is what a reader of the file sees; a triangle without an area has
+  // none, and 0 says so.
   const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
   const double length = across.norm();
   const bool degenerate = !(length > 0.0 && std::isfinite(length));
   for (const double x : across) out.binary(degenerate ? 0.0f : static_cast<float>(x / length));
   for (const Eigen::Vector3d& corner : corners)
     for (const double x : corner) out.binary(static_cast<float>(x));
+  // The attribute bytes, which have no agreed meaning.
   out.binary(std::uint16_t(0));
 }
 
 void write_stl(Output& out, const MeshFile& mesh) {
   if (mesh.triangle_count() > 0xffffffff) throw Error("an STL file cannot hold more than 2^32 triangles");
+  // Not "solid", by which readers would take it for text.
   std::string header = "binary STL";
   header.resize(80, ' ');
   out.text(header);
@@ -333,9 +354,11 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
   const Stage stage(context, "write");
   const std::optional<MeshPath> named = parse_mesh_path(path);
   if (!named) throw_unknown_extension(path);
+  // What is wrong with the coordinates is found before there is a file.
   const MeshFile file = to_mesh_file(mesh);
   check_mesh(path.string(), file);
   if (named->format == Format::stl) note_losses_of_stl(path.string(), file, context);
+  // In this order: the stream is closed before its file is removed, should an Error end this.
   AtomicFile aside(path);
   Output out(aside.path(), path, named->gzipped, context);
   switch (named->format) {
@@ -352,6 +375,7 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
       write_stl(out, file);
       break;
   }
+  // A rename only after the last byte was taken without complaint.
   out.close();
   aside.commit();
 }

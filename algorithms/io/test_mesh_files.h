@@ -19,7 +19,7 @@
 
 namespace hermesh {
 
-/// A folder of its own, which goes when the test ends.
+/// Fixture with a folder of its own, which goes when the test ends.
 class MeshFileTest : public testing::Test {
  protected:
   MeshFileTest() {
@@ -37,13 +37,13 @@ class MeshFileTest : public testing::Test {
     text << std::ifstream(path, std::ios::binary).rdbuf();
     return text.str();
   }
-  /// Without a file, unless it is gzipped.
+  /// The mesh in the bytes of a file of this name, which is written only where it is gzipped.
   MeshFile read(const std::string& name, const std::string& bytes) {
     const std::optional<mesh_formats::MeshPath> path = mesh_formats::parse_mesh_path(name);
     if (!path || path->gzipped || bytes.empty()) return read_mesh_file(write(name, bytes), context);
     return mesh_formats::parse_mesh(bytes, path->format, name, context);
   }
-  /// What the call throws, without the folder; empty if it succeeds.
+  /// The sentence of what `call` throws, without the folder; empty if it succeeds.
   template <class Call>
   std::string error_in(Call call) const {
     try {

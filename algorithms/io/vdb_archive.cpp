@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// OpenVDB reports a missing file and one of another kind in the same words; these are ours.
+/// Refuses what is no .vdb file. OpenVDB reports a missing file and one of another kind in the same words; these are
+/// ours.
 void check_is_vdb(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw Error(path.string() + " does not exist");
@@ -51,10 +52,10 @@ std::uint32_t crc_of(std::istream& in, std::uintmax_t bytes) {
   return static_cast<std::uint32_t>(crc);
 }
 
-/// A file's identifier: 36 characters behind magic number, versions and a flag.
+/// Place of a file's identifier: 36 characters behind magic number (8 bytes), three versions (4 each) and a flag (1).
 constexpr std::streamoff kIdentifier = 21, kIdentifierLength = 36;
 
-/// In the form of a UUID, from the size and two checksums of all that follows the identifier.
+/// Identifier in the form of a UUID, from the size and two checksums of all that follows it.
 std::string identifier_of(std::istream& in, std::uintmax_t size) {
   constexpr std::uintmax_t kHead = kIdentifier + kIdentifierLength;
   in.seekg(kHead);
@@ -72,6 +73,7 @@ std::string identifier_of(std::istream& in, std::uintmax_t size) {
 void seal(const fs::path& path, const fs::path& named) {
   std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
   const std::uintmax_t size = fs::file_size(path);
+  // The identifier goes first, for the seal covers it.
   const std::string identifier = identifier_of(file, size);
   file.seekp(kIdentifier);
   file.write(identifier.data(), kIdentifierLength);
@@ -87,6 +89,7 @@ void seal(const fs::path& path, const fs::path& named) {
 /// Whether the file ends with a seal. @throws Error if it does not fit the file.
 bool check_seal(const fs::path& path) {
   const std::uintmax_t size = fs::file_size(path);
+  // A file without a seal may be whole: other programs write none. Whether it should have one, its metadata say.
   if (size < kSealBytes) return false;
   std::ifstream in(path, std::ios::binary);
   in.seekg(static_cast<std::streamoff>(size - kSealBytes));
@@ -107,6 +110,7 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
   for (int axis = 0; axis < 3; ++axis)
     if (!(std::isfinite(size[axis]) && size[axis] > 0.0)) fail();
   if (!transform.isLinear()) return;  // its inverse is made of it
+  // There and back by the stored inverse, from the origin, far out along each axis and off the axes.
   for (const openvdb::Vec3d index : {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),
                                      openvdb::Vec3d(0, 0, 100), openvdb::Vec3d(-70, 20, 50)}) {
     const openvdb::Vec3d world = transform.indexToWorld(index);
@@ -121,6 +125,8 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
 VdbReader::VdbReader(const fs::path& path) : path_(path), file_(path.string()) {
   initialize_openvdb();
   check_is_vdb(path);
+  // The checksum is the surest judge of damage, so it comes first; the structure is stepped through all the same, for
+  // a seal can be forged. Only then OpenVDB may open the file.
   const bool sealed = check_seal(path);
   structure_ = std::make_unique<VdbStructure>(path);
   file_.open(/*delayLoad=*/false);
@@ -158,6 +164,8 @@ openvdb::GridBase::Ptr VdbReader::with_good_transform(const std::string& name, o
 }
 
 openvdb::GridBase::Ptr VdbReader::read(const std::string& name) {
+  // Where several grids share a name, OpenVDB chooses one: all of them must be sound, and memory must do for the
+  // largest.
   double bytes = 0.0;
   for (const VdbDescriptor* grid : found(name)) bytes = std::max(bytes, structure_->check_tree(*grid));
   check_fits_memory(bytes, path_.string() + ": the grid '" + shown(name) + "'");
@@ -172,6 +180,7 @@ openvdb::GridBase::Ptr VdbReader::read_metadata(const std::string& name) {
 void write_sealed(const fs::path& file, const openvdb::GridCPtrVec& grids, const fs::path& named) {
   try {
     openvdb::io::File out(file.string());
+    // The metadata announce the seal, so that a file which lost its end is told from one of another program.
     openvdb::MetaMap metadata;
     metadata.insertMeta(kSealKey, openvdb::StringMetadata("CRC-32 of all but the last 12 bytes, in the last 4"));
     out.write(grids, metadata);

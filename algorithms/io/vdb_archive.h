@@ -16,8 +16,9 @@
 
 namespace hermesh {
 
-/// Metadata (vec3d) of a grid of positions: where these have their zero in the world, so that single precision keeps far
-/// from the world's origin what it keeps near it. (Several programs take no grids of vectors in double precision.)
+/// Key of the metadata (vec3d) of a grid of positions that says where these have their zero in the world, so that
+/// single precision keeps far from the origin of the world what it keeps near it. (Several programs take no grids of
+/// vectors in double precision.)
 inline constexpr const char* kZeroOfPositions = "hermesh_origin";
 
 /// Runs f and turns what OpenVDB throws into one sentence about the file.
@@ -36,16 +37,15 @@ auto about_vdb_file(const std::filesystem::path& path, F&& f) {
   }
 }
 
-/// The grids of a .vdb file, each of which is checked (vdb_structure.h) before OpenVDB reads it. Its functions are for use
-/// within about_vdb_file().
+/// Reads the grids of a .vdb file, each of which is checked (vdb_structure.h) before OpenVDB reads it. Its functions
+/// are for use within about_vdb_file().
 class VdbReader {
  public:
-  /// initialize_openvdb() is done.
-  /// @throws Error for a file that is missing, of another kind, truncated or damaged: what write_grids() wrote has a
-  /// checksum, too.
+  /// Opens and checks the file, after initialize_openvdb(). @throws Error for a file that is missing, of another kind,
+  /// truncated or damaged: the checksum of a file that write_grids() wrote must fit, too.
   explicit VdbReader(const std::filesystem::path& path);
 
-  /// In the order of the names.
+  /// Names of all grids, in ascending order.
   std::vector<std::string> names() const;
   std::string joined_names() const;  ///< with commas between them, as a sentence quotes them
   bool has(const std::string& name) const { return file_.hasGrid(name); }
@@ -54,7 +54,7 @@ class VdbReader {
   /// The whole grid. @throws Error for a name that there is not, for damage, for more memory than there is, and for a
   /// transform that cannot be inverted.
   openvdb::GridBase::Ptr read(const std::string& name);
-  /// Its metadata and transform, with an empty tree. @throws Error as read() does
+  /// Metadata and transform of a grid, with an empty tree. @throws Error as read() does.
   openvdb::GridBase::Ptr read_metadata(const std::string& name);
 
  private:
@@ -72,7 +72,7 @@ class VdbReader {
 void write_sealed(const std::filesystem::path& file, const openvdb::GridCPtrVec& grids,
                   const std::filesystem::path& named);
 
-/// The same aside, then renames.
+/// Writes a file as write_sealed() does, aside and then renamed. @throws Error if the path cannot be written.
 void write_grids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids);
 
 }  // namespace hermesh

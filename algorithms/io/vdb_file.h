@@ -24,17 +24,18 @@ LevelSet read_level_set(const std::filesystem::path& path, const std::string& gr
 /// Writes the grid under the name `sdf`, aside and then renamed. @throws Error if the path cannot be written.
 void write_level_set(const std::filesystem::path& path, const LevelSet& level_set, RunContext& context);
 
+/// What a file says of one grid.
 struct GridSummary {
   std::string name, value_type, grid_class;
   bool is_read = true;  ///< false: of a type that is stepped over (points), so that nothing is known of its voxels
   std::uint64_t active_voxels = 0, memory_bytes = 0;
   std::array<int, 3> lower{}, upper{};  ///< active box, index space, inclusive
   std::array<double, 3> voxel_size{};   ///< along each index axis, world units
-  std::optional<double> background;     ///< of grids of numbers
+  std::optional<double> background;     ///< only for grids of numbers
 };
 
-/// What a .vdb holds. @throws Error as read_level_set() does, and for a file with a grid of an unknown type, which OpenVDB
-/// cannot step over.
+/// Summaries of all grids of a .vdb file, by name. @throws Error as read_level_set() does, and for a file with a grid
+/// of an unknown type, which OpenVDB cannot step over.
 std::vector<GridSummary> describe_vdb(const std::filesystem::path& path);
 
 }  // namespace hermesh

@@ -22,15 +22,17 @@ using openvdb::Coord;
 using openvdb::io::GridDescriptor;
 
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
-constexpr char kSeparator = '\x1e';  ///< between a grid's name and its number, see io/GridDescriptor.cc
+constexpr char kSeparator = '\x1e';  ///< stands between a grid's name and its number, see io/GridDescriptor.cc
 
 /// How the values of a tree lie in a file and in memory.
 struct ValueLayout {
-  std::uint32_t bytes = 0;       ///< of a value
-  std::uint32_t half_bytes = 0;  ///< where reals are saved with half precision; 0: no reals, never halved
+  std::uint32_t bytes = 0;       ///< size of a value
+  std::uint32_t half_bytes = 0;  ///< size where reals are saved with half precision; 0: no reals, never halved
   enum class Leaf { values, truths, mask } leaf = Leaf::values;
 };
 
+/// Layout of a type of tree, null for one that is not known here. Leaves of bools hold two masks and leaves of masks
+/// one; our own types of Hermite data are as large as their voxels (hermite/voxels.h).
 const ValueLayout* layout_of(const std::string& type) {
   using Leaf = ValueLayout::Leaf;
   static const std::map<std::string, ValueLayout> known = {{"bool", {1, 0, Leaf::truths}},
@@ -52,7 +54,8 @@ const ValueLayout* layout_of(const std::string& type) {
   return found == known.end() ? nullptr : &found->second;
 }
 
-/// Blosc's header: version, format, flags, size of an item; then 32 bits each for the bytes unpacked, of a block, and packed.
+/// Checks the header of a chunk packed by Blosc: version, format, flags, size of an item; then 32 bits each for the
+/// bytes unpacked, of a block, and packed.
 void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked) {
   file.need(packed);
   const std::string header = file.ahead(16);
@@ -64,7 +67,8 @@ void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked
   if (sizes[0] > std::max(unpacked, kLeast) || sizes[2] > packed) file.damaged("a block of packed values is not as long as it says");
 }
 
-/// What OpenVDB keeps for reading leaves later: their number, masks and packed sizes (io/DelayedLoadMetadata.cc).
+/// Checks what OpenVDB keeps for reading leaves later: their number, masks and packed sizes
+/// (io/DelayedLoadMetadata.cc).
 void check_delayed_load(BoundedFile& file) {
   const std::uint64_t leaves = file.number<std::uint32_t>();
   const auto list = [&](std::uint64_t bytes, std::uint64_t item_bytes) {
@@ -76,7 +80,7 @@ void check_delayed_load(BoundedFile& file) {
   if (sizes != ~std::uint32_t{0}) list(sizes, 8);
 }
 
-/// Steps over metadata. @returns their bytes, count and all
+/// Steps over metadata: count, then name, type, length and value of each. @returns their bytes, count and all.
 std::string checked_metadata(BoundedFile& file) {
   const std::uint64_t start = file.position();
   for (std::uint32_t left = file.number<std::uint32_t>(); left > 0; --left) {
@@ -85,6 +89,8 @@ std::string checked_metadata(BoundedFile& file) {
     const std::uint32_t bytes = file.number<std::uint32_t>();
     file.need(bytes);
     const std::uint64_t end = file.position() + bytes;
+    // Strings and unknown types OpenVDB reads by the length that the file says, which need() has seen to; the others
+    // by their own.
     if (type == "__delayedload") {
       if (bytes > 0) check_delayed_load(file);
       if (file.position() > end) file.damaged("its metadata are longer than they say");
@@ -101,7 +107,7 @@ std::string checked_metadata(BoundedFile& file) {
   return bytes;
 }
 
-/// Steps over a transform (math/Maps.h).
+/// Steps over a transform (math/Maps.h): the name of its kind, then as many bytes as that kind stores.
 void check_transform(BoundedFile& file) {
   static const std::map<std::string, std::uint64_t> affine = {{"AffineMap", 128},
                                                               {"UnitaryMap", 128},
@@ -136,8 +142,10 @@ class TreeWalk {
         value_bytes_(halved && layout.half_bytes > 0 ? layout.half_bytes : layout.bytes),
         halved_(halved && layout.half_bytes > 0) {}
 
-  /// @returns bytes that the tree takes in memory
+  /// Steps over the whole tree. @returns bytes that it takes in memory.
   double walk() {
+    // Root: number of buffers, background, numbers of tiles and children; then the tiles, then each child with all
+    // nodes below it. Values of leaves come last of all.
     if (file_.number<std::int32_t>() != 1) file_.damaged("its tree has several buffers");
     file_.skip(layout_.bytes);  // the background
     const std::uint32_t tiles = file_.number<std::uint32_t>(), children = file_.number<std::uint32_t>();
@@ -145,6 +153,8 @@ class TreeWalk {
     openvdb::CoordBBox box;
     const auto place = [&] {
       const auto at = file_.number<std::array<std::int32_t, 3>>();
+      // The root's map holds one node or tile a place, at multiples of 4096, within what index coordinates of 32 bits
+      // leave room for.
       const Coord lower(at[0], at[1], at[2]);
       for (const std::int32_t index : at)
         if (index % kUpperDim != 0 || index < -kLargestIndex - kUpperDim || index > kLargestIndex)
@@ -164,6 +174,7 @@ class TreeWalk {
     }
     for (std::uint32_t i = 0; i < children; ++i) {
       const Coord lower = place();
+      // Nodes and masks of leaves come in the order of the file.
       leaves_ = &leaves_of_[lower];
       node<5>(lower);
     }
@@ -184,12 +195,14 @@ class TreeWalk {
   template <int kLog2>
   void node(const Coord& lower) {
     constexpr int kSlots = 1 << (3 * kLog2), kWords = kSlots / 64, kChildDim = kLog2 == 5 ? 128 : 8;
+    // A node: mask of children, mask of active tiles, values of all slots, then its children.
     std::vector<std::uint64_t> children(kWords), active(kWords);
     file_.read(children.data(), kSlots / 8);
     file_.read(active.data(), kSlots / 8);
     for (int i = 0; i < kWords; ++i)
       if (children[i] & active[i]) file_.damaged("a place in its tree is both a node and an active tile");
     values(kSlots, count_bits(active.data(), kWords), kSlots / 8);
+    // A slot holds a pointer or a value, whichever is larger; two masks make a quarter byte a slot.
     memory_ += double(kSlots) * std::max<double>(8, layout_.bytes) + kSlots / 4;
     for (int word = 0; word < kWords; ++word)
       for (std::uint64_t left = children[word]; left != 0; left &= left - 1) {
@@ -204,8 +217,11 @@ class TreeWalk {
   }
 
   void leaf(const Coord& lower) {
+    // The first of two visits of the file to a leaf: here only its mask, which tells how many values the second one
+    // packs.
     const auto mask = file_.number<std::array<std::uint64_t, 8>>();
     leaves_->push_back({lower, count_bits(mask.data(), 8)});
+    // About 100 bytes for origin, mask and pointer, besides the values.
     memory_ += 100 + double(layout_.leaf == ValueLayout::Leaf::values ? kPerLeaf * layout_.bytes : kLeafMask);
   }
 
@@ -218,20 +234,26 @@ class TreeWalk {
     if (layout_.leaf == ValueLayout::Leaf::truths) file_.skip(kLeafMask);
   }
 
-  /// As readCompressedValues() of io/Compression.h.
+  /// Steps over the values of a node or leaf, as readCompressedValues() of io/Compression.h reads them: a byte that
+  /// says how inactive values are kept, up to two of these and a mask that tells them apart, then the values
+  /// themselves.
   void values(std::uint64_t count, int active, std::uint64_t mask_bytes) {
     using namespace openvdb::io;
     const int kept = file_.number<std::int8_t>();
     if (kept < NO_MASK_OR_INACTIVE_VALS || kept > NO_MASK_AND_ALL_VALS) file_.damaged("a node packs its values in an unknown way");
+    // Inactive values have full precision even where the others are halved.
     if (kept == NO_MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_ONE_INACTIVE_VAL) file_.skip(layout_.bytes);
     if (kept == MASK_AND_TWO_INACTIVE_VALS) file_.skip(2 * layout_.bytes);
     if (kept == MASK_AND_NO_INACTIVE_VALS || kept == MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_TWO_INACTIVE_VALS)
       file_.skip(mask_bytes);
+    // With this flag only active values are there, unless the byte says all are.
     if ((compression_ & COMPRESS_ACTIVE_MASK) && kept != NO_MASK_AND_ALL_VALS) count = std::uint64_t(active);
     if (halved_ && count == 0) return;
     chunk(count * value_bytes_);
   }
 
+  /// Steps over one block of values, of which a signed length says how it is stored: packed, or as it is with the
+  /// negated length.
   void chunk(std::uint64_t unpacked) {
     using namespace openvdb::io;
     if (!(compression_ & (COMPRESS_BLOSC | COMPRESS_ZIP))) return file_.skip(unpacked);
@@ -249,7 +271,7 @@ class TreeWalk {
   std::uint32_t compression_;
   std::uint64_t value_bytes_;
   bool halved_;
-  std::map<Coord, std::vector<Leaf>> leaves_of_;  ///< by child of the root
+  std::map<Coord, std::vector<Leaf>> leaves_of_;  ///< leaves below each child of the root
   std::vector<Leaf>* leaves_ = nullptr;
   double memory_ = 0.0;
 };
@@ -265,6 +287,7 @@ void BoundedFile::damaged(std::string_view why) const {
   throw Error(path_.string() + " is damaged or truncated: " + std::string(why));
 }
 
+// The difference cannot wrap, since the position is never behind the end; a sum with a length from the file could.
 void BoundedFile::need(std::uint64_t bytes) const {
   if (bytes > size_ - position_) damaged("it speaks of more than it holds");
 }
@@ -281,6 +304,8 @@ void BoundedFile::skip(std::uint64_t bytes) {
 
 void BoundedFile::read(void* to, std::size_t bytes) {
   need(bytes);
+  // Walks ask for a few bytes at a time: a quarter megabyte is read at once, and seek() and skip() only move the
+  // position within it.
   constexpr std::size_t kBuffer = std::size_t{1} << 18;
   char* out = static_cast<char*>(to);
   while (bytes > 0) {
@@ -312,7 +337,7 @@ std::string BoundedFile::ahead(std::uint64_t at_most) {
   return bytes;
 }
 
-/// What stands before a grid's tree.
+/// What stands before a grid's tree and decides how its values lie.
 struct VdbStructure::GridHead {
   std::uint32_t compression = 0;
   bool halved = false;
@@ -337,6 +362,8 @@ VdbStructure::VdbStructure(const fs::path& path) : file_(std::make_unique<Bounde
       walk(grid);
       continue;
     }
+    // Each grid lies behind its descriptor and before the next one: offsets that lead back would have the same bytes
+    // read again and again.
     const std::uint64_t here = file_->position();
     if (grid.start < here || grid.end < grid.start) file_->damaged("its grids do not follow one another");
     file_->seek(grid.end);
@@ -358,6 +385,7 @@ VdbDescriptor VdbStructure::read_descriptor() {
 }
 
 std::vector<const VdbDescriptor*> VdbStructure::find(const std::string& name) const {
+  // A name may be given with its number or without, as OpenVDB itself takes it.
   const std::string plain = GridDescriptor::stripSuffix(GridDescriptor::stringAsUniqueName(name));
   std::vector<const VdbDescriptor*> found;
   for (const VdbDescriptor& grid : grids_) {
@@ -372,6 +400,7 @@ bool VdbStructure::is_known(const std::string& type) { return layout_of(type) !=
 VdbStructure::GridHead VdbStructure::read_head() {
   GridHead head;
   head.compression = file_->number<std::uint32_t>();
+  // The metadata have been checked, so OpenVDB can read them from a copy of their bytes.
   std::istringstream bytes(checked_metadata(*file_));
   openvdb::MetaMap metadata;
   metadata.readMeta(bytes);
@@ -388,6 +417,7 @@ void VdbStructure::check_metadata(const VdbDescriptor& grid) {
 double VdbStructure::walk(const VdbDescriptor& grid) {
   file_->seek(grid.start);
   const GridHead head = read_head();
+  // A grid that shares a tree has none of its own in the file.
   if (!grid.parent.empty()) return 0.0;
   const ValueLayout* layout = layout_of(grid.type);
   if (!layout) throw openvdb::LookupError("the type '" + shown(grid.type, 30) + "'");

@@ -19,17 +19,20 @@
 
 namespace hermesh {
 
-/// Bytes of a file with their bounds.
+/// A file's bytes, read from front to back or from a given place, and never beyond its end. Numbers are those of the
+/// machine: little-endian, as .vdb files are.
 class BoundedFile {
  public:
-  /// `path` names the file in errors. @throws Error if it cannot be read.
+  /// Opens the file at `path`, which errors name. @throws Error if it cannot be read.
   explicit BoundedFile(std::filesystem::path path);
 
   std::uint64_t size() const { return size_; }
   std::uint64_t position() const { return position_; }
-  /// @throws Error for a place behind the end.
+  /// Moves to a place, in bytes from the front. @throws Error for one behind the end.
   void seek(std::uint64_t position);
+  /// Steps over bytes. @throws Error where fewer follow.
   void skip(std::uint64_t bytes);
+  /// Copies the next bytes. @throws Error where fewer follow.
   void read(void* to, std::size_t bytes);
   template <class T>
   T number() {
@@ -37,12 +40,13 @@ class BoundedFile {
     read(&value, sizeof value);
     return value;
   }
-  /// A string with its length before it. @throws Error
+  /// The string that follows, with its length of 32 bits before it. @throws Error where fewer bytes follow.
   std::string text();
-  /// The next bytes, at most so many; the position stays.
+  /// The next bytes, at most `at_most`; the position stays.
   std::string ahead(std::uint64_t at_most);
   /// @throws Error unless as many bytes follow.
   void need(std::uint64_t bytes) const;
+  /// @throws Error that says that the file is damaged or truncated, and why.
   [[noreturn]] void damaged(std::string_view why) const;
 
  private:
@@ -55,11 +59,12 @@ class BoundedFile {
 /// What a file says of a grid before its data.
 struct VdbDescriptor {
   std::string unique_name;  ///< as the file has it, with a number behind where several grids have one name
-  std::string type;         ///< of the tree, "Tree_float_5_4_3"
+  std::string type;         ///< type of the tree, such as "Tree_float_5_4_3"
   std::string parent;       ///< unique name of the grid whose tree this one shares; empty: it has its own
-  std::uint64_t start = 0, end = 0;  ///< of its data, bytes
+  std::uint64_t start = 0, end = 0;  ///< where its data lie in the file, bytes
 };
 
+/// Steps through the structure of one file; see above for what is checked and why.
 class VdbStructure {
  public:
   /// Reads the header, the file's metadata and the descriptors; of a file without offsets of grids (one that was written
@@ -74,10 +79,10 @@ class VdbStructure {
   /// Whether the grid's tree is of a type whose structure is known here; others must not be read.
   static bool is_known(const std::string& type);
 
-  /// Checks what stands before the grid's tree: metadata and transform. @throws Error
+  /// Checks what stands before the grid's tree: metadata and transform. @throws Error for damage.
   void check_metadata(const VdbDescriptor& grid);
-  /// Checks all of the grid, and of the one whose tree it shares.
-  /// @returns bytes that the tree takes in memory. @throws Error
+  /// Checks all of the grid, and of the grid whose tree it shares. @returns bytes that the tree takes in memory.
+  /// @throws Error for damage.
   double check_tree(const VdbDescriptor& grid);
 
  private:

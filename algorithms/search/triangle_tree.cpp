@@ -40,12 +40,14 @@ double squared_distance_to_box(const Eigen::Vector3d& p, const Eigen::Vector3d& 
   return squared;
 }
 
+/// An empty box, upside down: its distance is infinite, and adding a point to it gives the point.
 void clear(TriangleTree::BoxPack& pack) {
   std::fill_n(&pack.lower[0][0], 3 * kFan, kInfinity);
   std::fill_n(&pack.upper[0][0], 3 * kFan, -kInfinity);
 }
 
-/// Boxes still to be visited, the one to visit next on top. Every level adds three more at most.
+/// Boxes still to be visited, the one to visit next on top. Every level adds three more at most, and 2³² triangles
+/// have 15 levels: 46 visits.
 class VisitStack {
  public:
   struct Visit {
@@ -59,6 +61,8 @@ class VisitStack {
     const std::size_t bottom = size_;
     for (std::size_t k = 0; k < kFan; ++k) {
       if (!(squared[k] <= bound)) continue;
+      // Insertion keeps them in order; there are four at most. An empty box, which only an infinite bound lets in,
+      // comes to lie below all others, and its turn comes when a triangle has been found.
       std::size_t at = size_++;
       for (; at > bottom && visits_[at - 1].squared < squared[k]; --at) visits_[at] = visits_[at - 1];
       visits_[at] = {squared[k], {static_cast<std::uint32_t>(pack * kFan + k), level}};
@@ -86,6 +90,7 @@ double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
   const double ee = bc_longest ? bc : ca_longest ? ca : ab;
   if (!(ee > 0)) return op.squaredNorm();
   const double f = std::clamp((apex - o).dot(e) / ee, 0.0, 1.0);
+  // Where the height of a segment comes out as 0, y is 0 and the side e stands for the triangle.
   const Eigen::Vector3d h = (apex - o) - f * e;
   const double hh = h.squaredNorm();
   double x = op.dot(e) / ee, y = hh > 0 ? (op - x * e).dot(h) / hh : 0.0;
@@ -96,6 +101,7 @@ double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
     const double t = std::clamp((x * f * ee + y * hh) / (f * f * ee + hh), 0.0, 1.0);
     const double g = f - 1, u = std::clamp(((x - 1) * g * ee + y * hh) / (g * g * ee + hh), 0.0, 1.0);
     const auto squared = [&](double dx, double dy) { return dx * dx * ee + dy * dy * hh; };
+    // Each side has its foot; beyond both sides the nearer foot counts.
     const bool take_left = !right || (left && squared(x - t * f, y - t) <= squared(x - 1 - u * g, y - u));
     x = take_left ? t * f : 1 + u * g;
     y = take_left ? t : u;
@@ -110,6 +116,8 @@ TriangleTree::TriangleTree(std::span<const Eigen::Vector3f> points, std::span<co
 }
 
 void TriangleTree::build_boxes() {
+  // The number of packs of each level follows from the number of triangles alone, so all of them are there before the
+  // first box is known.
   std::size_t total = 0;
   for (std::size_t boxes = (order_.size() + kLeafSize - 1) / kLeafSize; boxes > 0;) {
     const std::size_t packs = (boxes + kFan - 1) / kFan;
@@ -117,6 +125,7 @@ void TriangleTree::build_boxes() {
     boxes = packs > 1 ? packs : 0;
   }
   packs_.resize(total);
+  // Level by level, since a level reads the one below; within a level each pack is written by one task only.
   for (std::size_t level = 0; level < first_.size(); ++level) {
     const std::size_t end = level + 1 < first_.size() ? first_[level + 1] : total;
     tbb::parallel_for(first_[level], end, [&](std::size_t pack) {
@@ -136,6 +145,7 @@ void TriangleTree::build_boxes() {
         }
         const std::size_t below =
             child_pack({static_cast<std::uint32_t>(box), static_cast<std::uint32_t>(level)});
+        // The last pack of a level may have lanes without children; they stay empty.
         if (below >= first_[level]) continue;
         const BoxPack& child = packs_[below];
         for (std::size_t i = 0; i < kFan; ++i)
@@ -146,6 +156,7 @@ void TriangleTree::build_boxes() {
 }
 
 NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bound_squared) const {
+  // Branch and bound, depth first and the nearest box first, so that the bound shrinks early.
   NearestTriangle best{upper_bound_squared, kNone};
   if (packs_.empty()) return best;
   VisitStack stack;
@@ -156,6 +167,8 @@ NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bou
   push(packs_.size() - 1, level_count() - 1);
   while (!stack.empty()) {
     const auto [squared, ref] = stack.pop();
+    // The bound may have shrunk since the box was pushed. A box just as far away as the best triangle is opened all
+    // the same: it may hold one of lower number, which wins among equals.
     if (squared > best.squared) continue;
     if (ref.level > 0) {
       push(child_pack(ref), ref.level - 1);

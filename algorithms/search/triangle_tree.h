@@ -19,14 +19,12 @@ struct NearestTriangle {
   std::uint32_t triangle;  ///< its number, TriangleTree::kNone if nothing is within the bound
 };
 
-/// Triangles are sorted along the Hilbert curve through the centres of their boxes; every eight consecutive
-/// ones make a leaf, and every four consecutive boxes of a level make a box of the level above. So there are
-/// no links, and the tree is the same for every number of threads. Points, and with them boxes, are single
-/// precision in the caller's units; index space is point * scale, rounded once to double precision, so that
-/// a scaled box holds its scaled points without any slack.
-///
-/// Refers to the caller's arrays, which have to outlive it. About 8 bytes a triangle, and while it is built
-/// about 16 more.
+/// Bounding volume hierarchy over triangles. They are sorted along the Hilbert curve through the centers of their
+/// boxes; every eight consecutive ones make a leaf, and every four consecutive boxes of a level make a box of the
+/// level above. So there are no links, and the tree is the same for every number of threads. Points, and with them
+/// boxes, are single precision in the caller's units; index space is point * scale, rounded once to double precision,
+/// so that a scaled box holds its scaled points without any slack. The tree refers to the caller's arrays, which have
+/// to outlive it. It takes about 8 bytes a triangle, and while it is built about 16 more.
 class TriangleTree {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -41,19 +39,18 @@ class TriangleTree {
     std::uint32_t box, level;
   };
 
-  /// @param scale voxels per unit of the points, positive. Points have to be finite; fewer than 2^32 − 1
-  /// triangles.
+  /// Builds the tree of `triangles`, of which there are fewer than 2^32 − 1, over finite `points`. `scale` is the
+  /// number of voxels per unit of the points, positive.
   TriangleTree(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles, double scale);
 
-  /// The triangle nearest to p, in index space, that is no farther than the bound; the lowest number where
-  /// several are equally near. The distance is that to the triangles with each corner moved by a few units in
-  /// the last place of the longest side, whatever their shape: slivers, segments and points are triangles
-  /// too.
+  /// The triangle nearest to p, in index space, that is no farther than the bound; of several that are equally near
+  /// the one of lowest number. The distance is that to the triangles with each corner moved by a few units in the last
+  /// place of the longest side, whatever their shape: slivers, segments and points are triangles, too.
   NearestTriangle nearest(const Eigen::Vector3d& p,
                           double upper_bound_squared = std::numeric_limits<double>::infinity()) const;
 
-  /// Calls f(triangle) for all whose leaf's box meets the box from `low` to `high` (index space), others of that leaf among
-  /// them.
+  /// Calls f(triangle) for the triangles of every leaf whose box meets the box from `low` to `high` (index space);
+  /// some of them may lie outside of that box.
   template <class F>
   void for_each_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, F&& f) const {
     if (packs_.empty()) return;
@@ -99,7 +96,7 @@ class TriangleTree {
   std::size_t child_pack(BoxRef ref) const {
     return first_[ref.level - 1] + (ref.box - first_[ref.level] * kFan);
   }
-  /// Numbers of the triangles in a leaf; none for one past the end.
+  /// Numbers of the triangles in a leaf; none for a leaf past the end.
   std::span<const std::uint32_t> leaf(std::size_t box) const {
     const std::size_t first = std::min(box * kLeafSize, order_.size());
     return {order_.data() + first, std::min(kLeafSize, order_.size() - first)};
@@ -112,11 +109,11 @@ class TriangleTree {
   std::span<const Triangle> triangles_;
   double scale_;
   std::vector<std::uint32_t> order_;  ///< triangle numbers along the curve
-  std::vector<BoxPack> packs_;
-  std::vector<std::size_t> first_;
+  std::vector<BoxPack> packs_;      ///< level by level, the leaves' first
+  std::vector<std::size_t> first_;  ///< first pack of each level
 };
 
-/// Squared distance from p to the triangle abc, which may be degenerate.
+/// Squared distance from p to the triangle abc, which may be degenerate, in the units of the points squared.
 double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                         const Eigen::Vector3d& c);
 

@@ -4,6 +4,7 @@
 
 namespace hermesh::edge_kernels {
 
+// Each level is compiled in a source file of its own, with its own flags; this one has those of the whole program.
 namespace sse2 {
 extern const Kernels kKernels;
 }
@@ -15,6 +16,7 @@ extern const Kernels kKernels;
 }
 
 const Kernels& chosen() {
+  // All levels give the same bytes, so the choice shows in time only.
   return of_level(chosen_simd_level(), sse2::kKernels, avx2::kKernels, avx512::kKernels);
 }
 

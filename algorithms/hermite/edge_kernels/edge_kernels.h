@@ -9,12 +9,12 @@
 
 namespace hermesh::edge_kernels {
 
-/// The plain code for edges whose stencils have samples that are no data, or differences whose squares single precision
-/// has no room for, which the vector code does not do.
+/// Interface of the plain code for edges whose stencils have samples that are no data, or differences whose squares
+/// single precision has no room for, which the vector code leaves out.
 class PlainCrossing {
  public:
-  /// Of an edge along `axis` that starts in the leaf or a step beyond: offset, and the normal along the axis and the two
-  /// after it.
+  /// Computes the crossing of an edge along `axis` that starts in the leaf or a step beyond; `record` gets the offset,
+  /// and the normal along the axis and the two after it.
   virtual void crossing(int x, int y, int z, int axis, float* record) const = 0;
 
  protected:
@@ -32,34 +32,34 @@ struct LeafInput {
   float isovalue, scale;  ///< as in InsideRule
   const PlainCrossing* incomplete;
 };
-/// With its crossed edges.
+/// A LeafInput with the crossed edges of the leaf.
 struct EdgeInput : LeafInput {
-  std::uint64_t crossing[3][8];  ///< as Crossed finds them
+  std::uint64_t crossing[3][8];  ///< crossed edges by axis, as Crossed finds them
 };
 
 /// Leaves whose crossings are found together: a few hundred crossings, enough for long loops, and caches hold their ends.
 constexpr int kBatch = 8;
-constexpr int kMostCrossings = 3 * 512;  ///< of a leaf
+constexpr int kMostCrossings = 3 * 512;  ///< most crossings that a leaf can own
 
-/// The edges that start in the leaf and are crossed, by axis; `inside` and `beyond` as in SignLeaf. Returns how many.
+/// Finds the edges that start in the leaf and are crossed, by axis; `inside` and `beyond` as in SignLeaf. Returns how
+/// many.
 using Crossed = int(const std::uint64_t* inside, const std::uint64_t* beyond, std::uint64_t (*crossing)[8]);
-/// The crossings of those edges by leaf, in it by axis, in that by sample. With t the offset, the gradient is that of both
-/// ends by central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed ones are as pack() has them, with tags of
-/// 0.
-///
-/// Of `count` leaves with the same isovalue and scale, at most kBatch. Behind the last crossing `out` has room for kOutRoom
-/// more, and what they are is not said.
+/// Computes the crossings of the crossed edges of `count` leaves with the same isovalue and scale, at most kBatch: by
+/// leaf, in it by axis, in that by sample. With t the offset, the gradient is that of both ends by central differences,
+/// interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed crossings are as pack() has them, with tags of 0. Behind the last
+/// crossing `out` has room for kOutRoom more, whose content is undefined afterwards.
 template <class Crossing>
 using Sample = void(const EdgeInput* leaves, int count, Crossing* out);
 constexpr int kOutRoom = 128;
 
+/// The kernels of one level of vector code.
 struct Kernels {
   Crossed* crossed;
   Sample<EdgeCrossing>* sample;
-  Sample<PackedCrossing>* sample_packed[kNormalCodes.size()];  ///< by NormalCodeId
+  Sample<PackedCrossing>* sample_packed[kNormalCodes.size()];  ///< one for each NormalCodeId
 };
 
-/// For the level of vector code that is chosen, see simd_level.h.
+/// The kernels for the level of vector code that is chosen, see simd_level.h.
 const Kernels& chosen();
 
 }  // namespace hermesh::edge_kernels

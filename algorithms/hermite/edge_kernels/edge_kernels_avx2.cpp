@@ -2,6 +2,7 @@
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
+// Vectors of eight.
 namespace hermesh::edge_kernels::avx2 {
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.inc"

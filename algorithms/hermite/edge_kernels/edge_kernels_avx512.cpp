@@ -2,6 +2,7 @@
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
+// Vectors of eight or sixteen, as vectors.inc says.
 namespace hermesh::edge_kernels::avx512 {
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.inc"

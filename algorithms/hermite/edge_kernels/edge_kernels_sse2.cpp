@@ -2,6 +2,7 @@
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
+// Vectors of four: what every processor that runs the program has.
 namespace hermesh::edge_kernels::sse2 {
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.inc"

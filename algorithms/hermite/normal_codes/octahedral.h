@@ -15,15 +15,15 @@ struct OctahedralNormalCode {
   static constexpr const char* name = "octahedral";
   static constexpr int kExtent = 127;
 
-  /// Rounds both coordinates to the nearest step.
+  /// Code of a normal, with both coordinates rounded to the nearest step.
   [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {
     const octant_slots::Projection at = octant_slots::project(normal, kExtent * octant_slots::kStep);
     return of_lattice(octant_slots::nearest_step(at.a), octant_slots::nearest_step(at.b), at.negative);
   }
 
-  /// Without a table. One of weights, as the other codes have, is no faster; one of all 65,536 normals is, by
-  /// four times in a loop that does nothing else, but its 768 KiB drive everything else out of the caches for
-  /// a gain of 3 ns, where the equations that are solved with each normal take more than a hundred.
+  /// The normal of a code, without a table. A table of weights, as the other codes have, is no faster; one of all
+  /// 65,536 normals is, by four times in a loop that does nothing else, but its 768 KiB drive everything else out of
+  /// the caches for a gain of 3 ns, where the equations that are solved with each normal take more than a hundred.
   static std::array<float, 3> unpack(std::uint16_t code) {
     const Lattice at = decode(code);
     const float weight = 1.0f / std::sqrt(float(at.x * at.x + at.y * at.y + at.z * at.z));

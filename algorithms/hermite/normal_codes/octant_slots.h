@@ -30,7 +30,7 @@ struct Projection {
   std::uint32_t negative;  ///< bits 15, 14, 13, as in a code
 };
 
-/// Steps 1 and 2, by one division. What has no direction is taken for +z. Negative zero counts as positive.
+/// Steps 1 and 2 of §4.1, by one division. What has no direction is taken for +z. Negative zero counts as positive.
 /// Masks stand in for branches, with which compilers would not turn loops over normals into vector code.
 [[gnu::always_inline]] inline Projection project(const std::array<float, 3>& normal, int levels) {
   const float x = std::fabs(normal[0]), y = std::fabs(normal[1]), z = std::fabs(normal[2]);
@@ -95,7 +95,7 @@ inline constexpr std::array<float, kSlots + 1> kWeights = make_weights<kSum>();
 inline constexpr int kStep = 1 << 16;
 
 [[gnu::always_inline]] constexpr int nearest_step(float value) { return (int(value) + kStep / 2) >> 16; }
-/// How far below the value its step lies, -kStep / 2 to kStep / 2.
+/// How far below `value` its step lies, −kStep / 2 to kStep / 2.
 [[gnu::always_inline]] constexpr int below(float value, int step) { return int(value) - step * kStep; }
 [[gnu::always_inline]] constexpr int sign_mask(int value) { return value >> 31; }
 [[gnu::always_inline]] constexpr int negated_if(int mask, int value) { return (value ^ mask) - mask; }
@@ -104,7 +104,7 @@ inline float with_sign(float magnitude, std::uint32_t sign_bit) {
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) ^ sign_bit);
 }
 
-/// Equations 4.8 to 4.13, and the signs.
+/// The normal of a code: equations 4.8 to 4.13, and the signs.
 template <int kSum>
 std::array<float, 3> unpack(std::uint16_t code) {
   const Components at = unfold(code);
@@ -115,7 +115,7 @@ std::array<float, 3> unpack(std::uint16_t code) {
           with_sign(float(kSum - int(at.a) - int(at.b)) * weight, (bits & 0x2000u) << 18)};
 }
 
-/// Step 3 (equations 4.5 and 4.6): rounds down.
+/// Code of a normal by step 3 as printed (equations 4.5 and 4.6), which rounds down.
 [[gnu::always_inline]] inline std::uint16_t pack_rounding_down(const std::array<float, 3>& normal) {
   const Projection at = project(normal, kLevels);
   return std::uint16_t(at.negative | fold(std::uint32_t(int(at.a)), std::uint32_t(int(at.b))));

@@ -23,35 +23,37 @@
 namespace hermesh {
 
 struct ImportOptions {
-  /// What takes the place of samples that are NaN, infinite or too large for single precision; none: they are refused.
+  /// Value in place of samples that are NaN, infinite or too large for single precision; none: they are refused.
   std::optional<float> replacement;
-  std::optional<std::int64_t> frame;  ///< of NIfTI files of more than three dimensions, from 0; none: the first, with a note
+  /// Number, from 0, of the frame in NIfTI files of more than three dimensions; none: the first, with a note.
+  std::optional<std::int64_t> frame;
 };
 
-/// True for .nii, .hdr and .img, also with .gz behind.
+/// Whether the path ends in .nii, .hdr or .img, also with .gz behind.
 bool is_nifti_path(const std::filesystem::path& path);
 
-/// NIfTI-1 in one file (.nii) or two (.hdr and .img, either of which may be named), either order of bytes, each file also
-/// gzipped; integers of 1 to 8 bytes, float32 and float64, which the datatype decides, whatever bitpix says. scl_slope and
-/// scl_inter are applied; a slope that is not finite, as one of 0, means that samples are not scaled. The transform is the
-/// file's sform, else (where it is empty or singular, too) its qform, else the sizes of its voxels alone; a unit of length
-/// other than millimetres is converted. What was forgiven is a note.
-/// @throws Error, one sentence that names the file, for one that is missing, truncated, damaged, no NIfTI-1 (ANALYZE 7.5
-/// and NIfTI-2 are named), of colours, complex or 128-bit numbers, with a singular transform, with more samples than the
-/// file can hold (before anything is allocated) or memory can; for a frame that there is not, and for samples that are not
-/// finite, unless there is a replacement; Cancelled
+/// Imports NIfTI-1 in one file (.nii) or two (.hdr and .img, either of which may be named), in either order of bytes,
+/// each file also gzipped; integers of 1 to 8 bytes, float32 and float64, which the datatype decides, whatever bitpix
+/// says. scl_slope and scl_inter are applied; a slope that is not finite, as one of 0, means that samples are not
+/// scaled. The transform is the sform of the file, else (where it is empty or singular, too) its qform, else the sizes
+/// of its voxels alone; a unit of length other than millimeters is converted. What was forgiven is a note. @throws
+/// Error, one sentence that names the file, for one that is missing, truncated, damaged, no NIfTI-1 (ANALYZE 7.5 and
+/// NIfTI-2 are named), of colours, complex or 128-bit numbers, with a singular transform, with more samples than the
+/// file can hold (before anything is allocated) or memory can; for a frame that there is not, and for samples that are
+/// not finite, unless there is a replacement. @throws Cancelled.
 LevelSet import_nifti(const std::filesystem::path& path, const ImportOptions& options, RunContext& context);
 
 /// How raw samples lie in a file, x fastest, then y, then z.
 struct RawLayout {
   std::array<std::int64_t, 3> dims{};  ///< samples
   SampleFormat format;
-  std::array<double, 3> spacing{1.0, 1.0, 1.0};  ///< of samples, world units (mm)
-  std::uint64_t offset = 0;                      ///< of the first sample, bytes (unpacked)
+  std::array<double, 3> spacing{1.0, 1.0, 1.0};  ///< distances of samples, world units (mm)
+  std::uint64_t offset = 0;                      ///< place of the first sample, bytes (unpacked)
 };
 
-/// The first sample lies at the world's origin. @throws Error as import_nifti() does, for a spacing that is not finite and
-/// above 0, and for a file that does not end with the last sample: dimensions that are wrong would pass for right.
+/// Imports raw samples, the first of which lies at the origin of the world. @throws Error as import_nifti() does, for
+/// a spacing that is not finite and above 0, and for a file that does not end with the last sample: dimensions that
+/// are wrong would pass for right.
 LevelSet import_raw(const std::filesystem::path& path, const RawLayout& layout, const ImportOptions& options,
                     RunContext& context);
 

@@ -30,7 +30,7 @@ class Import : public testing::Test {
     write_bytes(folder / "a.nii", bytes);
     return import_nifti(folder / "a.nii", options, context);
   }
-  /// What is said of the file; it must name it.
+  /// The error of importing the file, which must name it.
   std::string error_of(const std::string& bytes, const ImportOptions& options = {}) {
     try {
       nifti(bytes, options);

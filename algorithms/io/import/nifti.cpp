@@ -27,10 +27,14 @@ std::pair<fs::path, std::string> unpacked_name(const fs::path& path) {
   return {name, lower_extension(name)};
 }
 
+/// The header as it lies in the file; numbers are turned to the order of bytes of this machine when they are asked
+/// for.
 class Header {
  public:
   Header(ByteSource& source, std::string file, const RunContext& context) : file_(std::move(file)) {
     source.read(bytes_, context);
+    // The first number is the length of the header, 348, or 540 in NIfTI-2: read in both orders of bytes, it tells the
+    // file's.
     const auto own = number<std::int32_t>(0);
     swap_ = true;
     const auto swapped = number<std::int32_t>(0);
@@ -47,7 +51,7 @@ class Header {
     if (swap_) std::reverse(own.begin(), own.end());
     return std::bit_cast<T>(own);
   }
-  /// @throws Error for what is not finite
+  /// The number at `at`, in single precision. @throws Error where it is not finite; `what` is its name.
   double real(std::size_t at, const char* what) const {
     const float value = number<float>(at);
     if (!std::isfinite(value)) fail(std::string("is damaged: its ") + what + " is not a finite number");
@@ -72,6 +76,7 @@ class Header {
 
 SampleFormat format_of(const Header& header, RunContext& context) {
   const int code = header.number<std::int16_t>(70), bits = header.number<std::int16_t>(72);
+  // Codes of nifti1.h.
   constexpr std::array<std::pair<int, SampleType>, 10> kCodes = {{{2, SampleType::uint8},
                                                                  {4, SampleType::int16},
                                                                  {8, SampleType::int32},
@@ -86,6 +91,7 @@ SampleFormat format_of(const Header& header, RunContext& context) {
   if (found == kCodes.end())
     header.fail("holds samples of the NIfTI type " + std::to_string(code) +
                 ", which is not one real number of up to 64 bits; convert it to a scalar type");
+  // bitpix repeats what the datatype says, and programs that convert volumes forget to change it.
   const int own_bits = 8 * int(size_of(found->second));
   if (bits != own_bits)
     context.note(header.file() + " says that samples of the NIfTI type " + std::to_string(code) + " have " +
@@ -93,7 +99,7 @@ SampleFormat format_of(const Header& header, RunContext& context) {
   return {found->second, header.big_endian()};
 }
 
-/// Sets the box's dimensions. @returns how many boxes there are
+/// Sets the box's dimensions; axes beyond the third are frames. @returns how many boxes there are.
 std::int64_t read_dims(const Header& header, SampleBox& box) {
   const int axes = header.number<std::int16_t>(40);
   if (axes < 1 || axes > 7) header.fail("is damaged: it says that it has " + std::to_string(axes) + " dimensions");
@@ -110,7 +116,7 @@ std::int64_t read_dims(const Header& header, SampleBox& box) {
   return frames;
 }
 
-/// Millimetres of the file's unit of length.
+/// Length of the file's unit in millimeters.
 double unit_of(const Header& header) {
   switch (header.number<std::uint8_t>(123) & 7) {
     case 1:
@@ -126,6 +132,7 @@ std::array<double, 3> voxel_sizes(const Header& header, RunContext& context) {
   std::array<double, 3> sizes;
   bool missing = false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    // pixdim has a sign in some files; directions are a matter of the transforms.
     sizes[axis] = std::fabs(header.real(80 + 4 * axis, "size of voxels"));
     if (sizes[axis] == 0.0) missing = true, sizes[axis] = 1.0;
   }
@@ -133,9 +140,11 @@ std::array<double, 3> voxel_sizes(const Header& header, RunContext& context) {
   return sizes;
 }
 
-/// A rotation as the last three numbers of a quaternion, times the sizes of voxels (method 2 of nifti1.h).
+/// The qform: a rotation as the last three numbers of a unit quaternion, times the sizes of voxels (method 2 of
+/// nifti1.h).
 Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3>& sizes) {
   const double b = header.real(256, "qform"), c = header.real(260, "qform"), d = header.real(264, "qform");
+  // What single precision rounds beyond a length of 1 is forgiven.
   const double rest = 1.0 - (b * b + c * c + d * d);
   if (rest < -1e-5) header.fail("is damaged: the quaternion of its qform is longer than 1");
   const double a = std::sqrt(std::max(0.0, rest));
@@ -143,6 +152,7 @@ Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3
   turn << a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c),  //
       2 * (b * c + a * d), a * a + c * c - b * b - d * d, 2 * (c * d - a * b),      //
       2 * (b * d - a * c), 2 * (c * d + a * b), a * a + d * d - b * b - c * c;
+  // qfac: −1 mirrors the third axis, which a rotation alone cannot.
   const double hand = header.number<float>(76) < 0.0f ? -1.0 : 1.0;
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
   form.topLeftCorner<3, 3>() = turn * Eigen::Vector3d(sizes[0], sizes[1], hand * sizes[2]).asDiagonal();
@@ -150,7 +160,7 @@ Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3
   return form;
 }
 
-/// Nothing where it is not finite.
+/// The sform of the header; nothing where it is not finite.
 std::optional<Eigen::Matrix4d> affine_form(const Header& header) {
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
   for (std::size_t row = 0; row < 3; ++row)
@@ -161,12 +171,13 @@ std::optional<Eigen::Matrix4d> affine_form(const Header& header) {
 
 bool is_singular(const Eigen::Matrix4d& form) {
   const Eigen::Matrix3d linear = form.topLeftCorner<3, 3>();
+  // Relative to the lengths of its columns, so that the unit of length does not matter.
   const double scale = linear.colwise().norm().prod();
   return !(scale > 0.0) || !(std::fabs(linear.determinant()) > 1e-6 * scale);
 }
 
-/// The sform, else the qform, else the sizes of voxels alone. Programs write an sform of zeros, or one that is not
-/// finite, with a code that says that it counts; then the next one does.
+/// Index coordinates to millimeters by the sform, else the qform, else the sizes of voxels alone. Programs write an
+/// sform of zeros, or one that is not finite, with a code that says that it counts; then the next one does.
 Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
   const bool has_qform = header.number<std::int16_t>(252) > 0;
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
@@ -195,20 +206,22 @@ Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
   return form;
 }
 
-/// Moves on to the frame that is asked for. @throws Error where there is none
+/// Moves the box on to the frame that is asked for. @throws Error where there is none.
 void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame_bytes, const ImportOptions& options,
                   SampleBox& box, RunContext& context) {
   const std::int64_t frame = options.frame.value_or(0);
   if (frame < 0 || frame >= frames)
     header.fail("has no frame " + std::to_string(frame) + "; it has " + std::to_string(frames) + ", numbered from 0");
+  // In double precision, since the product of a number of the user and a size may overflow 64 bits.
   if (double(frame) * double(frame_bytes) > 0x1p62) header.fail("is truncated: that frame cannot be in it");
   if (frames > 1 && !options.frame)
     context.note(header.file() + " holds " + std::to_string(frames) + " frames; the first was taken (--frame N takes another)");
   box.offset += static_cast<std::uint64_t>(frame) * frame_bytes;
 }
 
-/// The file beside it with the extension, also gzipped.
+/// The file of the same name with another extension, also gzipped.
 fs::path companion(const fs::path& path, const char* extension) {
+  // Where neither is there, the name without .gz is what the complaint names.
   fs::path beside = unpacked_name(path).first;
   beside.replace_extension(extension);
   std::error_code ignored;
@@ -218,6 +231,7 @@ fs::path companion(const fs::path& path, const char* extension) {
 
 std::uint64_t samples_offset(const Header& header) {
   const double offset = header.real(108, "offset of the samples");
+  // In a file of its own the samples may begin at once; behind a header they cannot lie within it.
   const double least = header.one_file() ? double(kHeaderBytes) : 0.0;
   if (offset < least || offset > 0x1p40 || offset != std::floor(offset))
     header.fail("is damaged: its samples cannot start at byte " + std::to_string(offset));
@@ -237,6 +251,7 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const Header header(first, header_path.string(), context);
   SampleBox box{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
   const std::int64_t frames = read_dims(header, box);
+  // scl_slope and scl_inter: value = slope · stored + intercept.
   const double slope = header.number<float>(112);
   if (!std::isfinite(slope)) context.note(header.file() + " has a scl_slope that is not finite; its samples were not scaled");
   if (std::isfinite(slope) && slope != 0.0) {  // 0: the samples are not scaled
@@ -244,12 +259,14 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
     box.intercept = header.real(116, "scl_inter");
   }
   box.to_world = transform_of(header, context);
+  // Of two files the header names neither: the samples lie in the one of the same name.
   std::optional<ByteSource> second;
   if (!header.one_file()) {
     box.file = companion(header_path, ".img").string();
     second.emplace(box.file);
   }
   ByteSource& source = second ? *second : first;
+  // Twice: the first time for one frame, whose size the offset of the frame needs, the second time with that offset.
   const std::uint64_t frame_bytes = check_box(box, source.at_most());
   choose_frame(header, frames, frame_bytes, options, box, context);
   check_box(box, source.at_most());

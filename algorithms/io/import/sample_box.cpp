@@ -20,16 +20,18 @@ namespace {
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 
+/// Dimensions as sentences have them.
 std::string dims_text(const std::array<std::int64_t, 3>& dims) {
   return std::to_string(dims[0]) + " x " + std::to_string(dims[1]) + " x " + std::to_string(dims[2]);
 }
 
-/// Reads, decodes and checks; x fastest.
+/// The samples as floats, in the order of the file, x fastest.
 std::vector<float> read_values(ByteSource& source, const SampleBox& box, const ImportOptions& options,
                                RunContext& context) {
   source.skip(box.offset - source.position(), context);
   const std::size_t size = size_of(box.format.type);
   const std::size_t count = static_cast<std::size_t>(box.dims[0] * box.dims[1] * box.dims[2]);
+  // A million samples at a time: bytes of the file and floats need not be there in full side by side.
   constexpr std::size_t kPart = std::size_t{1} << 20;
   std::vector<unsigned char> bytes(std::min(count, kPart) * size);
   // It grows with what is read: a gzipped file that claims too much ends before memory does.
@@ -45,6 +47,7 @@ std::vector<float> read_values(ByteSource& source, const SampleBox& box, const I
     counts.not_finite += now.not_finite, counts.rounded += now.rounded;
     context.progress("read volume", static_cast<double>(values.size()) / static_cast<double>(count));
   }
+  // All are counted before one complains: how many there are decides what to do about them.
   if (counts.not_finite > 0 && !options.replacement)
     throw Error(box.file + " holds " + std::to_string(counts.not_finite) +
                 " samples that are NaN, infinite or too large for single precision; say what takes their place with "
@@ -59,7 +62,8 @@ std::vector<float> read_values(ByteSource& source, const SampleBox& box, const I
   return values;
 }
 
-/// The next single precision; below 0 the next normal one, which survives where denormal numbers are flushed to 0.
+/// The next lower single precision; near 0 the next normal one, which survives where denormal numbers are flushed to
+/// 0.
 float just_below(float value) {
   const float next = std::nextafter(value, -std::numeric_limits<float>::infinity());
   return std::fabs(next) < std::numeric_limits<float>::min() ? -std::numeric_limits<float>::min() : next;
@@ -74,6 +78,7 @@ Leaf* make_leaf(const std::vector<float>& values, const std::array<std::int64_t,
       for (int z = 0; z < 8; ++z) {
         const std::int64_t i = lower.x() + x, j = lower.y() + y, k = lower.z() + z;
         if (i >= dims[0] || j >= dims[1] || k >= dims[2]) continue;
+        // In a leaf z runs fastest, in the file x.
         const auto offset = static_cast<openvdb::Index>(64 * x + 8 * y + z);
         leaf->setValueOn(offset, values[static_cast<std::size_t>(i + dims[0] * (j + dims[1] * k))]);
       }
@@ -84,6 +89,8 @@ openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const Sample
                                   RunContext& context) {
   std::array<std::size_t, 3> blocks;
   for (int axis = 0; axis < 3; ++axis) blocks[axis] = static_cast<std::size_t>((box.dims[axis] + 7) / 8);
+  // Leaves are filled in parallel, each by one thread; they enter the tree one after the other, which no two threads
+  // may change at once.
   std::vector<std::unique_ptr<Leaf>> leaves(blocks[0] * blocks[1] * blocks[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const openvdb::Coord lower(static_cast<int>(8 * (i / (blocks[1] * blocks[2]))),
@@ -91,6 +98,7 @@ openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const Sample
     leaves[i].reset(make_leaf(values, box.dims, lower, background));
   });
   auto grid = openvdb::FloatGrid::create(background);
+  // The tree owns the leaves from here on.
   for (auto& leaf : leaves) grid->tree().addLeaf(leaf.release());
   openvdb::tools::prune(grid->tree());  // exactly constant regions only
   return grid;
@@ -108,6 +116,7 @@ std::uint64_t check_box(const SampleBox& box, std::uint64_t at_most) {
   if (bytes + double(box.offset) > double(at_most))
     throw Error(box.file + " is too short for " + claim + " behind " + std::to_string(box.offset) +
                 " bytes; it is truncated, or the dimensions are wrong");
+  // At its peak there are the floats, the leaves, and what a growing vector keeps of its old room.
   const double needed = bytes / double(size_of(box.format.type)) * 3.0 * sizeof(float);  // samples, leaves, growth
   if (const auto available = available_memory(); available && needed > double(*available)) {
     char text[120];
@@ -122,10 +131,13 @@ LevelSet read_box(ByteSource& source, const SampleBox& box, const ImportOptions&
   const Stage stage(context, "read volume");
   initialize_openvdb();
   const std::vector<float> values = read_values(source, box, options, context);
+  // All samples are finite by now, so they have a least and a greatest.
   const auto [lowest, highest] = std::ranges::minmax_element(values);
+  // Below every sample, so that what lies beyond the box is outside at any isovalue.
   const float background = just_below(*lowest);
   if (!std::isfinite(background)) throw Error(box.file + " holds the least of all numbers; rescale its samples");
   const openvdb::FloatGrid::Ptr grid = make_grid(values, box, background, context);
+  // OpenVDB multiplies rows from the left: the transpose of what multiplies columns.
   openvdb::math::Mat4d matrix;  // of rows
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column) matrix(row, column) = box.to_world(column, row);
