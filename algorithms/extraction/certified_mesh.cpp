@@ -6,6 +6,7 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

@@ -11,6 +11,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "algorithms/hermite/with_normal_code.h"
+
 namespace hermesh {
 namespace {
 

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "algorithms/hermite/test_lattice.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

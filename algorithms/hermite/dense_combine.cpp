@@ -18,6 +18,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/dense_tree.h"
 #include "algorithms/hermite/dense_voxel_rules.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

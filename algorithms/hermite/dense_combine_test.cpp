@@ -12,6 +12,7 @@
 #include "algorithms/hermite/dense_tree.h"
 #include "algorithms/hermite/dense_voxel_rules.h"
 #include "algorithms/hermite/test_lattice.h"
+#include "algorithms/hermite/thesis_voxel.h"
 
 namespace hermesh {
 namespace {

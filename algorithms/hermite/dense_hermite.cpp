@@ -6,6 +6,8 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/dense_tree.h"
 #include "algorithms/hermite/sign_tree.h"
+#include "algorithms/hermite/thesis_voxel.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

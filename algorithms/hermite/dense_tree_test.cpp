@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "algorithms/hermite/test_lattice.h"
+#include "algorithms/hermite/thesis_voxel.h"
 
 namespace hermesh {
 namespace {

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "algorithms/hermite/boolean_rule.h"
+#include "algorithms/hermite/thesis_voxel.h"
 #include "algorithms/hermite/voxels.h"
 
 namespace hermesh {

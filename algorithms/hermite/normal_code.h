@@ -1,6 +1,7 @@
 // Unit normals in 16 bits: the thesis's code (Aldén 2011, §4.1), the one that it was taken from, and better
 // ones of the same size. A code is a type with static functions, so that loops over normals have it as a
-// template parameter; with_normal_code() chooses it by name outside of the loop.
+// template parameter; with_normal_code() of with_normal_code.h, which has the codes themselves and is included by few
+// files, chooses it by name outside of the loop.
 //
 //               mean / max error   codes in use
 //   thesis         1.32° / 2.58°         64,008   as printed
@@ -17,13 +18,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-
-#include "algorithms/core/error.h"
-#include "algorithms/hermite/normal_codes/baptista.h"
-#include "algorithms/hermite/normal_codes/nearest.h"
-#include "algorithms/hermite/normal_codes/octahedral.h"
-#include "algorithms/hermite/normal_codes/rounded.h"
-#include "algorithms/hermite/normal_codes/thesis.h"
 
 namespace hermesh {
 
@@ -55,41 +49,9 @@ inline constexpr std::array kNormalCodes = {NormalCodeId::thesis, NormalCodeId::
                                             NormalCodeId::rounded, NormalCodeId::octahedral,
                                             NormalCodeId::nearest};
 
-/// Calls f(code) with an empty object of the code's type: with_normal_code(id, [](auto code) { using Code =
-/// decltype(code); … }).
-template <class Function>
-decltype(auto) with_normal_code(NormalCodeId id, Function&& f) {
-  switch (id) {
-    case NormalCodeId::thesis:
-      return f(ThesisNormalCode{});
-    case NormalCodeId::baptista:
-      return f(BaptistaNormalCode{});
-    case NormalCodeId::rounded:
-      return f(RoundedNormalCode{});
-    case NormalCodeId::octahedral:
-      return f(OctahedralNormalCode{});
-    case NormalCodeId::nearest:
-      break;
-  }
-  return f(NearestNormalCode{});
-}
-
-inline std::string_view name(NormalCodeId id) {
-  return with_normal_code(id, [](auto code) { return std::string_view(decltype(code)::name); });
-}
+std::string_view name(NormalCodeId id);
 
 /// The code of a name. @throws Error that lists the names there are.
-inline NormalCodeId parse_normal_code(std::string_view text) {
-  std::string known;
-  for (const NormalCodeId id : kNormalCodes) {
-    if (name(id) == text) return id;
-    known += (known.empty() ? "" : ", ") + std::string(name(id));
-  }
-  throw Error("there is no normal code \"" + std::string(text) + "\"; there are " + known);
-}
-
-static_assert(NormalCode<ThesisNormalCode> && NormalCode<BaptistaNormalCode> &&
-              NormalCode<RoundedNormalCode> && NormalCode<OctahedralNormalCode> &&
-              NormalCode<NearestNormalCode>);
+NormalCodeId parse_normal_code(std::string_view text);
 
 }  // namespace hermesh

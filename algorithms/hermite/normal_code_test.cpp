@@ -1,4 +1,5 @@
 #include "algorithms/hermite/normal_code.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 #include <gtest/gtest.h>
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

@@ -166,11 +166,9 @@ class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
   static float reconstruct(std::uint16_t code) { return static_cast<float>(code) / kLevels; }
 
   bool crosses(int axis) const { return axis == 2 ? (word() & kBit30) != 0 : normal(axis) != 0; }
-  void set(int axis, const EdgeCrossing& crossing) {
-    set_edge(axis, ThesisNormalCode::pack(crossing.normal), quantize(crossing.offset));
-    if (axis == 2) set_word(word() | kBit30);
-  }
-  EdgeCrossing get(int axis) const { return {reconstruct(offset(axis)), ThesisNormalCode::unpack(normal(axis))}; }
+  // Both are in thesis_voxel.h, which has the code of the normals.
+  inline void set(int axis, const EdgeCrossing& crossing);
+  inline EdgeCrossing get(int axis) const;
   void clear(int axis) {
     set_edge(axis, 0, 0);
     if (axis == 2) set_word(word() & ~kBit30);

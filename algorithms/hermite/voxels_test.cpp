@@ -1,4 +1,6 @@
+#include "algorithms/hermite/thesis_voxel.h"
 #include "algorithms/hermite/voxels.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 #include <gtest/gtest.h>
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/hermite/normal_code.h"
+#include "algorithms/hermite/with_normal_code.h"
 #include "experiments/bench/failures.h"
 
 namespace hermesh {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algorithms/hermite/normal_code.h"
+#include "algorithms/hermite/with_normal_code.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
 
