@@ -1,11 +1,11 @@
 #include "experiments/cli/adaptivity.h"
 
-#include <CLI/CLI.hpp>
 #include <sstream>
 #include <vector>
 
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/extraction/frustum.h"
+#include "experiments/cli/cli11.h"
 
 namespace hermesh::cli {
 namespace {

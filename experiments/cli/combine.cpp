@@ -1,5 +1,4 @@
 // hermesh combine: the union, intersection or difference of two solids, as Hermite data and back to a mesh.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -8,6 +7,7 @@
 #include "algorithms/io/written_precision.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"

@@ -1,5 +1,4 @@
 // hermesh extract, remesh: level set to mesh, and polygons to level set and back to a mesh in one.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/extraction/volume_ends.h"
 #include "experiments/cli/adaptivity.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"

@@ -1,10 +1,10 @@
 // hermesh run, report and compare: experiments, the tables made of them, and two runs beside each other.
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
 #include "experiments/harness/compare.h"

@@ -1,7 +1,6 @@
 #include "experiments/cli/extracting.h"
 
-#include <CLI/CLI.hpp>
-
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"

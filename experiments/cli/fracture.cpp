@@ -1,5 +1,4 @@
 // hermesh fracture: a solid into pieces, one file each, with a ledger.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -7,6 +6,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/samplers.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"

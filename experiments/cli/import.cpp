@@ -1,11 +1,11 @@
 // hermesh import: scalar volumes of other programs to .vdb.
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
 #include <memory>
 
 #include "algorithms/core/value_range.h"
 #include "algorithms/io/import/import_volume.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"

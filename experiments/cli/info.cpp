@@ -1,5 +1,4 @@
 // hermesh info: what a file holds.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -8,6 +7,7 @@
 #include "algorithms/core/shown.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/hermite_file.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 

@@ -1,5 +1,4 @@
 // hermesh list: variants, voxelizers, experiments and cases.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -7,6 +6,7 @@
 
 #include "algorithms/variants.h"
 #include "experiments/cases/cases.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 #include "experiments/harness/harness.h"

@@ -2,7 +2,6 @@
 // scripts: results on stdout, everything else on stderr, a failure is one line there, the last, after the notes.
 #include <tbb/global_control.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 #include <thread>
 
 #include "algorithms/core/shown.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/terminal_progress.h"

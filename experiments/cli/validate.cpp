@@ -1,11 +1,11 @@
 // hermesh validate: the judges' report of one mesh.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <sstream>
 
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/report_text.h"
 #include "experiments/cli/session.h"
 #include "validation/mesh_report.h"

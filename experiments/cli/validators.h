@@ -1,9 +1,10 @@
 // Checks of options that several commands share.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <string>
+
+#include "experiments/cli/cli11.h"
 
 namespace hermesh::cli {
 

@@ -1,5 +1,4 @@
 // hermesh voxelize: polygons to volumes.
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "algorithms/core/level_set_grid.h"
@@ -9,6 +8,7 @@
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 #include "algorithms/voxelization/distance/quad_diagonals.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
+#include "experiments/cli/cli11.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
