@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <numbers>
 

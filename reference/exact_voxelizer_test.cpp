@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include "algorithms/core/level_set_grid.h"
 #include "reference/test_meshes.h"

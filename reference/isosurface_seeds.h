@@ -1,9 +1,9 @@
 // Points on every component of an isosurface, for methods that have to be told where it is. Heavy (OpenVDB).
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <vector>
+
+#include "algorithms/core/openvdb_trees.h"
 
 namespace hermesh {
 

@@ -1,7 +1,6 @@
 #include "reference/level_set_judge.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <functional>
 

@@ -1,8 +1,7 @@
 // What the references ask of a grid before they mesh it. Heavy (OpenVDB): for .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/polygon_mesh.h"
 
 namespace hermesh {

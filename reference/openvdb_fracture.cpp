@@ -1,7 +1,6 @@
 #include "reference/openvdb_fracture.h"
 
 #include <openvdb/tools/LevelSetFracture.h>
-#include <openvdb/tools/VolumeToMesh.h>
 
 #include <chrono>
 #include <list>
@@ -11,6 +10,7 @@
 #include "algorithms/core/stopwatch.h"
 #include "reference/meshing_frame.h"
 #include "reference/openvdb_mesh_to_volume.h"
+#include "reference/openvdb_mesher.h"
 
 namespace hermesh {
 namespace {
@@ -27,7 +27,7 @@ PolygonMesh mesh_of(const FloatGrid& fragment, const FloatGrid& reference, const
   const FloatGrid::ConstPtr piece = moved(fragment), whole = moved(reference);
   openvdb::tools::VolumeToMesh mesher(0.0, adaptivity);
   mesher.setRefGrid(whole, adaptivity);
-  mesher(*piece);
+  run_mesher(mesher, *piece);
   PolygonMesh mesh;
   mesh.origin = frame.origin;
   for (std::size_t i = 0; i < mesher.pointListSize(); ++i) {

@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/ChangeBackground.h>
 
 #include <atomic>

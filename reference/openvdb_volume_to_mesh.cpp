@@ -1,9 +1,8 @@
 #include "reference/openvdb_volume_to_mesh.h"
 
-#include <openvdb/tools/VolumeToMesh.h>
-
 #include "algorithms/core/level_set_grid.h"
 #include "reference/meshing_frame.h"
+#include "reference/openvdb_mesher.h"
 
 namespace hermesh {
 
@@ -21,7 +20,7 @@ PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   const openvdb::FloatGrid::ConstPtr centred = grid.copyReplacingMetadataAndTransform(meta, frame.transform);
 
   openvdb::tools::VolumeToMesh mesher(input.isovalue, input.options.number("adaptivity"));
-  mesher(*centred);
+  run_mesher(mesher, *centred);
   input.context.check();
 
   PolygonMesh mesh;

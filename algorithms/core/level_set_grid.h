@@ -2,7 +2,7 @@
 // need it.
 #pragma once
 
-#include <openvdb/openvdb.h>
+#include "algorithms/core/openvdb_trees.h"
 
 #include "algorithms/core/level_set.h"
 

@@ -1,6 +1,5 @@
 #include "algorithms/hermite/dense_combine.h"
 
-#include <openvdb/openvdb.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 

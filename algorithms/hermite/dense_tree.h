@@ -1,8 +1,7 @@
 // The OpenVDB tree inside a DenseHermite. Heavy: include it from the few .cpp files that need it.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/hermite/dense_hermite.h"
 
 // OpenVDB calls these functions by their full names, so that they must be specialised type by type: an overload for
@@ -42,6 +41,20 @@ namespace hermesh {
 
 template <class Voxel>
 using DenseGrid = openvdb::Grid<typename openvdb::tree::Tree4<Voxel, 5, 4, 3>::Type>;
+using FloatDenseTree = DenseGrid<FloatVoxel>::TreeType;
+using DirectedDenseTree = DenseGrid<DirectedVoxel>::TreeType;
+using ThesisDenseTree = DenseGrid<ThesisVoxel>::TreeType;
+using FixedDenseTree = DenseGrid<FixedVoxel>::TreeType;
+
+}  // namespace hermesh
+
+// They are compiled in dense_tree.cpp.
+HERMESH_INSTANTIATE_TREE(extern template, hermesh::FloatDenseTree)
+HERMESH_INSTANTIATE_TREE(extern template, hermesh::DirectedDenseTree)
+HERMESH_INSTANTIATE_TREE(extern template, hermesh::ThesisDenseTree)
+HERMESH_INSTANTIATE_TREE(extern template, hermesh::FixedDenseTree)
+
+namespace hermesh {
 
 template <class Voxel>
 struct DenseTree {

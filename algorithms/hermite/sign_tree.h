@@ -2,7 +2,6 @@
 // the tree of bits in files. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/sparse_hermite.h"
 

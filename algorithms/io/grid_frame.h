@@ -2,12 +2,11 @@
 // from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <Eigen/Core>
 #include <filesystem>
 #include <vector>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/polygon_mesh.h"
 
 namespace hermesh {

@@ -1,8 +1,6 @@
 // What reading and writing .vdb files of any content have in common. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
 #include <memory>
 #include <new>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/shown.h"
 #include "algorithms/io/vdb_structure.h"
 

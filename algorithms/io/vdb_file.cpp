@@ -1,7 +1,5 @@
 #include "algorithms/io/vdb_file.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>

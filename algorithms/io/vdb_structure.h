@@ -8,14 +8,14 @@
 // Blosc write no more than they were told that there is room for, which both promise.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "algorithms/core/openvdb_trees.h"
 
 namespace hermesh {
 

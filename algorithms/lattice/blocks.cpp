@@ -1,6 +1,5 @@
 #include "algorithms/lattice/blocks.h"
 
-#include <openvdb/openvdb.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 

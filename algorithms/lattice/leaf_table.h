@@ -2,8 +2,6 @@
 // Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -13,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/lattice/blocks.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/level_set.h"

@@ -1,7 +1,6 @@
 #include "algorithms/thesis/thesis_voxelizer.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <tbb/global_control.h>
 
 #include <Eigen/Geometry>

@@ -2,22 +2,12 @@
 // voxel. Heavy (OpenVDB): include it from .cpp files. hermesh_voxelizer.h has the same as a variant.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/voxelization/sign_rule.h"
 
 namespace hermesh {
-
-/// How a voxel's side is found.
-enum class SignRule {
-  automatic,   ///< flood fill, or winding numbers where the flood leaks in through a hole, with a note
-  flood_fill,  ///< inside is what cannot be reached from infinity: any orientation, cavities filled (Aldén
-               ///< §5.3)
-  winding_number,  ///< inside is where the generalised winding number is above ½: keeps cavities, closes
-                   ///< holes
-  none             ///< no sign: distance alone
-};
 
 /// What voxelize() is asked for.
 struct VoxelizeOptions {

@@ -1,7 +1,5 @@
 #include "experiments/cases/volume_cases.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 

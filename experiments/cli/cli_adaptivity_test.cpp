@@ -1,6 +1,6 @@
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {

@@ -1,5 +1,4 @@
 // What comes from outside, damaged or odd: the program's answer to single files, its limits and signals.
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 

@@ -1,7 +1,6 @@
 #include "experiments/harness/run_voxelizers.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <fstream>

@@ -1,5 +1,4 @@
 // Tables 9.3 and 9.4 of the thesis, and their figures: a large level set contoured finely only where a camera looks.
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Composite.h>
 
 #include <algorithm>

@@ -1,5 +1,4 @@
 // Scans, fog and level sets of other programs through the extractors, with both treatments of the end of the data.
-#include <openvdb/openvdb.h>
 
 #include <array>
 

@@ -1,7 +1,6 @@
 // Volumes and experiment files that something has damaged: an answer or a short sentence, never a crash, a hang or gigabytes.
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/LevelSetUtil.h>
 #include <tbb/global_control.h>

@@ -1,6 +1,5 @@
 #include "algorithms/io/import/sample_box.h"
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
 
 #include <algorithm>

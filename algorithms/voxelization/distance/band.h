@@ -1,18 +1,15 @@
 // Distances and crossed grid edges of every 8³ block of voxels near the triangles; signs come later.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <functional>
 #include <memory>
 #include <vector>
 
+#include "algorithms/core/openvdb_leaf.h"
 #include "algorithms/voxelization/distance/kernels/kernels.h"
 #include "algorithms/voxelization/distance/triangle_bins.h"
 
 namespace hermesh {
-
-using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 
 /// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest. It means nothing for a
 /// voxel that is out of reach.

@@ -6,7 +6,7 @@
 
 #include "algorithms/voxelization/distance/band.h"
 #include "algorithms/voxelization/inside/regions.h"
-#include "algorithms/voxelization/voxelize.h"
+#include "algorithms/voxelization/sign_rule.h"
 
 namespace hermesh {
 

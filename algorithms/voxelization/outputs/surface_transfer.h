@@ -2,10 +2,9 @@
 // there. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <vector>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 

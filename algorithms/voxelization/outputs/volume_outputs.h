@@ -2,13 +2,12 @@
 // attributes, Hermite data. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/hermite/sparse_hermite.h"
 #include "algorithms/voxelization/voxelize.h"
 

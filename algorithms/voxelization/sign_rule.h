@@ -1,0 +1,16 @@
+// How our voxelizer tells inside from outside.
+#pragma once
+
+namespace hermesh {
+
+/// How a voxel's side is found.
+enum class SignRule {
+  automatic,   ///< flood fill, and winding numbers where the flood leaks in through a hole; says so in a note
+  flood_fill,  ///< inside is what cannot be reached from infinity: any orientation, cavities filled (Aldén
+               ///< §5.3)
+  winding_number,  ///< inside is where the generalised winding number is above ½: keeps cavities, closes
+                   ///< holes
+  none             ///< no sign: distance alone
+};
+
+}  // namespace hermesh
