@@ -13,6 +13,8 @@
 namespace hermesh {
 namespace {
 
+// An accessor that does not register with the tree, which would be an insertion into a table that all threads share,
+// for each block of cells. It must not outlive a change of the tree, and nobody changes these trees.
 using Accessor = openvdb::FloatGrid::ConstUnsafeAccessor;
 
 openvdb::Vec3d index_of(const openvdb::FloatGrid& grid, const Eigen::Vector3d& world) {
@@ -34,6 +36,7 @@ void check_linear(const openvdb::FloatGrid& grid, const char* what) {
 void check_scale(const openvdb::FloatGrid& grid) {
   // An imported volume whose least value is 0 has the next normal number below for a background.
   const auto good = [](float value) { return std::isfinite(value) && value >= -std::numeric_limits<float>::min(); };
+  // Inactive values count, too, because interpolation reads every sample, whatever its state.
   if (!good(grid.background()))
     throw Error("the scale of the tolerance has a background that is negative or not finite; give it one of 0 or more");
   for (auto it = grid.cbeginValueAll(); it; ++it) {
@@ -57,6 +60,7 @@ FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld&
     check_scale(*field->scale.grid().grid);
     scale_ = field->scale;
   }
+  // Where the bound holds everywhere, the mask stays empty, and inside() gives back all that it is asked for.
   if (!field->mask || field->outside == AdaptivityField::Outside::everywhere) return;
   mask_ = field->mask;
   outside_ = field->outside;
@@ -64,6 +68,7 @@ FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld&
   check_linear(grid, "the mask");
   is_level_set_ = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
   for (int corner = 0; corner < 8; ++corner) {
+    // The map may shear, so that the diagonals of a block differ: the longest one bounds all.
     const Eigen::Vector3d half(corner & 1 ? 4 : -4, corner & 2 ? 4 : -4, corner & 4 ? 4 : -4);
     block_radius_ = std::max(block_radius_, (placement.linear * half).norm());
   }
@@ -72,6 +77,7 @@ FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld&
 }
 
 Eigen::Vector3d FieldEvaluator::world(const std::array<std::int32_t, 3>& lower, const Eigen::Vector3d& local) const {
+  // The base is subtracted in whole numbers, which is exact, before anything becomes a float.
   const Eigen::Vector3d index(lower[0] - placement_.base[0], lower[1] - placement_.base[1],
                               lower[2] - placement_.base[2]);
   return placement_.origin + placement_.local(index + local);
@@ -83,12 +89,15 @@ BlockMask FieldEvaluator::inside(const std::array<std::int32_t, 3>& lower, const
   const Accessor accessor = grid.getConstUnsafeAccessor();
   const auto at = [&](const Eigen::Vector3d& local) { return index_of(grid, world(lower, local)); };
   BlockMask result{};
+  // A distance changes no faster than one walks, so that one look at the middle may decide for the whole block. Where
+  // the band is narrower than the block's radius, its background never exceeds that, and every cell is asked.
   if (is_level_set_) {
     const float middle = interpolated(accessor, at(Eigen::Vector3d::Constant(4.0)));
     if (std::fabs(middle) > block_radius_) return middle < 0.0f ? cells : result;
   }
   for_each_bit(cells, [&](int cell) {
     const openvdb::Vec3d index = at(centre(cell));
+    // Masks of other classes may hold labels, which cannot be interpolated: the nearest sample decides.
     const bool in =
         is_level_set_ ? interpolated(accessor, index) < 0.0f : nearest(accessor, index) != grid.background();
     if (in) result[cell >> 6] |= std::uint64_t{1} << (cell & 63);
@@ -102,6 +111,7 @@ void FieldEvaluator::scales(const std::array<std::int32_t, 3>& lower, const Bloc
   const Accessor accessor = grid.getConstUnsafeAccessor();
   for_each_bit(cells, [&](int cell) {
     const float scale = interpolated(accessor, index_of(grid, world(lower, centre(cell))));
+    // What check_scale() forgives, a background just below 0, counts as 0.
     out[static_cast<std::size_t>(cell)] = std::max(scale, 0.0f);
   });
 }
@@ -113,6 +123,8 @@ void drop_unused_points(PolygonMesh& mesh) {
     for (const std::uint32_t point : triangle) number[point] = 0;
   for (const Quad& quad : mesh.quads)
     for (const std::uint32_t point : quad) number[point] = 0;
+  // A point moves down to the next free place, which is never above its own: order is kept,
+  // and no second array is needed.
   std::uint32_t next = 0;
   for (std::size_t i = 0; i < number.size(); ++i) {
     if (number[i] == kUnused) continue;

@@ -4,7 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
+#include "algorithms/lattice/placement.h"
 #include "algorithms/core/level_set.h"
 #include "algorithms/core/polygon_mesh.h"
 
@@ -38,10 +39,11 @@ class FieldEvaluator {
   bool leaves_out_outside() const { return outside_ == AdaptivityField::Outside::nothing; }
   bool has_scale() const { return static_cast<bool>(scale_); }
 
-  /// Those of `cells` whose centres lie in the mask, in the block of 8³ cells whose first sample is `lower`. A block
-  /// that a level set puts wholly on one side costs one look-up.
+  /// The cells among `cells` whose centres lie in the mask, in the block of 8³ cells whose first sample is `lower`
+  /// (index coordinates of the volume). A block that a level set puts wholly on one side costs one look-up.
   BlockMask inside(const std::array<std::int32_t, 3>& lower, const BlockMask& cells) const;
-  /// The scale at the centres of `cells`; other entries are left as they are.
+  /// Writes the scale at the centres of `cells` to their entries of `out`; other entries are left as they are. There
+  /// must be a scale (has_scale()).
   void scales(const std::array<std::int32_t, 3>& lower, const BlockMask& cells, std::array<float, 512>& out) const;
 
  private:
@@ -54,7 +56,7 @@ class FieldEvaluator {
   double block_radius_ = 0.0;  ///< world units: no point of a block is farther from its middle than this, less margin
 };
 
-/// Takes out the points that no polygon uses; the others keep their order. For meshes without attributes.
+/// Takes out of a mesh without attributes the points that no polygon uses; the others keep their order.
 void drop_unused_points(PolygonMesh& mesh);
 
 }  // namespace hermesh

@@ -11,6 +11,7 @@
 namespace hermesh {
 namespace {
 
+/// The mesh in the coordinates that a file holds, relative to the placement's origin.
 PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunContext& context) {
   PolygonMesh result;
   result.origin = file.placement().origin;
@@ -27,13 +28,14 @@ PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunCont
   return result;
 }
 
-/// Only the triangles that the field does not leave out, and their points. A triangle of the uniform mesh is outside if its
-/// middle is; one that was merged may have its middle anywhere.
+/// The triangles that the field does not leave out, and their points, in the order in which these use them. A triangle
+/// of the uniform mesh is outside if its middle is; one that was merged may have its middle anywhere.
 CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   constexpr std::uint32_t kNone = 0xffffffffu;
   std::vector<std::uint32_t> number(all.points.size(), kNone);
   CertifiedPolygons result;
   std::size_t triangle = 0;
+  // `shown` follows this very order, triangles first and then two of each quad.
   for (Triangle t : all_triangles(std::move(all.triangles), all.quads)) {
     const bool shown = !all.shown.empty() && all.shown[triangle];
     ++triangle;
@@ -50,11 +52,13 @@ CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   return result;
 }
 
-/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes.
+/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes: the map's
+/// largest singular value. A bound in world units that is divided by it holds in every direction.
 double longest_step(const IndexToWorld& placement) { return placement.linear.operatorNorm(); }
 
 }  // namespace
 
+/// A cell as FieldEvaluator takes it: its block, and the only bit of a mask.
 struct FieldAtPoints::Cell {
   std::array<std::int32_t, 3> lower;
   BlockMask mask{};
@@ -66,6 +70,7 @@ FieldAtPoints::Cell FieldAtPoints::cell_at(const Eigen::Vector3d& p) const {
   int at[3];
   for (int a = 0; a < 3; ++a) {
     const int index = static_cast<int>(std::floor(p[a])) + base_[a];
+    // Bits round down for negative coordinates, too.
     cell.lower[a] = index & ~7;
     at[a] = index & 7;
   }
@@ -82,11 +87,13 @@ bool FieldAtPoints::leaves_out(const Eigen::Vector3d& p) const {
 
 float FieldAtPoints::tolerance(const Eigen::Vector3d& p, double tolerance) const {
   const Cell cell = cell_at(p);
+  // Outside of the mask the scale has no say: a tolerance that is larger than that of simplification stays.
   if (evaluator_.simplifies_outside() && !in_mask(cell))
     return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
   // What is left out in the end must not have become part of what is not.
   if (evaluator_.leaves_out_outside() && !in_mask(cell)) return 0;
   if (!evaluator_.has_scale()) return static_cast<float>(tolerance);
+  // One entry alone is written and read.
   std::array<float, 512> scales;
   evaluator_.scales(cell.lower, cell.mask, scales);
   return static_cast<float>(tolerance * scales[cell.sample]);
@@ -95,6 +102,7 @@ float FieldAtPoints::tolerance(const Eigen::Vector3d& p, double tolerance) const
 std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads) {
   triangles.reserve(triangles.size() + 2 * quads.size());
   for (const Quad& q : quads) {
+    // Whoever makes a quad has put the diagonal that it wants between the corners 0 and 2.
     triangles.push_back({q[0], q[1], q[2]});
     triangles.push_back({q[0], q[2], q[3]});
   }
@@ -104,6 +112,7 @@ std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const Large
 void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown) {
   for (const Triangle& t : all_triangles(polygons.triangles, polygons.quads)) {
     const std::size_t number = polygons.shown.size();
+    // A merged triangle stands for something within if one of its corners does.
     polygons.shown.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) || is_shown(number, 2, t[2]));
   }
 }
@@ -142,8 +151,11 @@ PolygonMesh contour_certified(const ExtractionInput& input, std::string_view nam
                               const std::function<PolygonMesh(const HermiteView&, double)>& contour) {
   const double asked = input.options.number("tolerance"), world = input.options.number("tolerance_world");
   const auto contoured = [&](const HermiteView& grid) {
+    // The bound is proved in index space, whatever units it was asked for in.
     return contour(grid, world > 0 ? world / longest_step(grid.placement()) : asked);
   };
+  // Packed data are decoded where they are read, by code that is compiled for their normal code; all other
+  // representations are floats by now.
   const std::string variant(name);
   if (const std::optional<PackedHermite> packed = packed_hermite_input(input, variant))
     return with_normal_code(packed->normal_code,

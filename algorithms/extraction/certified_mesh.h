@@ -26,7 +26,8 @@ inline constexpr double kSimplifiedTolerance = 8.0;
 /// An adaptivity field at single places of index space, relative to the placement's base.
 class FieldAtPoints {
  public:
-  /// @param field may be null, for none
+  /// `field` may be null, for none; `placement` is that of the volume whose index space the places are in.
+  /// @throws Error as FieldEvaluator's constructor does
   FieldAtPoints(const AdaptivityField* field, const IndexToWorld& placement)
       : evaluator_(field, placement), base_(placement.base) {}
 
@@ -35,6 +36,8 @@ class FieldAtPoints {
   }
   bool simplifies() const { return evaluator_.simplifies_outside(); }
   bool leaves_out_outside() const { return evaluator_.leaves_out_outside(); }
+  /// Whether the mesh is to be open at the place: the cell that holds it is outside of the mask, and the field asks for
+  /// nothing there.
   bool leaves_out(const Eigen::Vector3d& p) const;
   /// The tolerance that holds at a place, where `tolerance` was asked for, in voxels.
   float tolerance(const Eigen::Vector3d& p, double tolerance) const;
@@ -61,7 +64,8 @@ struct CertifiedPolygons {
 /// Triangles as given, then two of each quad, cut between its corners 0 and 2.
 std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads);
 
-/// Fills `shown`. @param is_shown called with the number of a triangle, which of its corners, and the corner's point
+/// Fills `shown`. `is_shown` is called with the number of a triangle, which of its corners (0 to 2), and the corner's
+/// point; a triangle is shown if one of its corners is.
 void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown);
 
 /// Records the uniform mesh's counts as figures of the run.
@@ -77,8 +81,9 @@ PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, con
 /// The entries `tolerance` and `tolerance_world` of both tables.
 std::vector<OptionSpec> tolerance_options();
 
-/// Calls `contour` with the input's Hermite data and the tolerance in voxels that its options ask for.
-/// @param name of the extractor, for messages
+/// Calls `contour` with the input's Hermite data and the tolerance in voxels that its options ask for. `name` is the
+/// extractor's, for messages.
+/// @throws Error as hermite_input() does, and what `contour` throws
 PolygonMesh contour_certified(const ExtractionInput& input, std::string_view name, bool needs_normals,
                               const std::function<PolygonMesh(const HermiteView&, double tolerance)>& contour);
 

@@ -26,7 +26,9 @@ class Solid {
   explicit Solid(const Frustum& frustum) {
     check(frustum);
     const Vector3d forward = (frustum.look_at - frustum.position).normalized();
+    // An orthonormal frame: `up` is made perpendicular to the view, and its length is 1 because that of the others is.
     const Vector3d right = forward.cross(frustum.up).normalized(), up = right.cross(forward);
+    // Half of the angle, since it is measured from the lower to the upper plane.
     const double slope = std::tan(0.5 * frustum.field_of_view * std::numbers::pi / 180.0);
     for (int corner = 0; corner < 8; ++corner) {
       const double depth = corner & 4 ? frustum.far : frustum.near, half = slope * depth;
@@ -36,16 +38,18 @@ class Solid {
     const Vector3d middle = mean();
     for (int f = 0; f < 6; ++f) {
       normals_[f] = (corner(f, 1) - corner(f, 0)).cross(corner(f, 3) - corner(f, 0)).normalized();
+      // Turned away from the middle, so that the order of corners in the table need not be the same for all faces.
       if (normals_[f].dot(middle - corner(f, 0)) > 0) normals_[f] = -normals_[f];
     }
   }
 
-  /// Exact inside, and nowhere larger than the distance: the largest of those to the planes.
+  /// The largest signed distance to the planes of the six faces: exact inside, and nowhere larger than the distance.
   double lower_bound(const Vector3d& point) const {
     double largest = -std::numeric_limits<double>::infinity();
     for (int f = 0; f < 6; ++f) largest = std::max(largest, normals_[f].dot(point - corner(f, 0)));
     return largest;
   }
+  /// Signed distance to the surface. From outside, the nearest point of a convex solid lies on one of its faces.
   double distance(const Vector3d& point) const {
     const double bound = lower_bound(point);
     if (bound <= 0) return bound;
@@ -77,6 +81,7 @@ class Solid {
     if (!(f.near > 0 && f.near < f.far)) throw Error("a frustum's near and far plane must be 0 < near < far");
     const Vector3d view = f.look_at - f.position;
     if (!(view.norm() > 0)) throw Error("a frustum must look at another point than its own position");
+    // The sine of the angle between the two; below this the frame would be made of rounding.
     if (!(view.normalized().cross(f.up.normalized()).norm() > 1e-6))
       throw Error("a frustum's up must not be zero, nor lie along its view");
   }
@@ -92,6 +97,8 @@ class Solid {
     for (const Vector3d& corner : corners_) sum += corner;
     return sum / 8.0;
   }
+  /// Distance to one face: to its plane, if the foot of the perpendicular lies on the same side of all four edges
+  /// (which side it is depends on the order of corners), or else to the nearest edge.
   double to_face(int f, const Vector3d& point) const {
     const double height = normals_[f].dot(point - corner(f, 0));
     const Vector3d foot = point - height * normals_[f];
@@ -107,7 +114,7 @@ class Solid {
   }
 
   std::array<Vector3d, 8> corners_;
-  std::array<Vector3d, 6> normals_;  ///< of the faces, outwards
+  std::array<Vector3d, 6> normals_;  ///< unit normals of the faces, outwards
 };
 
 /// The leaf with its first sample there, or null if no sample is within the band.
@@ -115,11 +122,14 @@ std::unique_ptr<Leaf> make_leaf(const Solid& solid, const openvdb::Coord& lower,
   const auto at = [&](double x, double y, double z) -> Vector3d {
     return Vector3d(lower.x() + x, lower.y() + y, lower.z() + z) * voxel;
   };
+  // The samples of a leaf lie within half the diagonal of 7 voxels of its middle, and the bound changes no faster than
+  // one walks: where it is beyond band and radius at the middle, no sample is in the band.
   const double radius = std::sqrt(3.0) * 3.5 * voxel, middle = solid.lower_bound(at(3.5, 3.5, 3.5));
   if (std::fabs(middle) > band + radius) return nullptr;
   auto leaf = std::make_unique<Leaf>(lower, static_cast<float>(band), false);
   for (int sample = 0; sample < 512; ++sample) {
     const Vector3d point = at(sample >> 6, (sample >> 3) & 7, sample & 7);
+    // The bound alone settles most samples outside of the band; the distance to faces and edges is for the others.
     const double bound = solid.lower_bound(point);
     const double value = bound >= band ? band : std::clamp(solid.distance(point), -band, band);
     leaf->setValueOnly(static_cast<openvdb::Index>(sample), static_cast<float>(value));
@@ -142,15 +152,18 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
     throw Error("the frustum is too small for a mask of " + std::to_string(resolution) +
                 " voxels along it; use larger units, or fewer voxels");
   constexpr double kNarrow = 2.0;  // voxels between whose samples nothing of the frustum may be seen
+  // Only a note, because the rest of the mask is right all the same.
   if (solid.near_side() < kNarrow * voxel)
     context.note(
         "the frustum's near end is narrower than two voxels of its mask, which may lose it there; "
         "take planes nearer to what is seen, or more voxels");
+  // The leaves that the box and the band around it meet; the grid has its index zero at the world's origin.
   std::array<int, 3> first, count;
   for (int a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));
     count[a] = static_cast<int>(std::floor((box.max()[a] + band) / voxel / 8.0)) - first[a] + 1;
   }
+  // Threads make leaves, each in its own place; the tree, which takes one at a time, gets them afterwards in order.
   std::vector<std::unique_ptr<Leaf>> leaves(std::size_t(count[0]) * count[1] * count[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const int n = static_cast<int>(i), z = n % count[2], y = n / count[2] % count[1], x = n / (count[2] * count[1]);
@@ -163,6 +176,7 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
   for (auto& leaf : leaves)
     if (leaf) grid->tree().addLeaf(leaf.release());
+  // Tiles within the frustum have the background's value so far; the band around them says that they are inside.
   openvdb::tools::signedFloodFill(grid->tree());
   return make_level_set(grid);
 }

@@ -8,7 +8,7 @@
 
 namespace hermesh {
 
-/// World units and degrees.
+/// The part of space that a camera sees, a pyramid cut off by two planes; lengths in world units, angles in degrees.
 struct Frustum {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d look_at = -Eigen::Vector3d::UnitZ();
@@ -25,7 +25,7 @@ double signed_distance(const Frustum& frustum, const Eigen::Vector3d& point);
 
 /// Level set of the frustum with a band of three voxels, `resolution` voxels (8 to 4096) along the longest
 /// side of its box. A note says so where the near end is so narrow that the samples may miss it.
-/// @throws Error as above, or if the voxels would be smaller than OpenVDB takes.
+/// @throws Error as signed_distance() does, or if the voxels would be smaller than OpenVDB takes; Cancelled.
 LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& context);
 
 }  // namespace hermesh

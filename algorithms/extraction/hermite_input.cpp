@@ -7,6 +7,8 @@
 namespace hermesh {
 namespace {
 
+/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the isovalue 0
+/// alone, for nowhere else does the surface that is asked for lie on the polygons.
 bool wants_polygons(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
   return source == "exact" || (source == "auto" && (input.source || input.hermite) && input.isovalue == 0.0);
@@ -14,11 +16,14 @@ bool wants_polygons(const ExtractionInput& input) {
 
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
+  // Who voxelized the input may have exact crossings at hand; then nothing is sampled.
   if (input.hermite && input.isovalue == 0.0) return *input.hermite;
   const PolygonMesh& source =
       polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
   FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, source, input.context, &sampling);
+  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons' (samplers.h); the
+  // user is told how many do, and where their crossings are from.
   const std::size_t missed = sampling.nearest + sampling.fallback;
   if (missed > 0)
     input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
@@ -27,8 +32,8 @@ FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   return hermite;
 }
 
-/// The same points of the world about the world's own origin: with it single precision is that of a file in single
-/// precision.
+/// Moves the placement's origin to that of the world, with every sample where it was: points in single precision are
+/// then those that a file in single precision holds.
 void about_world_origin(IndexToWorld& placement) {
   placement.offset += placement.origin;
   placement.origin.setZero();
@@ -56,9 +61,11 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
   if (parse_representation(input.options.text("representation")) != Representation::sparse)
     return std::nullopt;
   const NormalCodeId code = parse_normal_code(input.options.text("normals"));
+  // From a level set each leaf is packed as soon as it is sampled, so that the floats of all are never there together.
   PackedHermite hermite = wants_polygons(input)
                               ? pack(sample(input, variant), code, input.context)
                               : sample_level_set_packed(input.level_set, input.isovalue, code, input.context);
+  // Before any point is placed, so that proofs are about the points that the file will hold.
   if (input.written_in_single) about_world_origin(hermite.placement);
   Represented figures;
   figures.crossings = hermite.crossings.size();
@@ -69,8 +76,10 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
 
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals) {
   const Representation representation = parse_representation(input.options.text("representation"));
+  // Directed distances are offsets alone, which is all that average placement reads.
   if (representation == Representation::directed && needs_normals)
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");
+  // There and back again: the extractor gets what the representation has kept, with its losses.
   Represented data =
       through(representation, parse_normal_code(input.options.text("normals")), sample(input, variant), input.context);
   if (input.written_in_single) about_world_origin(data.hermite.placement);
@@ -79,6 +88,7 @@ FloatHermite hermite_input(const ExtractionInput& input, const std::string& vari
 }
 
 bool from_level_set_alone(const ExtractionInput& input) {
+  // Sparse floats are the crossings as they are computed; all other representations have a form of their own.
   return !wants_polygons(input) &&
          parse_representation(input.options.text("representation")) == Representation::sparse_float;
 }

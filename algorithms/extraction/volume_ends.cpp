@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
@@ -15,16 +16,18 @@ namespace {
 
 using openvdb::Coord;
 
+// Signs or states of a whole tile.
 constexpr BlockMask kNone{};
 constexpr BlockMask kAll{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
-/// From a sample inside to the one beyond the data.
+/// An edge of the grid from a sample inside to the sample beyond the data.
 struct EndEdge {
   Coord beyond;
-  float value;  ///< of the sample inside
+  float value;  ///< value of the sample inside
   int axis;
   int side;  ///< 0: the sample beyond lies below, 1: above
 
+  /// The order by samples beyond puts all edges side by side that lead to one sample.
   bool operator<(const EndEdge& other) const {
     return std::tie(beyond, axis, side) < std::tie(other.beyond, other.axis, other.side);
   }
@@ -33,8 +36,8 @@ struct EndEdge {
 /// What makes an edge with a change of sign an end of the data.
 struct EndRule {
   bool level_set = false;
-  openvdb::CoordBBox box;               ///< of the data, where it is no level set
-  std::array<float, 3> largest_rise{};  ///< of distances, from one sample to the next along each axis
+  openvdb::CoordBBox box;               ///< box of the data, where it is no level set
+  std::array<float, 3> largest_rise{};  ///< most that distances can rise from one sample to the next along each axis
 
   bool operator()(const Coord& inside, float value, float beyond, int axis, int side) const {
     if (level_set) return std::fabs(double(beyond) - double(value)) > largest_rise[axis];
@@ -42,12 +45,13 @@ struct EndRule {
   }
 };
 
-/// Nothing where the volume has no ends.
+/// Fills in the rule for a volume; false where the volume has no ends.
 bool find_rule(const openvdb::FloatGrid& grid, double isovalue, EndRule& rule) {
   rule.level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
   if (rule.level_set) {
     // Distances that were stored in half precision, or advected, rise a little more than they should.
     constexpr double kTolerance = 1.01;
+    // A distance rises by no more than the length of the step, in world units a column of the map.
     const IndexToWorld placement = placement_of(grid);
     for (int axis = 0; axis < 3; ++axis)
       rule.largest_rise[axis] = static_cast<float>(kTolerance * placement.linear.col(axis).norm());
@@ -55,6 +59,7 @@ bool find_rule(const openvdb::FloatGrid& grid, double isovalue, EndRule& rule) {
   }
   rule.box = active_box(grid.tree());
   if (rule.box.empty()) return false;
+  // Fog that fills its box is a scan; fog that does not is sparse, and its background is empty space.
   const bool is_fog = grid.getGridClass() == openvdb::GRID_FOG_VOLUME;
   return !is_fog || grid.activeVoxelCount() == rule.box.volume();
 }
@@ -63,12 +68,13 @@ class EndFinder {
  public:
   EndFinder(const LeafTable& table, const EndRule& rule) : table_(table), rule_(rule) {}
 
-  /// In order of the samples beyond.
+  /// All edges that cross an end of the data, in the order of the samples beyond.
   std::vector<EndEdge> find(const RunContext& context) const {
     std::vector<std::vector<EndEdge>> found(table_.size());
     parallel_blocks(table_.size(), context, [&](std::size_t i) {
       for (int axis = 0; axis < 3; ++axis) search(i, axis, found[i]);
     });
+    // Each leaf has had a list of its own; sorted, they are the same for any number of threads.
     std::vector<EndEdge> all;
     for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
     std::sort(all.begin(), all.end());
@@ -81,6 +87,7 @@ class EndFinder {
     if (there >= 0) return table_.inside(static_cast<std::size_t>(there));
     return there == kUniformInside ? kAll : kNone;
   }
+  // The table knows the signs of tiles, but not whether they are active: that takes a look at the tree.
   BlockMask active_of(std::size_t leaf, int dx, int dy, int dz) const {
     const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
     if (there >= 0) return table_.active(static_cast<std::size_t>(there));
@@ -88,6 +95,8 @@ class EndFinder {
   }
 
   void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {
+    // The two signs of every edge along the axis that starts in the leaf, as bits. All edges with a change of sign
+    // start in a leaf, as the table promises.
     const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
     const BlockMask own[2] = {table_.inside(leaf), inside_of(leaf, dx, dy, dz)};
     const auto shifted = [&](const BlockMask& here, const BlockMask& next) {
@@ -96,6 +105,7 @@ class EndFinder {
     const BlockMask next = shifted(own[0], own[1]);
     BlockMask crossing;
     for (int x = 0; x < 8; ++x) crossing[x] = own[0][x] ^ next[x];
+    // The states of samples cost a look at the leaves themselves, which is spared where nothing crosses.
     if (!::hermesh::any(crossing)) return;
     const BlockMask active = table_.active(leaf);
     const BlockMask next_active = shifted(active, active_of(leaf, dx, dy, dz));
@@ -108,6 +118,7 @@ class EndFinder {
     const Coord first = table_.lower(leaf).offsetBy(sample >> 6, (sample >> 3) & 7, sample & 7);
     Coord second = first;
     ++second[axis];
+    // An end above has its sample inside first, along the axis, and one below has it second.
     const Coord inside = side ? first : second, beyond = side ? second : first;
     const float value = table_.tree().getValue(inside);
     if (rule_(inside, value, table_.tree().getValue(beyond), axis, side)) found.push_back({beyond, value, axis, side});
@@ -117,6 +128,7 @@ class EndFinder {
   const EndRule& rule_;
 };
 
+/// The ends that the edges cross. They are in a box if each lies at the side of the active box.
 DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& active) {
   DataEnds ends;
   for (const EndEdge& edge : edges) {
@@ -129,7 +141,7 @@ DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& ac
   return ends;
 }
 
-/// Outside, mirrored at the isovalue.
+/// The value mirrored at the isovalue, which is outside for one inside.
 float mirrored(float value, const InsideRule& rule) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   const double wanted = 2.0 * double(rule.isovalue) - double(value);
@@ -139,12 +151,14 @@ float mirrored(float value, const InsideRule& rule) {
   return std::nextafter(rule.isovalue, rule.scale * std::numeric_limits<float>::infinity());
 }
 
+/// A copy of the grid in which the samples beyond the ends are active and mirror those inside; a level set no longer.
 openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid, const std::vector<EndEdge>& edges,
                                               const InsideRule& rule) {
   const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
   if (copy->getGridClass() == openvdb::GRID_LEVEL_SET) copy->setGridClass(openvdb::GRID_UNKNOWN);
   auto access = copy->getAccessor();
   for (std::size_t i = 0; i < edges.size();) {
+    // A sample beyond may have several neighbours inside, where the data were clipped by a mask: it gets their mean.
     std::size_t end = i;
     double sum = 0.0;
     for (; end < edges.size() && edges[end].beyond == edges[i].beyond; ++end) sum += mirrored(edges[end].value, rule);
@@ -154,7 +168,8 @@ openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid, co
   return copy;
 }
 
-/// The inactive samples get the signs of the active ones beside them. The background must be above 0.
+/// A copy of the grid whose inactive samples have the signs of the active ones beside them.
+/// The background must be above 0.
 LevelSet with_flooded_signs(const openvdb::FloatGrid& grid) {
   const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
   openvdb::tools::signedFloodFill(copy->tree());

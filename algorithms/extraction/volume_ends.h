@@ -30,16 +30,16 @@ enum class Ends { closed, open };
 
 /// The ends that a surface runs into.
 struct DataEnds {
-  /// By axis of the grid, then below and above: whether the surface runs into the end there.
+  /// Whether the surface runs into an end of the data, by axis of the grid, then below (0) and above (1).
   std::array<std::array<bool, 2>, 3> reached{};
-  /// The same: the index coordinate of the last samples.
+  /// Index coordinate of the last samples at each end that is reached, in the order of `reached`.
   std::array<std::array<int, 2>, 3> last{};
   /// False where the ends of a level set lie in no box (it was clipped by a mask): those caps are closed, but only flat
   /// where one sample beyond has one neighbour inside, and they cannot be opened.
   bool in_a_box = true;
 
   bool any() const;
-  std::string text() const;  ///< "-x, +z"
+  std::string text() const;  ///< names of the ends, such as "-x, +z"
 };
 
 struct ClosedVolume {
@@ -74,7 +74,8 @@ struct EndedMesh {
   DataEnds ends;
 };
 
-/// close_ends(), the extractor, and flatten_ends() or open_ends(). @throws what these throw.
+/// Closes the volume's ends (close_ends()), runs the extractor, and has its mesh flattened (flatten_ends()) or opened
+/// (open_ends()) there. @throws what these throw.
 EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends);
 
 }  // namespace hermesh

@@ -3,15 +3,15 @@
 #include <limits>
 #include <unordered_map>
 
-#include "algorithms/lattice/leaf_table.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/volume_ends.h"
 
 namespace hermesh {
 namespace {
 
-/// Points that close to the plane of the last samples, in voxels, lie in it: single precision far from the origin, and
-/// slivers that nobody wants.
+/// How near to the plane of the last samples a point counts as in it, in voxels: that much single precision may be off
+/// far from the origin, and nobody wants slivers as thin.
 constexpr double kInPlane = 2e-3;
 
 /// Index coordinates of a mesh's points.
@@ -22,10 +22,11 @@ class IndexSpace {
         inverse_(placement_.linear.inverse()),
         shift_(mesh.origin - placement_.origin - placement_.offset) {}
 
+  /// Index coordinate of the point along one axis, for which a row of the inverse map is enough.
   double coordinate(const Eigen::Vector3f& point, int axis) const {
     return inverse_.row(axis).dot(point.cast<double>() + shift_) + placement_.base[axis];
   }
-  /// The point moved along the axis.
+  /// The point moved by so many voxels along the axis of the grid, which need not be one of the world.
   Eigen::Vector3f moved(const Eigen::Vector3f& point, int axis, double by) const {
     return (point.cast<double>() + by * placement_.linear.col(axis)).cast<float>();
   }
@@ -51,6 +52,7 @@ class PlaneCut {
   PlaneCut(PolygonMesh& mesh, const IndexSpace& space, int axis, int side, int last) : mesh_(mesh) {
     depth_.reserve(mesh.points.size());
     for (Eigen::Vector3f& point : mesh.points) {
+      // Counted upwards along the axis, whichever side the data lie on; depths are counted towards the data.
       const double over = space.coordinate(point, axis) - last;
       const bool in_plane = std::fabs(over) < kInPlane;
       if (in_plane) point = space.moved(point, axis, -over);
@@ -61,6 +63,7 @@ class PlaneCut {
   void cut() {
     std::vector<Triangle> triangles;
     LargeArray<Quad> quads;
+    // Polygons are written anew, and points are only added: those beyond are left to drop_unused_points().
     triangles.swap(mesh_.triangles);
     quads.swap(mesh_.quads);
     for (const Triangle& t : triangles) {
@@ -73,6 +76,7 @@ class PlaneCut {
       if (is_whole(q)) {
         mesh_.quads.push_back(q);
       } else {
+        // Cut along the diagonal between the corners 0 and 2, along which extractors mean their quads to be split.
         add_part({q[0], q[1], q[2]});
         add_part({q[0], q[2], q[3]});
       }
@@ -80,7 +84,7 @@ class PlaneCut {
   }
 
  private:
-  /// Nothing beyond, and not all in the plane.
+  /// True for a polygon of which nothing lies beyond the plane, and not all in it.
   template <class Polygon>
   bool is_whole(const Polygon& polygon) const {
     bool some = false;
@@ -92,6 +96,7 @@ class PlaneCut {
   }
 
   void add_part(const Triangle& triangle) {
+    // A triangle cut by a plane leaves a triangle or a quad, in the same order of corners.
     std::array<std::uint32_t, 4> part{};
     std::size_t size = 0;
     bool some = false;
@@ -99,6 +104,7 @@ class PlaneCut {
       const std::uint32_t here = triangle[i], next = triangle[(i + 1) % 3];
       some |= depth_[here] > 0.0;
       if (depth_[here] >= 0.0) part[size++] = here;
+      // A corner in the plane has depth 0, so that no edge is cut beside it.
       if (depth_[here] * depth_[next] < 0.0) part[size++] = point_between(here, next);
     }
     if (!some) return;
@@ -106,7 +112,8 @@ class PlaneCut {
     if (size == 4) mesh_.quads.push_back(part);
   }
 
-  /// One for both polygons of an edge.
+  /// Number of the point where the edge from a to b meets the plane, one for both polygons of the edge. It is computed
+  /// from the lower number on, so that it does not matter which polygon asks first.
   std::uint32_t point_between(std::uint32_t a, std::uint32_t b) {
     if (a > b) std::swap(a, b);
     const auto [entry, is_new] =
@@ -121,7 +128,7 @@ class PlaneCut {
   }
 
   PolygonMesh& mesh_;
-  std::vector<double> depth_;  ///< of each point below the plane, in voxels; negative beyond it
+  std::vector<double> depth_;  ///< how far each point lies below the plane, in voxels; negative beyond it
   std::unordered_map<std::uint64_t, std::uint32_t> cuts_;
 };
 
@@ -151,6 +158,7 @@ void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& end
   if (!ends.in_a_box) return;
   const IndexSpace space(mesh, closed);
   for_each_end(ends, [&](int axis, int side, int last) {
+    // A sample stands for the voxel around it, which ends half a voxel further on.
     const double plane = last + (side ? 0.5 : -0.5);
     for (Eigen::Vector3f& point : mesh.points) {
       const double at = space.coordinate(point, axis);
@@ -165,6 +173,7 @@ PolygonMesh open_ends(const PolygonMesh& mesh, const LevelSet& closed, const Dat
   PolygonMesh result = mesh;
   result.attributes.clear();
   const IndexSpace space(mesh, closed);
+  // One plane after the other: edges and corners of the box are cut by each of theirs.
   for_each_end(ends, [&](int axis, int side, int last) { PlaneCut(result, space, axis, side, last).cut(); });
   drop_unused_points(result);
   return result;

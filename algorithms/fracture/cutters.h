@@ -19,6 +19,7 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

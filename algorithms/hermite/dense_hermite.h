@@ -7,8 +7,10 @@
 #include <cstddef>
 #include <memory>
 
+#include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
 #include "algorithms/hermite/voxels.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

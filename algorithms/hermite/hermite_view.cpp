@@ -12,10 +12,9 @@ using Lower = std::array<std::int32_t, 3>;
 /// Which blocks below a leaf hold a cell with one of its crossing edges: bit |dx| + 2|dy| + 4|dz| for each direction.
 /// The cells around an edge begin at its own sample and one step down each axis that is not the edge's.
 unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
-  constexpr std::uint64_t kFirstY = 0xff, kFirstZ = 0x0101010101010101u;
   // Whether an edge along `axis` starts in the first layers along the axes whose bits are set in `down`.
   const auto touches = [&](int axis, int down) {
-    const std::uint64_t bits = (down & 2 ? kFirstY : ~std::uint64_t{0}) & (down & 4 ? kFirstZ : ~std::uint64_t{0});
+    const std::uint64_t bits = first_layers(down & 2, down & 4);
     for (int x = 0; x < (down & 1 ? 1 : 8); ++x)
       if (edges[axis][x] & bits) return true;
     return false;

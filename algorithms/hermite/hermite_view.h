@@ -11,6 +11,7 @@
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

@@ -9,6 +9,7 @@
 #include <new>
 #include <optional>
 
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"

@@ -11,6 +11,8 @@
 #include <set>
 #include <vector>
 
+#include "algorithms/core/error.h"
+
 namespace hermesh {
 namespace {
 

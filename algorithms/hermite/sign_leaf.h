@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
 
 namespace hermesh {
 
@@ -24,7 +24,6 @@ static_assert(sizeof(SignLeaf) == 104);
 
 /// Signs of the samples one step further along `axis`, at the bits of the samples themselves.
 inline BlockMask successors(const SignLeaf& leaf, int axis) {
-  constexpr std::uint64_t kLastZ = 0x8080808080808080u;
   BlockMask result;
   for (int x = 0; x < 8; ++x) {
     if (axis == 0)
@@ -34,7 +33,7 @@ inline BlockMask successors(const SignLeaf& leaf, int axis) {
     else {
       // Eight bits of a row are spread to the last bit of each byte: bit y goes to bit 8y+7.
       const std::uint64_t row = (leaf.beyond[2] >> (8 * x)) & 0xff;
-      const std::uint64_t spread = ((row * 0x8040201008040201u) & 0x8080808080808080u) >> 7;
+      const std::uint64_t spread = ((row * 0x8040201008040201u) & kLastZ) >> 7;
       result[x] = ((leaf.inside[x] >> 1) & ~kLastZ) | (__builtin_bswap64(spread) << 7);
     }
   }
@@ -59,7 +58,7 @@ inline std::uint64_t first_layer(const BlockMask& inside, int axis) {
     const std::uint64_t word = inside[x];
     // Along z the first bit of every byte is gathered: bit 8y goes to bit y.
     const std::uint64_t row =
-        axis == 1 ? word & 0xff : ((word & 0x0101010101010101u) * 0x0102040810204080u) >> 56;
+        axis == 1 ? word & kFirstY : ((word & kFirstZ) * 0x0102040810204080u) >> 56;
     result |= row << (8 * x);
   }
   return result;

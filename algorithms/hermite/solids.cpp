@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "algorithms/core/error.h"
-#include "algorithms/lattice/leaf_table.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/combine.h"
 #include "algorithms/io/grid_frame.h"

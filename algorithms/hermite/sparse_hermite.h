@@ -10,8 +10,10 @@
 #include <span>
 
 #include "algorithms/core/large_array.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/hermite/crossing.h"
 #include "algorithms/hermite/sign_leaf.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

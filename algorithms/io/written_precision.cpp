@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "algorithms/lattice/leaf_table.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/io/mesh_file_formats.h"
 

@@ -9,23 +9,26 @@
 
 namespace hermesh {
 
-/// Coordinates of a block: those of its first voxel divided by 8. Of a tile: those of its first block divided
-/// by 8.
+/// Coordinates of a block, which are those of its first voxel divided by 8; or of a tile of 8³ blocks, which are those
+/// of its first block divided by 8.
 using BlockAt = std::array<std::int32_t, 3>;
 
+/// Coordinates of the tile that holds the block.
 inline BlockAt tile_of(const BlockAt& block) { return {block[0] >> 3, block[1] >> 3, block[2] >> 3}; }
 /// Word (x) and bit (y, z) of a block within its tile, or of a voxel within its block, as one number.
 inline unsigned place_in_tile(const BlockAt& block) {
   return unsigned(block[0] & 7) << 6 | unsigned(block[1] & 7) << 3 | unsigned(block[2] & 7);
 }
 
-/// Open addressing from tile to number.
+/// A hash table with open addressing that numbers tiles from 0 on, in the order in which they are inserted.
 class TileNumbers {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   /// Number of the tile, which gets the next one if it has none.
   std::uint32_t insert(const BlockAt& tile);
+  /// Number of the tile, or kNone.
   std::uint32_t find(const BlockAt& tile) const;
+  /// Coordinates of all tiles, by number.
   const std::vector<BlockAt>& tiles() const { return tiles_; }
 
  private:
@@ -34,7 +37,8 @@ class TileNumbers {
   std::vector<std::uint32_t> slots_;
 };
 
-/// Collects blocks in any order; one to a thread or to a piece of the work.
+/// Collects blocks in any order. A set is not safe to share between threads: each thread or piece of work has its
+/// own, and BlockTable joins them.
 class BlockSet {
  public:
   /// Adds a block. The result, tile · 512 + place in it, stands for the block within this set.
@@ -46,7 +50,7 @@ class BlockSet {
     return last_ << 9 | place;
   }
 
-  /// The block that insert() gave `code` for.
+  /// Coordinates of the block for which insert() returned `code`.
   BlockAt block(std::uint32_t code) const {
     const BlockAt& tile = numbers_.tiles()[code >> 9];
     return {tile[0] * 8 + std::int32_t(code >> 6 & 7), tile[1] * 8 + std::int32_t(code >> 3 & 7),
@@ -85,16 +89,18 @@ class BlockTable {
     const std::uint32_t tile = numbers_.find(tile_of(block));
     return tile == kNone ? kNone : number(tiles_[tile], place_in_tile(block));
   }
+  /// Number of the block at a place in the tile (place_in_tile()), or kNone.
   static std::uint32_t number(const Tile& tile, unsigned place) {
     const std::uint64_t word = tile.mask[place >> 6], bit = std::uint64_t(1) << (place & 63);
     if (!(word & bit)) return kNone;
     return tile.first[place >> 6] + std::uint32_t(__builtin_popcountll(word & (bit - 1)));
   }
-  /// Where each block is, by number.
+  /// Coordinates of all blocks, by number.
   std::vector<BlockAt> blocks() const;
-  /// For each tile of one of the sets, its number here.
+  /// The number in this table of each tile of `part`, by the tile's number in `part`, which is one of the sets that the
+  /// table was made from.
   std::vector<std::uint32_t> translation(const BlockSet& part) const;
-  /// Number of the block that insert() gave `code` for.
+  /// Number of the block for which insert() returned `code`; `translation` is that of its set.
   std::uint32_t number(const std::vector<std::uint32_t>& translation, std::uint32_t code) const {
     return number(tiles_[translation[code >> 9]], code & 511);
   }
@@ -105,7 +111,8 @@ class BlockTable {
   std::size_t size_ = 0;
 };
 
-/// Looks up blocks near each other.
+/// Finds blocks of a table as BlockTable::find() does, faster where one block lies in the tile of
+/// the one before. One to a thread.
 class BlockFinder {
  public:
   explicit BlockFinder(const BlockTable& table) : table_(table) {}

@@ -29,18 +29,19 @@ constexpr std::array<float, 512> make_no_samples() {
 }
 constexpr std::array<float, 512> kNoSamples = make_no_samples();
 
-/// To wait for one leaf after the other, and for the samples that it points to, would take longer than all the rest.
+/// How many leaves, and how many leaves' samples, are prefetched. To wait for one leaf after the other, and for the
+/// samples that it points to, would take longer than all the rest.
 constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
 
-/// How many pairs of blocks may change their sign where neither holds samples. A few bytes in a file, as a damaged one
+/// Most pairs of blocks that may change their sign where neither holds samples. A few bytes in a file, as a damaged one
 /// has them, can stand for a surface of any size; extractors hold some 15 kB for the 64 edges of a pair (leaves, their
 /// copies, a crossing and a polygon each), so that this is a gibibyte, on any machine. Level sets have none, and a
 /// cube that is one tile reaches it at a width of 864 voxels.
 constexpr double kMostTilePairs = 70e3;
 
-/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which there is a tile
-/// whose value `wanted` takes: the first block within, the first beyond, and the width in samples. Squares are as large as
-/// the tiles beyond.
+/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which there is a
+/// tile whose value `wanted` takes: the first block within, the first beyond, and the width in samples. Squares are
+/// as large as the tiles beyond.
 template <class Wanted, class F>
 void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::CoordBBox& tile, Wanted&& wanted, F&& f) {
   using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
@@ -50,6 +51,8 @@ void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::Coor
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto square = [&](auto&& self, Coord own, Coord there, int width) -> void {
+      // A square is divided where a node of its own width lies beyond, and left out where in the end a leaf does. A
+      // tile beyond that is wider than the square counts with the square's width.
       const bool divided = width > int(Node::DIM) ? access.probeConstNode<LargeNode>(there) != nullptr
                            : width > 8            ? access.probeConstNode<Node>(there) != nullptr
                                                   : access.probeConstLeaf(there) != nullptr;
@@ -104,6 +107,8 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
   it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
     if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
+  // Counted first, before anything is listed: a damaged file is refused before it takes memory. Only the side that is
+  // unlike the background is walked over, so that each pair is met once.
   std::vector<double> pairs(tiles.size());
   const auto bordering = [&](std::size_t i, auto&& f) {
     for_each_bordering_tile(tree, tiles[i], [&](float value) { return is_inside(value) == background; }, f);
@@ -128,6 +133,7 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
           }
     });
   });
+  // Joined in the order of the tiles, and so the same for any number of threads.
   std::vector<Coord> all;
   for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
   return all;
@@ -151,9 +157,12 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
     index.emplace(sources[i]->origin(), static_cast<std::int32_t>(i));
     counts[i] = sources[i]->getChildMask().countOn();
   }
+  // The scan turns counts into the number of each node's first leaf, so that nodes number their leaves side by side.
   const std::uint64_t total = exclusive_scan(counts, "leaves");
   places_.resize(total);
   leaves_.resize(total);
+  // The two numbers that stand for "no leaf" are negative; with the array moved on by two,
+  // values() takes them without a branch.
   values_.resize(total + kUniforms);
   std::fill_n(values_.begin(), kUniforms, kNoSamples.data());
   around_.resize(total);
@@ -164,6 +173,7 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
     });
   };
+  // A node writes its own entry and those of its own leaves alone.
   each_node([&](std::size_t i) {
     Node& node = nodes_[i];
     node.source = sources[i];
@@ -186,18 +196,23 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       find_values(leaf);
     }
   });
+  // A second pass, because what lies around a node is copied from its neighbours' numbers, which must all be there;
+  // each node writes its own rim, which no other one reads.
   each_node([&](std::size_t i) { number_around(i); });
   nodes_in_order_.resize(sources.size());
   std::iota(nodes_in_order_.begin(), nodes_in_order_.end(), 0u);
   std::ranges::sort(nodes_in_order_, {}, [&](std::uint32_t node) { return nodes_[node].lower; });
 }
 
-/// Which tiles are inside, and what is no tile.
+/// Finds which slots of the node hold children, which tiles are inside, and the tile inside
+/// that is nearest to the isovalue.
 void LeafPlaces::find_tiles(Node& node) const {
   static_assert(TreeNode::NUM_VALUES == 64 * kWords);
   for (int word = 0; word < kWords; ++word) {
     node.child[word] = node.source->getChildMask().getWord<std::uint64_t>(word);
     const auto* const table = node.source->getTable() + 64 * word;
+    // All slots are read, without branches. One with a child holds a pointer instead of a value, and what the rule
+    // makes of its bits is masked away.
     std::uint64_t inside = 0;
     for (int bit = 0; bit < 64; ++bit) inside |= static_cast<std::uint64_t>(rule_(table[bit].getValue())) << bit;
     node.tile_inside[word] = inside & ~node.child[word];
@@ -206,9 +221,11 @@ void LeafPlaces::find_tiles(Node& node) const {
   }
 }
 
-/// Numbers the leaves from `next` on.
+/// Numbers the node's leaves from `next` on in the order of its slots, which is that of
+/// OpenVDB's own walk over the tree.
 void LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   Numbers& numbers = numbers_[index];
+  // A row is 16 slots along z, a quarter of a word of the masks.
   for (int row = 0; row < 256; ++row) {
     if (row % 16 == 0) node.first_at[row / 16] = next;
     std::int32_t* to = &numbers[number_slot(row >> 4, row & 15, 0)];
@@ -226,12 +243,13 @@ void LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   node.first_at[16] = next;
 }
 
-/// The numbers one step around the node, from those in its neighbours.
+/// Fills the rim of the node's numbers, one step around it, from those in its neighbours.
 void LeafPlaces::number_around(std::size_t node) {
   for (int slot = 0; slot < 27; ++slot) {
     if (slot == neighbour_slot(0, 0, 0)) continue;
     const int step[3] = {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1};
     const std::int32_t there = nodes_[node].neighbours[slot];
+    // The part of the rim in that direction: a face of 16² places, an edge of 16 or a corner.
     int first[3], end[3];
     for (int axis = 0; axis < 3; ++axis) {
       first[axis] = step[axis] < 0 ? -1 : step[axis] > 0 ? 16 : 0;
@@ -244,6 +262,7 @@ void LeafPlaces::number_around(std::size_t node) {
         if (there < 0) {
           std::fill_n(to, count, there);
         } else {
+          // Coordinates −1 and 16 become 15 and 0 of the neighbour.
           const Numbers& from = numbers_[static_cast<std::size_t>(there)];
           std::copy_n(&from[number_slot(x & 15, y & 15, first[2] & 15)], count, to);
         }
@@ -253,6 +272,7 @@ void LeafPlaces::number_around(std::size_t node) {
 
 LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& context)
     : LeafPlaces(level_set, isovalue) {
+  // Samples are found while the signs are read, one wait for both.
   number_leaves(context, false);
   read_signs(context);
   if (is_complete(context)) return;
@@ -273,12 +293,15 @@ void throw_not_finite() {
 
 void LeafTable::read_signs(RunContext& context) {
   inside_.resize(size());
+  // Each leaf's signs are written by one thread; the flag is only ever raised, so that no order matters.
   std::atomic<bool> not_finite{false};
   const SignReader& reader = chosen_sign_reader();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
     context.check();
     bool finite = true;
     constexpr std::size_t kLine = 16;
+    // Two steps of one chain: the leaf must have come before its pointer to the samples can be
+    // read, and these be asked for.
     const auto find = [&](std::size_t i) {
       find_values(i);
       for (std::size_t sample = 0; sample < 512; sample += kLine) __builtin_prefetch(values(i) + sample);
@@ -306,6 +329,7 @@ bool LeafTable::has_inactive_inside_nearer_than(float distance) const {
       tbb::blocked_range<std::size_t>(0, size(), 64), false,
       [&](const auto& range, bool found) {
         for (std::size_t leaf = range.begin(); leaf < range.end() && !found; ++leaf) {
+          // Inside, signed values are negative: nearer than `distance` is greater than −distance.
           const BlockMask mask = active(leaf);
           const float* samples = values(leaf);
           for (int word = 0; word < 8; ++word)
@@ -327,6 +351,7 @@ std::vector<LeafPlaces::Slab> LeafPlaces::slabs() const {
   std::vector<Slab> result;
   const std::span<const std::uint32_t> nodes = nodes_in_order_;
   const auto x_of = [&](std::size_t i) { return nodes_[nodes[i]].lower.x(); };
+  // Sorted by their coordinates, nodes of one x stand together; each such group makes 16 layers of leaves.
   for (std::size_t first = 0, end; first < nodes.size(); first = end) {
     for (end = first + 1; end < nodes.size() && x_of(end) == x_of(first); ++end) continue;
     for (int x = 0; x < 16; ++x) result.push_back({nodes.subspan(first, end - first), x});
@@ -362,6 +387,8 @@ bool LeafPlaces::tiles_meet(const Node& node) const {
       met |= meet(own, {below.tile >> 15, below.inside >> 15}) & 1;
       met |= meet(own, y < 15 ? row_of(node, x, y + 1) : row_at(x, 16, 0));
       met |= meet(own, x < 15 ? row_of(node, x + 1, y) : row_at(16, y, 0));
+      // Pairs are met from below, but for those at the node's lower sides: what lies beyond may be a tile as large as
+      // the node, which compares nothing itself.
       if (y == 0) met |= meet(own, row_at(x, -1, 0));
       if (x == 0) met |= meet(own, row_at(-1, y, 0));
     }
@@ -370,13 +397,14 @@ bool LeafPlaces::tiles_meet(const Node& node) const {
 
 /// Whether all signs of the first layer along the axis are `inside`.
 bool LeafPlaces::is_first_layer(const BlockMask& signs, int axis, bool inside) {
-  constexpr std::uint64_t kLayer[3] = {~std::uint64_t{0}, 0xff, 0x0101010101010101u};
+  const std::uint64_t layer = first_layers(axis == 1, axis == 2);
   for (int x = 0; x < (axis == 0 ? 1 : 8); ++x)
-    if ((signs[x] & kLayer[axis]) != (inside ? kLayer[axis] : 0)) return false;
+    if ((signs[x] & layer) != (inside ? layer : 0)) return false;
   return true;
 }
 
 bool LeafPlaces::tiles_of_both_signs_meet(RunContext& context) const {
+  // Nodes with smaller tiles first, which is a few operations on bits for each.
   std::atomic<bool> meet{false};
   parallel_blocks(nodes_.size(), context, [&](std::size_t i) {
     if (!meet && tiles_meet(nodes_[i])) meet = true;
@@ -392,6 +420,7 @@ bool LeafPlaces::tiles_of_both_signs_meet(RunContext& context) const {
 
 /// True if every edge with a change of sign starts in a leaf.
 bool LeafTable::is_complete(RunContext& context) const {
+  // Edges that end in a leaf and start in none, then edges between two tiles; all others start in a leaf by themselves.
   std::atomic<bool> complete{true};
   parallel_blocks(size(), context, [&](std::size_t i) {
     for (int axis = 0; axis < 3; ++axis)
@@ -456,11 +485,33 @@ std::vector<Coord> LeafTable::missing_leaves(RunContext& context) const {
   for (std::size_t i = 0; i < size(); ++i)
     for (int axis = 0; axis < 3; ++axis) {
       if (!differs_from_tile_below(i, inside_[i], axis)) continue;
+      // The leaf below owns the edges that lead into this one.
       Coord there = lower(i);
       there[axis] -= 8;
       missing.push_back(there);
     }
   return missing;
+}
+
+std::array<BlockMask, 3> LeafTable::crossing_edges(std::size_t leaf) const {
+  std::array<BlockMask, 3> edges;
+  for (int axis = 0; axis < 3; ++axis) {
+    const BlockMask above = shifted_mask(axis == 0, axis == 1, axis == 2, [&](int x, int y, int z) -> const BlockMask& {
+      return x + y + z == 0 ? inside(leaf) : signs(neighbour(leaf, x, y, z));
+    });
+    for (std::size_t x = 0; x < 8; ++x) edges[std::size_t(axis)][x] = inside(leaf)[x] ^ above[x];
+  }
+  return edges;
+}
+
+void LeafTable::throw_no_leaf(std::size_t leaf, int x, int y, int z) const {
+  const auto at = [](int i, int j, int k) {
+    return "(" + std::to_string(i) + ", " + std::to_string(j) + ", " + std::to_string(k) + ")";
+  };
+  const Coord first = lower(leaf);
+  throw Error("an extractor looked up the sample " + at(x, y, z) + " of the leaf at " +
+              at(first.x(), first.y(), first.z()) +
+              ", where the volume has no leaf; LeafPlaces::neighbour() tells what is outside or inside throughout");
 }
 
 }  // namespace hermesh

@@ -11,16 +11,16 @@
 #include <span>
 #include <vector>
 
-#include "algorithms/core/openvdb_trees.h"
-#include "algorithms/lattice/blocks.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/level_set.h"
-#include "algorithms/lattice/read_signs.h"
+#include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/lattice/block_mask.h"
+#include "algorithms/lattice/read_signs.h"
 
 namespace hermesh {
 
-/// For a sample of a volume. @throws Error
+/// Refuses a volume of which a sample is not finite. @throws Error always
 [[noreturn]] void throw_not_finite();
 
 /// Where the leaves of a volume are, and where their samples; no sample is read. Leaves are numbered in the
@@ -36,10 +36,12 @@ class LeafPlaces {
   const InsideRule& rule() const { return rule_; }
   const openvdb::FloatTree& tree() const { return *tree_; }
 
-  /// Of a leaf, or for what neighbour() gives: where there is no leaf all samples are infinite.
+  /// The 512 samples of a leaf, in the order of BlockMask. `leaf` may also be what neighbour() gives where there is no
+  /// leaf: all samples are then infinite.
   const float* values(std::int64_t leaf) const { return values_[static_cast<std::size_t>(leaf + kUniforms)]; }
-  /// Samples of the band, at the bits of BlockMask.
+  /// Samples that are active in the tree: in a level set, those of the band.
   BlockMask active(std::size_t leaf) const;
+  /// Index coordinates of the leaf's first sample.
   openvdb::Coord lower(std::size_t leaf) const {
     // The leaf itself lies where no cache has it.
     const Place place = places_[leaf];
@@ -47,23 +49,24 @@ class LeafPlaces {
     return nodes_[place.node].lower.offsetBy(at(8), at(4), at(0));
   }
 
-  /// A leaf's number, or kUniformOutside or kUniformInside where there is none; each offset −1, 0 or 1.
+  /// Number of the leaf at an offset in leaves, each −1, 0 or 1, or kUniformOutside or
+  /// kUniformInside where there is none.
   std::int32_t neighbour(std::size_t leaf, int dx, int dy, int dz) const {
     return around_[leaf][kStepX * dx + kStepY * dy + dz];
   }
-  /// Asks for the numbers of the neighbours above along x and y, which may lie where no cache has them.
+  /// Prefetches the numbers of the neighbours above along x and y, which may lie where no cache has them.
   [[gnu::always_inline]] void ask_for_neighbours(std::size_t leaf) const {
     __builtin_prefetch(around_[leaf] + kStepX);
     __builtin_prefetch(around_[leaf] + kStepY);
   }
-  /// The leaf itself and its seven neighbours one step up (`side` 1) or down (−1) along each axis or not: at
-  /// |dx| + 2|dy| + 4|dz|.
+  /// Numbers of the leaf itself and of its seven neighbours one step up (`side` 1) or down (−1) along each axis or not,
+  /// as neighbour() gives them: entry |dx| + 2|dy| + 4|dz|.
   std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const {
     std::array<std::int32_t, 8> result;
     for (int i = 0; i < 8; ++i) result[i] = neighbour(leaf, side * (i & 1), side * (i >> 1 & 1), side * (i >> 2));
     return result;
   }
-  /// All neighbours, by neighbour_slot(), and the leaf itself at 13.
+  /// Numbers of all neighbours, by neighbour_slot(), with the leaf itself at 13.
   std::array<std::int32_t, 27> surroundings(std::size_t leaf) const {
     std::array<std::int32_t, 27> result;
     for (int dx = -1; dx <= 1; ++dx)
@@ -73,10 +76,10 @@ class LeafPlaces {
   }
   /// Leaves of the same x.
   struct Slab {
-    std::span<const std::uint32_t> nodes;  ///< in ascending order of their coordinates
-    int x;                                 ///< within the nodes
+    std::span<const std::uint32_t> nodes;  ///< numbers of nodes, in ascending order of their coordinates
+    int x;                                 ///< which layer of leaves within the nodes, 0 to 15
   };
-  /// All leaves, in ascending order of x; they last as long as this does.
+  /// Slabs that together hold all leaves, in ascending order of x. They refer to this object.
   std::vector<Slab> slabs() const;
   /// Calls f(leaf) for every leaf of the slab, in ascending order of (y, z).
   template <class F>
@@ -89,20 +92,22 @@ class LeafPlaces {
 
   /// Whether a tile of one sign meets a tile of the other, so that edges change sign and start in no leaf.
   bool tiles_of_both_signs_meet(RunContext& context) const;
-  /// Whether an edge along the axis that ends in the leaf, of which `inside` are the signs, changes sign and
-  /// starts in no leaf.
+  /// Whether an edge along the axis that ends in the leaf changes sign and starts in no leaf;
+  /// `inside` are the leaf's signs.
   bool differs_from_tile_below(std::size_t leaf, const BlockMask& inside, int axis) const {
     const std::int32_t there = neighbour(leaf, -(axis == 0), -(axis == 1), -(axis == 2));
     return there < 0 && !is_first_layer(inside, axis, there == kUniformInside);
   }
-  /// The signed value of that tile inside that is nearest to the isovalue, of those as small as a leaf.
+  /// The signed value (InsideRule) nearest to the isovalue among inside tiles that are as small as a leaf;
+  /// nothing where there is no such tile.
   std::optional<float> nearest_tile_inside() const;
 
  protected:
-  /// Without leaves: they must be numbered, and their samples found.
+  /// Makes an object without leaves, for a class that numbers them itself and finds their samples.
   LeafPlaces(const LevelSet& level_set, double isovalue);
+  /// Numbers the leaves of tree_; with `with_values` their samples are found, too, so that values() holds.
   void number_leaves(RunContext& context, bool with_values);
-  /// The leaf lies where no cache has it: ask_for() it long before.
+  /// Makes values() hold for the leaf, which lies where no cache has it: ask_for() it long before.
   void find_values(std::size_t leaf) { values_[leaf + kUniforms] = leaves_[leaf]->buffer().data(); }
   [[gnu::always_inline]] void ask_for(std::size_t leaf) const { __builtin_prefetch(leaves_[leaf]); }
 
@@ -114,11 +119,12 @@ class LeafPlaces {
   using Leaf = openvdb::FloatTree::LeafNodeType;
   using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
   using TreeNode = LargeNode::ChildNodeType;
-  static constexpr int kWords = 64;  ///< of a mask of 16³ bits
+  static constexpr int kWords = 64;  ///< words of a mask of 16³ bits
   using NodeMask = std::array<std::uint64_t, kWords>;
-  /// What lies in a node and one step around it is found at once, with neither a search nor a count of bits:
-  /// 18³ leaves' numbers or kUniform…, less than the node's own table takes. (From masks and counts of bits, which the
-  /// caches hold, a conversion to Hermite data takes up to 7 % longer with two cores: there are dozens of lookups a leaf.)
+  /// The numbers (or kUniform…) of the 18³ places for leaves in a node and one step around it. What lies there is found
+  /// at once, with neither a search nor a count of bits, and the array is less than the node's own table takes. (From
+  /// masks and counts of bits, which the caches hold, a conversion to Hermite data takes up to 7 % longer with two
+  /// cores: there are dozens of lookups a leaf.)
   static constexpr int kStepY = 18, kStepX = 18 * kStepY;
   using Numbers = std::array<std::int32_t, 18 * kStepX>;
   static constexpr int number_slot(int x, int y, int z) { return kStepX * (x + 1) + kStepY * (y + 1) + z + 1; }
@@ -128,7 +134,7 @@ class LeafPlaces {
     const TreeNode* source = nullptr;
     NodeMask child{}, tile_inside{};
     std::array<std::uint32_t, 17> first_at{};   ///< number of the first leaf at every x, and behind the last
-    std::array<std::int32_t, 27> neighbours{};  ///< by neighbour_slot(); a node's number or kUniform…
+    std::array<std::int32_t, 27> neighbours{};  ///< a node's number or kUniform…, by neighbour_slot()
     float nearest_inside = kNoTile;             ///< signed value of the inside tile that is nearest to the isovalue
   };
   struct Place {
@@ -147,11 +153,11 @@ class LeafPlaces {
   bool meets_background(const openvdb::CoordBBox& tile) const;
 
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> nodes_in_order_;  ///< of their coordinates
-  LargeArray<Numbers> numbers_;                ///< by node
+  std::vector<std::uint32_t> nodes_in_order_;  ///< numbers of nodes in the order of their coordinates
+  LargeArray<Numbers> numbers_;                ///< one entry a node
   LargeArray<Place> places_;
   LargeArray<const Leaf*> leaves_;
-  LargeArray<const float*> values_;         ///< from leaf −kUniforms on
+  LargeArray<const float*> values_;         ///< samples of leaves; the first entry is for leaf −kUniforms
   LargeArray<const std::int32_t*> around_;  ///< a leaf's own place among its node's numbers
 };
 
@@ -176,7 +182,7 @@ void LeafPlaces::for_each_leaf(const Slab& slab, F&& f) const {
   }
 }
 
-/// With their signs as bits.
+/// The leaves of a volume with the signs of their samples as bits.
 class LeafTable : public LeafPlaces {
  public:
   /// Reads every sample once. Where a tile of one sign meets a tile of the other, or a leaf's first layer,
@@ -184,17 +190,33 @@ class LeafTable : public LeafPlaces {
   /// @throws Error if a sample, the isovalue or the background is not finite.
   LeafTable(const LevelSet& level_set, double isovalue, RunContext& context);
 
+  /// Which samples of the leaf are inside.
   const BlockMask& inside(std::size_t leaf) const { return inside_[leaf]; }
-  /// inside() for what neighbour() gives.
+  /// Which samples are inside of the leaf, or of what neighbour() gives where there is none.
   const BlockMask& signs(std::int32_t leaf) const {
     return leaf >= 0 ? inside_[static_cast<std::size_t>(leaf)] : leaf == kUniformInside ? kAllInside : kAllOutside;
+  }
+  /// The edges along each axis that start in the leaf and change sign, at the bits of their first samples.
+  std::array<BlockMask, 3> crossing_edges(std::size_t leaf) const;
+  struct Location {
+    std::int32_t leaf;
+    int sample;
+  };
+  /// Leaf and sample for coordinates from −8 to 15, relative to the first sample of a leaf, where there is a leaf: at
+  /// the start of every edge with a change of sign. For any other sample neighbour() tells whether there is a leaf.
+  /// @throws Error that names the sample if there is none, or if a coordinate is beyond.
+  Location locate(std::size_t leaf, int x, int y, int z) const {
+    constexpr auto is_beyond = [](int i) { return static_cast<unsigned>(i + 8) > 23u; };
+    if (is_beyond(x) || is_beyond(y) || is_beyond(z)) throw_no_leaf(leaf, x, y, z);
+    const std::int32_t there = neighbour(leaf, x >> 3, y >> 3, z >> 3);
+    if (there < 0) throw_no_leaf(leaf, x, y, z);
+    return {there, sample_index(x & 7, y & 7, z & 7)};
   }
   /// Whether a sample that is inside and not active is less than `distance` from the isovalue.
   bool has_inactive_inside_nearer_than(float distance) const;
 
  private:
-  static constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
-
+  [[noreturn]] void throw_no_leaf(std::size_t leaf, int x, int y, int z) const;
   void read_signs(RunContext& context);
   bool is_complete(RunContext& context) const;
   std::vector<openvdb::Coord> missing_leaves(RunContext& context) const;
@@ -202,19 +224,12 @@ class LeafTable : public LeafPlaces {
   LargeArray<BlockMask> inside_;
 };
 
-/// As FloatTree::evalActiveVoxelBoundingBox(), which reads where a leaf is from the leaf itself, and so waits for memory as
-/// often as there are leaves. Most lie within the box of those before them, and then the node above tells.
-openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
-
-/// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
-/// @throws Error for a grid with perspective.
-IndexToWorld placement_of(const openvdb::FloatGrid& grid);
-
-/// The rule for a grid. @throws Error if the isovalue or the background is not finite.
+/// The rule which samples of a grid are inside, with the isovalue rounded to single precision such that no
+/// sample changes its side. @throws Error if the isovalue or the background is not finite.
 InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue);
 
-/// Tiles, as origins of 8³ blocks, that meet a sample of the other sign in another tile. @throws Error for more
-/// than 70,000 pairs of blocks: a surface of 4.5 million faces without samples.
+/// First samples of the 8³ blocks of tiles that meet a sample of the other sign in another tile, some of them more than
+/// once. @throws Error for more than 70,000 pairs of blocks: a surface of 4.5 million faces without samples.
 std::vector<openvdb::Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
                                                 RunContext& context);
 

@@ -179,6 +179,28 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
   unsetenv("HERMESH_SIMD");
 }
 
+TEST_F(LeafTableTest, LookingUpWhereThereIsNoLeafIsRefusedInASentence) {
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->tree().setValue(Coord(3, 3, 3), -1.0f);
+  const LeafTable leaves = table(grid);
+  ASSERT_EQ(leaves.size(), 1u);
+  EXPECT_EQ(leaves.locate(0, 3, 4, 5).leaf, 0);
+  EXPECT_EQ(leaves.locate(0, 3, 4, 5).sample, sample_index(3, 4, 5));
+  const auto sentence = [&](int x, int y, int z) -> std::string {
+    try {
+      leaves.locate(0, x, y, z);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // A neighbour that is outside throughout, and what is beyond all neighbours.
+  EXPECT_NE(sentence(8, 0, 0).find("sample (8, 0, 0) of the leaf at (0, 0, 0)"), std::string::npos);
+  EXPECT_NE(sentence(0, -1, 7).find("no leaf"), std::string::npos);
+  EXPECT_NE(sentence(16, 0, 0).find("no leaf"), std::string::npos);
+  EXPECT_NE(sentence(0, 0, -9).find("no leaf"), std::string::npos);
+}
+
 TEST(SignReader, RowsAreThoseOfTheRuleAtAnyLevelOfVectorCode) {
   std::mt19937 random(7);
   std::array<float, 512> values;
@@ -204,35 +226,6 @@ TEST_F(LeafTableTest, ValuesThatAreNotFiniteAreRefused) {
     EXPECT_THROW(table(grid), Error);
   }
   EXPECT_THROW(table(openvdb::FloatGrid::create(1.0f), std::nan("")), Error);
-}
-
-TEST(ActiveBox, IsThatOfVoxelsAndTilesAtAllLevels) {
-  std::mt19937 random(17);
-  const auto at_most = [&](int n) { return std::uniform_int_distribution<int>(-n, n)(random); };
-  EXPECT_TRUE(active_box(openvdb::FloatTree(1.0f)).empty());
-  for (int round = 0; round < 200; ++round) {
-    openvdb::FloatTree tree(1.0f);
-    for (int i = round % 12; i > 0; --i) {
-      const Coord place(at_most(5000), at_most(300), at_most(40));
-      switch (random() % 8) {
-        case 0:
-          tree.addTile(1 + random() % 3, place, 0.5f, random() % 2 == 0);
-          break;
-        case 1:
-          tree.touchLeaf(place);  // without an active voxel
-          break;
-        default:
-          for (int voxel = 0; voxel < 4; ++voxel) tree.setValue(place.offsetBy(at_most(9), at_most(9), at_most(9)), 0.5f);
-      }
-    }
-    openvdb::CoordBBox expected;
-    tree.evalActiveVoxelBoundingBox(expected);
-    const openvdb::CoordBBox box = active_box(tree);
-    EXPECT_EQ(box.empty(), expected.empty()) << round;
-    if (!expected.empty()) {
-      EXPECT_EQ(box, expected) << round;
-    }
-  }
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ constexpr double kLeafBytes = 2152.0, kMiddleBytes = 33.8e3, kUpperBytes = 270e3
 constexpr double kPeakOverGrid = 3.5;
 /// OpenVDB's scale maps refuse a determinant below 3e-15, which is a voxel of 1.4423e-5.
 constexpr double kSmallestVoxel = 1.4423e-5;
+/// Largest voxel coordinate that is taken, half of what an index of 32 bits holds.
 constexpr double kLargestIndex = 1 << 30;
 
 std::string format(const char* pattern, double value) {
@@ -53,11 +54,12 @@ Bounds joined(Bounds a, const Bounds& b) {
 
 /// What one pass over the polygons tells.
 struct Measured {
-  Bounds box;       ///< of the corners, relative to the mesh's origin; not finite when a corner is not
-  double area = 0;  ///< world units; no number when a corner is none
+  Bounds box;       ///< bounds of the corners, relative to the mesh's origin; not finite if a corner is not
+  double area = 0;  ///< square world units; no number if a corner is none
 };
 
-/// The corners of one polygon after the other, in single precision, as they come.
+/// Gathers bounds and area of one triangle after the other. Corners stay in single precision for the bounds, which are
+/// exact in it; the area is summed in double precision.
 class Measure {
  public:
   void add(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
@@ -80,6 +82,7 @@ class Measure {
 
 Measured measure(const PolygonMesh& mesh) {
   const std::size_t triangles = mesh.triangles.size(), n = triangles + mesh.quads.size();
+  // A task writes its own entry of `parts` alone; they are joined in order below.
   std::vector<Measured> parts((n + kChunk - 1) / kChunk);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
     const std::size_t begin = part * kChunk, end = std::min(n, begin + kChunk);
@@ -90,6 +93,7 @@ Measured measure(const PolygonMesh& mesh) {
     }
     for (std::size_t i = std::max(begin, triangles); i < end; ++i) {
       const Quad& q = mesh.quads[i - triangles];
+      // A quad counts as two triangles; which diagonal cuts it makes no difference to an estimate.
       measure.add(mesh.points[q[0]], mesh.points[q[1]], mesh.points[q[2]]);
       measure.add(mesh.points[q[0]], mesh.points[q[2]], mesh.points[q[3]]);
     }
@@ -112,12 +116,14 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
     for (std::size_t i = part * kChunk; i < std::min(mesh.points.size(), (part + 1) * kChunk); ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
+        // Held within the range of integers: estimate_band() does not check how far out a mesh lies.
         block[std::size_t(axis)] = static_cast<std::int32_t>(
             std::floor(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex)));
       parts[part].insert(block);
     }
   });
   const BlockTable table(parts);
+  // 16 blocks along an axis are 128 voxels, 512 are 4096: the widths of OpenVDB's two levels of nodes.
   std::vector<BlockSet> coarse(2);
   for (const BlockAt& block : table.blocks()) {
     coarse[0].insert({block[0] >> 4, block[1] >> 4, block[2] >> 4});
@@ -129,11 +135,12 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
 
 /// What the estimates of blocks of any size share.
 struct Extent {
-  double surface;         ///< voxel faces
-  double thickness;       ///< of the band, voxels
-  Eigen::Vector3d sides;  ///< of the box around the band, voxels
+  double surface;         ///< area in faces of voxels
+  double thickness;       ///< thickness of the band, voxels
+  Eigen::Vector3d sides;  ///< sides of the box around the band, voxels
 };
 
+/// Numbers of blocks of one size, as estimates.
 struct Blocks {
   double along_surface, scattered, all;
 };
@@ -143,6 +150,7 @@ struct Blocks {
 /// small scattered pieces, each of which costs as much as a point's ball. The box is the upper limit.
 Blocks count_blocks(double with_points, const Extent& extent, double edge) {
   const double volume = edge * edge * edge;
+  // Blocks with points that the area explains: those that a layer without thickness meets (t = 0).
   const double bare = extent.surface * 1.5 * edge / volume;
   Blocks blocks;
   blocks.along_surface = extent.surface * (1.5 * edge + extent.thickness) / volume;
@@ -222,6 +230,7 @@ void check_coordinates(const PolygonMesh& mesh, const Bounds& box, double voxel_
 
 BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size,
                       double exterior_band, double interior_band) {
+  // The band lies around the surface on both sides, and one more sample where its ends fall between samples.
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
   const Extent extent{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
                       measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
@@ -230,6 +239,8 @@ BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double 
   const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
   const Blocks leaves = count_blocks(small, extent, 8.0);
   estimate.leaves = leaves.all;
+  // The least of three counts: the filled box, all samples of the leaves, and the band's own
+  // volume with scattered pieces.
   // A piece far below a voxel is a ball of the exterior band's radius.
   const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
   estimate.active_voxels = std::min(
@@ -249,8 +260,10 @@ BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double ex
 }
 
 std::optional<std::uint64_t> available_memory() {
+  // The machine's own figure is in units of 1024 bytes.
   std::optional<std::uint64_t> available = field_of("/proc/meminfo", "MemAvailable");
   if (available) *available *= 1024;
+  // Control groups of version 2, then of version 1, then this process's limits: the least of all that are set holds.
   const std::string root = "/sys/fs/cgroup/";
   for (const auto& left :
        {left_in_group(root + "memory.max", root + "memory.current", root + "memory.stat", "inactive_file"),
@@ -270,6 +283,7 @@ void check_fits_memory(double bytes, const std::string& what) {
 
 void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                              double interior_band) {
+  // In this order each check can rely on those before: the estimate divides by the voxel size and takes finite corners.
   check_arguments(voxel_size, exterior_band, interior_band);
   if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
   const Measured measured = measure(mesh);

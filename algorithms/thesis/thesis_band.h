@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/thesis/thesis_voxelizer.h"

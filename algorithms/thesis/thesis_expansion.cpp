@@ -15,8 +15,8 @@ struct Limits {
 bool reaches(const BlockMask& mask, int slot) {
   constexpr std::uint64_t kAll = ~std::uint64_t(0);
   // Rows are y, columns z, in a word of one x: first, all, or last.
-  constexpr std::uint64_t kRows[3] = {0xff, kAll, kAll - (kAll >> 8)};
-  constexpr std::uint64_t kColumns[3] = {0x0101010101010101u, kAll, 0x8080808080808080u};
+  constexpr std::uint64_t kRows[3] = {kFirstY, kAll, kLastY};
+  constexpr std::uint64_t kColumns[3] = {kFirstZ, kAll, kLastZ};
   const std::uint64_t bits = kRows[slot / 3 % 3] & kColumns[slot % 3];
   std::uint64_t found = 0;
   for (int x = 0; x < 8; ++x)

@@ -7,7 +7,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/distance/band.h"
-#include "algorithms/voxelization/inside/inner_sheets.h"
+#include "algorithms/voxelization/inside/interior_faces.h"
 #include "algorithms/voxelization/inside/signs.h"
 #include "algorithms/voxelization/distance/wide_band.h"
 
@@ -30,7 +30,7 @@ struct Widths {
 };
 
 /// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side.
-void sign_leaf(FloatLeaf& leaf, const VoxelBits& inside, const Widths& widths,
+void sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths,
                const kernels::Kernels& kernels) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   kernels.apply_signs(inside.data(), widths.exterior, widths.interior, widths.least, leaf.buffer().data(),
@@ -83,7 +83,7 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
     // has a leaf.
     band.leaves.push_back(std::move(near_caps.leaves[i]));
     band.blocks.push_back(near_caps.blocks[i]);
-    signs.inside.push_back(known != BlockTable::kNone ? VoxelBits(signs.inside[known])
+    signs.inside.push_back(known != BlockTable::kNone ? BlockMask(signs.inside[known])
                                                       : signs.beyond.at(near_caps.blocks[i]));
     if (!band.nearest.empty()) {
       band.nearest.push_back(std::make_unique<LeafTriangles>());
@@ -92,11 +92,11 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
   }
 }
 
-bool has(const VoxelBits& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
+bool has(const BlockMask& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
 
 /// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: a way from
-/// outside to an inner sheet passes the solid's boundary first, so the sheet is never the nearest to them.
-void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& inside, float reach) {
+/// outside to an interior face passes the solid's boundary first, so the sheet is never the nearest to them.
+void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   for (unsigned i = 0; i < 512; ++i) {
     if (!has(inside, i)) continue;
@@ -108,10 +108,10 @@ void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const VoxelBits& in
 
 /// Computes the distances of the voxels inside once more without what does not bound the solid. It goes leaf by leaf,
 /// since all of the new ones at once could outweigh a small volume.
-InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
+InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
                                    BandWork work, Band& band, RunContext& context) {
-  InnerSheets sheets =
-      find_inner_sheets(soup, bins, band, signs, work.reach, work.voxel_size, context);
+  InteriorFaces sheets =
+      find_interior_faces(soup, bins, band, signs, work.reach, work.voxel_size, context);
   if (sheets.triangles.empty()) return sheets;
   // First without any triangle that is inner, if only in part. Each call back writes to its own block's leaf, so that
   // threads need no lock.
@@ -119,7 +119,7 @@ InnerSheets leave_out_inner_sheets(const IndexSoup& soup, TriangleBins& bins, co
   work.without = &sheets.triangles;
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
     if (!band.leaves[found.block]) return;
-    const VoxelBits& inside = signs.inside[found.block];
+    const BlockMask& inside = signs.inside[found.block];
     replace_inside(*band.leaves[found.block], found, inside, float(work.reach * work.voxel_size));
     if (!work.nearest || !found.any) return;
     for (unsigned v = 0; v < 512; ++v)
@@ -183,11 +183,11 @@ openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool
 /// What the search for the sides found, beside the sides.
 struct Boundary {
   bool is_signed = false;  ///< false when there is no inside
-  InnerSheets sheets;
+  InteriorFaces sheets;
   std::vector<TriangleCorners> caps;
 };
 
-/// Finds the sides and makes `band` signed. The order matters: the caps come after the inner sheets, whose search
+/// Finds the sides and makes `band` signed. The order matters: the caps come after the interior faces, whose search
 /// replaces distances by those to the mesh alone; the signs last, once every distance is the least.
 Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, TriangleBins& bins,
               const Widths& widths, Band& band, RunContext& context) {
@@ -195,7 +195,7 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
   Signs signs = find_signs(soup, rule, bins, band, work.reach, context);
   if (!signs.usable) return {};
   Boundary boundary{.is_signed = true,
-                    .sheets = leave_out_inner_sheets(soup, bins, signs, work, band, context),
+                    .sheets = leave_out_interior_faces(soup, bins, signs, work, band, context),
                     .caps = {}};
   if (!signs.caps.empty()) add_caps(signs, work.voxel_size, work.reach, bins.blocks(), band, context);
   const kernels::Kernels& kernels = kernels::chosen();

@@ -219,7 +219,7 @@ TEST(Voxelize, UnionOfOverlappingSpheres) {
   EXPECT_LT(worst, 0.06) << "facets are 0.03 off the spheres";
 }
 
-TEST(Voxelize, WallsOfAGapStayWhereInnerSheetsGo) {
+TEST(Voxelize, WallsOfAGapStayWhereInteriorFacesGo) {
   // Two boxes with a gap of 0.3 voxels that no voxel lies in, and a bar across it, above z = 5.2. The walls
   // of the gap bound the solid below the bar, and are inside it within the bar: both are two sheets on the
   // same edge.

@@ -16,8 +16,8 @@ namespace hermesh {
 /// One file that holds a case's mesh.
 struct CaseFile {
   std::string name;    ///< in the data folder and in the cache
-  std::string sha256;  ///< of its bytes
-  std::string from;    ///< where fetch_data.sh gets it; empty for a file that only the data folder can have
+  std::string sha256;  ///< hash of the file's bytes
+  std::string from;    ///< where fetch_data.sh gets the file; empty for a file that only the data folder can have
 };
 
 /// How a file of raw samples is laid out, as text for import_volume.h.
@@ -27,7 +27,7 @@ struct RawSamples {
   std::array<double, 3> spacing{1.0, 1.0, 1.0};  ///< mm
 };
 
-/// A case is either files, the first that is to be had wins, with a stand-in (a recipe that takes a number of
+/// A case is either files, of which the first that is to be had wins, with a stand-in (a recipe that takes a number of
 /// triangles) for when none is; or a recipe; or another case, changed.
 struct CaseRecipe {
   std::string name, summary;
@@ -36,13 +36,14 @@ struct CaseRecipe {
   std::string stand_in;
   std::string recipe;
   RecipeParameters parameters;
-  std::string changed_case;  ///< the other case
-  std::string change;        ///< "close_holes_of" it, or "agree_faces_of"
+  std::string changed_case;  ///< the case that is changed to make this one
+  std::string change;        ///< "close_holes_of" or "agree_faces_of": what is done to it
   bool is_volume = false;         ///< samples instead of polygons; its stand-in is one of volume_cases.h
-  std::optional<RawSamples> raw;  ///< of a volume whose file does not say
-  std::string sha256;  ///< of a generated mesh's arrays
+  std::optional<RawSamples> raw;  ///< layout of a volume's samples where the file does not say
+  std::string sha256;  ///< hash of a generated mesh's arrays
 };
 
+/// Reads the recipes of a file such as cases.toml.
 /// @throws Error naming the file and line of a mistake: an unknown or missing key, a value of the wrong type,
 /// a name given twice.
 std::vector<CaseRecipe> read_case_file(const std::filesystem::path& path);

@@ -66,14 +66,14 @@ std::string fetch(const CaseFile& file, RunContext& context) {
   return failures[file.name] = reason.empty() ? "it could not be fetched" : reason;
 }
 
-/// As a program that voxelizes it would take it.
+/// The mesh of a file as a program that voxelizes it would take it: quads are cut along the better diagonal.
 PolygonMesh read_polygons(const fs::path& path, RunContext& context) {
   PolygonMesh mesh = read_mesh(path, context);
   choose_diagonals(mesh);
   return mesh;
 }
 
-/// @throws Error if the file is another one.
+/// The file at `path`, which must have the hash that the recipe states. @throws Error if it has another one.
 LocatedFile checked(const CaseRecipe& recipe, const CaseFile& file, const fs::path& path,
                     const std::string& origin) {
   const std::string sha256 = sha256_of_file(path);

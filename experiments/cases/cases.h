@@ -25,14 +25,14 @@ struct LoadedCase {
   std::string name;
   PolygonMesh mesh;
   std::string origin;  ///< "data folder", "package registry", "generated", or "stand-in: …" with the reason
-  std::string sha256;  ///< of the file's bytes, or of the generated mesh's arrays
-  std::optional<std::uint64_t> seed = {};  ///< of a generated case's random numbers, where it has any
+  std::string sha256;  ///< hash of the file's bytes, or of the generated mesh's arrays
+  std::optional<std::uint64_t> seed = {};  ///< seed of a generated case's random numbers, where it has any
 };
 
 /// All cases of cases.toml, in its order. @throws Error naming the file and line of a mistake.
 std::vector<CaseInfo> list_cases();
 
-/// Looks in $HERMESH_DATA, then in the cache (filled from a package registry on first use), else makes the
+/// Loads a case: from $HERMESH_DATA, or from the cache (filled from a package registry on first use), or else as its
 /// procedural stand-in of the same size. A name that is no case but a path to a mesh file is read as that
 /// file.
 /// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
@@ -51,7 +51,8 @@ struct LocatedFile {
   std::string origin, sha256;  ///< as in LoadedCase
 };
 
-/// Looks in the data folder, the cache and the package registry. Nothing where it is nowhere; then `reasons` says why.
+/// Looks for the files of a case in the data folder, the cache and the package registry. Returns nothing where none of
+/// them has one; then `reasons` says why.
 /// @throws Error for a file whose SHA-256 is not the stated one.
 std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& reasons, RunContext& context);
 

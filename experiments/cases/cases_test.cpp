@@ -230,7 +230,7 @@ class CasesTest : public testing::Test {
     fs::create_directories(path.parent_path());
     std::ofstream(path, std::ios::binary) << text;
   }
-  /// From here on the recipes are these.
+  /// Makes `toml` the recipes of all calls that follow in the test.
   void use_recipes(const std::string& toml) {
     write(folder / "experiments" / "cases.toml", toml);
     set("HERMESH_EXPERIMENTS", folder / "experiments");
@@ -273,8 +273,8 @@ TEST_F(CasesTest, TheRecipesOfTheProjectAreInOrder) {
     }
 }
 
-/// load_case compares the hash. Ten million triangles take too long for every run, and so does one million
-/// where nothing is optimised.
+/// Generated cases must have the stated hash, which load_case() compares. Ten million triangles take too long for every
+/// run, and so does one million where nothing is optimised.
 TEST_F(CasesTest, GeneratedCasesHaveTheStatedHash) {
 #ifdef NDEBUG
   constexpr double most = 1e6;

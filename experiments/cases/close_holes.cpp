@@ -14,7 +14,7 @@ using recipes::next_index;
 
 namespace {
 
-/// Without the points that no polygon uses.
+/// The mesh without the points that no polygon uses.
 PolygonMesh compacted(const PolygonMesh& mesh) {
   constexpr std::uint32_t unused = 0xffffffff;
   std::vector<std::uint32_t> number(mesh.points.size(), unused);

@@ -6,7 +6,7 @@
 
 namespace hermesh::recipes {
 
-/// splitmix64.
+/// Random numbers by splitmix64 (Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, 2014).
 class Random {
  public:
   explicit Random(double seed) : state_(static_cast<std::uint64_t>(seed)) {}
@@ -16,7 +16,7 @@ class Random {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return z ^ (z >> 31);
   }
-  /// From 0 to below 1.
+  /// The next number, from 0 to below 1.
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
 
@@ -28,7 +28,7 @@ class Random {
 class GradientNoise {
  public:
   explicit GradientNoise(std::uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u) {}
-  /// About −1 to 1, 0 at lattice points.
+  /// The noise at a point: between about −1 and 1, and 0 where all coordinates are whole numbers.
   double operator()(const Eigen::Vector3d& point) const;
 
  private:

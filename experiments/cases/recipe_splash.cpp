@@ -12,10 +12,10 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Half of 716 : 928 : 2671, the longest side being 1.
+/// Half of the box's sides, which are as 716 : 928 : 2671, the longest one being 1.
 const Vector3d kHalf(0.134032, 0.173718, 0.5);
 constexpr double kWater = -0.11;  ///< height of the pool's surface
-constexpr double kGap = 0.001;    ///< between droplets
+constexpr double kGap = 0.001;    ///< least gap between droplets
 constexpr double kGravity = 0.9;  ///< lengths per squared unit of time
 
 /// A crown: a ring of thin sheet that leans outwards.
@@ -106,7 +106,7 @@ PolygonMesh pool(const GradientNoise& noise, double detail) {
   return mesh;
 }
 
-/// The way of what flies off a rim.
+/// The path of what flies off a rim.
 struct Flight {
   Vector3d start, velocity;
   Vector3d at(double time) const { return start + time * velocity - Vector3d(0, 0.5 * kGravity * time * time, 0); }

@@ -27,8 +27,9 @@ PolygonMesh sphere_cluster(const RecipeParameters& parameters, RunContext&) {
   return mesh;
 }
 
-/// The poles are those of a uv-sphere that is turned, so that the hole faces no axis of the grid; the ring
-/// about the hole has the hole's diameter.
+/// A sphere with a ring of points about one of its poles, which bounds a hole if `open`. The poles are
+/// those of a uv-sphere that is turned, so that the hole faces no axis of the grid; the ring about the
+/// hole has the hole's diameter.
 PolygonMesh holed_sphere(const RecipeParameters& parameters, RunContext&) {
   const auto around = static_cast<std::uint32_t>(parameters.at("around"));
   const double radius = parameters.at("radius"), hole = parameters.at("hole") / 2.0;

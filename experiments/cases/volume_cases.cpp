@@ -22,7 +22,7 @@ double lattice_noise(int x, int y, int z) {
   return double((h ^ (h >> 16)) >> 8) / 0x1p24;
 }
 
-/// Trilinear between lattice points `spacing` samples apart.
+/// Noise from 0 to 1, trilinear between lattice points `spacing` samples apart.
 double noise(const Coord& at, int spacing) {
   const double scaled[3] = {double(at.x()) / spacing, double(at.y()) / spacing, double(at.z()) / spacing};
   const int low[3] = {int(std::floor(scaled[0])), int(std::floor(scaled[1])), int(std::floor(scaled[2]))};

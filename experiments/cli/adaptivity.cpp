@@ -15,7 +15,7 @@ constexpr int kFrustumResolution = 84;
 constexpr const char* kFrustumForm =
     "\"px,py,pz lx,ly,lz angle aspect near far\", and \"ux,uy,uz\" for up behind them unless it is 0,1,0";
 
-/// "1,2,3" to a vector.
+/// The vector that is written "1,2,3".
 Eigen::Vector3d read_vector(const std::string& word) {
   std::istringstream stream(word);
   Eigen::Vector3d result;
@@ -54,7 +54,8 @@ AdaptivityField::Outside read_outside(const std::string& name) {
   return name == "nothing" ? AdaptivityField::Outside::nothing : AdaptivityField::Outside::simplify;
 }
 
-/// The mask or the scale. What is wrong with it is said here, where its file is known, and before the work.
+/// Reads the mask or the scale of a field from a file. What is wrong with it is said here, where its file
+/// is known, and before the work.
 LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, AdaptivityField::Outside outside,
                    Session& session) {
   return about_file(file, [&] {
@@ -65,7 +66,8 @@ LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, Ada
   });
 }
 
-/// Any other would make its usual mesh and leave the user in the belief that it did not.
+/// Refuses an extractor that is not adaptive: it would make its usual mesh and leave the user
+/// in the belief that it did not.
 void check_adaptive(const Extractor& extractor) {
   for (const OptionSpec& option : extractor.options)
     if (option.name == "threshold" || option.name == "tolerance") return;

@@ -17,8 +17,8 @@ struct AdaptivityArguments {
 
 void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments);
 
-/// None if no option asks for one. @throws UsageError for options that contradict one another, a frustum that is none,
-/// or an extractor that is not adaptive; Error for a file that cannot be used.
+/// The field that the options ask for, or none. @throws UsageError for options that contradict one another, a frustum
+/// that is none, or an extractor that is not adaptive; Error for a file that cannot be used.
 std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments, const Extractor& extractor,
                                                Session& session);
 

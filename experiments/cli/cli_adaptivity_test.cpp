@@ -17,7 +17,7 @@ class AdaptivityTest : public ProgramTest {
     words.insert(words.end(), more.begin(), more.end());
     return run(words);
   }
-  /// Points of the mesh that the summary tells of.
+  /// Number of points of the mesh, as the summary tells it.
   int points(const std::vector<std::string>& more) {
     const Outcome outcome = extract(more);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -7,7 +7,7 @@ namespace {
 
 class CombineTest : public ProgramTest {
  protected:
-  /// A box as an OFF file.
+  /// Writes a box from x0 to x1 along x, and from −1 to 1 along y and z, as an OFF file.
   void write_box(const std::string& name, double x0, double x1) {
     const auto corner = [&](int i) {
       return std::to_string(i & 1 ? x1 : x0) + (i & 2 ? " 1" : " -1") + (i & 4 ? " 1\n" : " -1\n");
@@ -19,7 +19,7 @@ class CombineTest : public ProgramTest {
   Outcome combine(const std::string& operation) {
     return run({"combine", operation, "a.off", "b.off", "out.ply", "--voxel-size", "0.05"});
   }
-  /// Of the mesh that was written, as the judges have it.
+  /// Volume of the mesh that was written, as the judges have it.
   double volume() {
     const Outcome judged = run({"validate", "out.ply", "--json", "--require", "closed,oriented"});
     EXPECT_EQ(judged.exit_code, 0);

@@ -25,7 +25,7 @@ class DamageTest : public ProgramTest {
     fs::copy_file(fs::path(HERMESH_TEST_INPUTS) / name, target);
     return name;
   }
-  /// One short line without control characters that ends the run, after notes if need be.
+  /// Expects the program to end with one short line without control characters on stderr, after notes if need be.
   void expect_refusal(int exit_code, const Arguments& arguments, const std::vector<std::string>& words) {
     std::string command = "hermesh";
     for (const std::string& argument : arguments) command += " " + argument;

@@ -13,7 +13,7 @@
 namespace hermesh::cli {
 namespace {
 
-/// Unpacks what is packed, so that the program sees the file as its writer left it.
+/// The file's bytes, unpacked where it is packed, so that the program sees the file as its writer left it.
 std::string foreign(const std::string& name) {
   const std::string file = std::string(HERMESH_FOREIGN_MESHES) + "/" + name;
   const bool packed = !std::filesystem::exists(file);
@@ -28,7 +28,7 @@ std::string foreign(const std::string& name) {
 
 const std::vector<std::string> kBallsWithBadAttributes = {"obj_vt_nan.obj", "obj_vn_nan.obj",
                                                           "obj_tinkercad_comma.obj", "obj_zero_attr.obj"};
-/// What the note about each says.
+/// Files of a ball that another program wrote, and what the note about each says.
 const std::vector<std::pair<std::string, std::string>> kBalls = {
     {"obj_nan_unref.obj", "1 points that no polygon uses were left out"},
     {"obj_trailing_junk.obj", "Ctrl-Z"},

@@ -139,7 +139,7 @@ TEST_F(CliTest, BandsAndIsovalueTakeEffect) {
   EXPECT_NEAR(volume("-0.2") / volume("0"), 0.512, 0.02);
 }
 
-/// The polygons, which remesh has at hand, lie at the isovalue 0.
+/// Exact crossings are no use at other isovalues: the polygons, which remesh has at hand, lie at 0.
 TEST_F(CliTest, RemeshesAtOtherIsovalues) {
   write_sphere();
   const auto volume = [&](const std::string& isovalue) {
@@ -201,7 +201,7 @@ TEST_F(CliTest, RequirementNotMetIsExitCodeThree) {
   EXPECT_EQ(run({"validate", "triangle.off"}).exit_code, 0);
 }
 
-/// Boxes of 10 × 10 between heights, on points of their own.
+/// OBJ text of boxes of 10 × 10 between heights, each on points of its own.
 std::string boxes_obj(const std::vector<std::pair<double, double>>& heights) {
   std::ostringstream file;
   int base = 1;

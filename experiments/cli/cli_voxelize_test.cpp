@@ -37,7 +37,7 @@ class VoxelizeTest : public ProgramTest {
     std::sort(names.begin(), names.end());
     return names;
   }
-  /// A tetrahedron with an attribute of each kind.
+  /// Writes a tetrahedron with an attribute of each kind.
   void write_tetrahedron() {
     write("t.obj",
           "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nvt 0 0\nvt 1 0\nvt 0 1\n"
@@ -60,7 +60,7 @@ TEST_F(VoxelizeTest, AllGridsInOneFileAndHermiteBesideIt) {
   EXPECT_EQ(run({"extract", "out.vdb", "out.ply"}).exit_code, 0);
 }
 
-/// The tool returns 0 whatever happens, so its text is what counts.
+/// OpenVDB's tool reads the file. It returns 0 whatever happens, so its text is what counts.
 TEST_F(VoxelizeTest, OpenVdbsToolReadsTheFile) {
   ASSERT_EQ(std::system("command -v vdb_print > /dev/null"), 0)
       << "vdb_print is not installed (package libopenvdb-tools)";

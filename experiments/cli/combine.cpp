@@ -37,7 +37,8 @@ std::string result_name(const Arguments& arguments) {
   return "the " + arguments.operation + " of '" + arguments.first + "' and '" + arguments.second + "'";
 }
 
-/// A resolution is that of the longer operand, so that the order of the two does not matter.
+/// Voxel size in world units. A resolution counts along the longer operand, so that the
+/// order of the two does not matter.
 double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Arguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session) {
   const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
@@ -63,8 +64,8 @@ SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const Sha
   return solid;
 }
 
-/// What became of parts that are thinner than a voxel. (Of parts that an operand alone lost its voxelization
-/// tells.)
+/// A sentence on what became of parts of the result that are thinner than a voxel. (Parts that an operand by itself
+/// lost are told of when it is voxelized.)
 std::string sentence(const LostSlivers& lost, Boolean boolean, double voxel_size) {
   const double volume = lost.volume * voxel_size * voxel_size * voxel_size;
   return std::to_string(lost.edges) + " lattice edges pass through " +
@@ -74,7 +75,7 @@ std::string sentence(const LostSlivers& lost, Boolean boolean, double voxel_size
          " at " + text(lost.place) + "; smaller voxels keep more";
 }
 
-/// @throws Error that tells a result that is empty from one that is too thin.
+/// Refuses a result without a sample. @throws Error that tells a result that is empty from one that is too thin.
 void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const Arguments& arguments,
                      double voxel_size) {
   if (!result.hermite.leaves.empty()) return;

@@ -40,7 +40,7 @@ void add_extract_options(CLI::App& command, ExtractArguments& arguments, const s
   add_adaptivity_options(command, arguments.adaptivity);
 }
 
-/// Polygons that the extractor would not look at would leave the user in the belief that it did.
+/// Refuses polygons that the extractor would not look at: they would leave the user in the belief that it did.
 void check_source_has_effect(const ExtractArguments& arguments, const ChosenExtractor& chosen) {
   const Options& options = chosen.options;
   if (options.is("hermite", "exact") || options.is("crossings", "exact")) return;
@@ -72,7 +72,8 @@ void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
                                                 : "closed half a voxel beyond its last samples; see --ends"));
 }
 
-/// Why a mesh is empty. `source`: the polygons that the volume was made from in the same run, if it was.
+/// A sentence that says why a mesh is empty. `source` is the polygons that the volume was made
+/// from in the same run, if it was.
 std::string no_surface(const LevelSet& level_set, const PolygonMesh* source, const ChosenExtractor& chosen,
                        const ExtractArguments& arguments) {
   const auto [lowest, highest] = value_range(level_set);
@@ -89,7 +90,7 @@ std::string no_surface(const LevelSet& level_set, const PolygonMesh* source, con
   return nothing + "the volume has no sample inside, or none outside; " + values;
 }
 
-/// `paths.in`: the file that it is about.
+/// The volume's mesh by the chosen extractor; messages name `paths.in`.
 PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
                     const ChosenExtractor& chosen, const ExtractArguments& arguments, Session& session) {
   const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);

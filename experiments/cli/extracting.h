@@ -23,7 +23,7 @@ struct ChosenExtractor {
 
 void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);
 
-/// @throws UsageError
+/// Looks the extractor up and checks its options. @throws UsageError for a name or an option that there is not.
 ChosenExtractor choose_extractor(const ExtractorArguments& arguments);
 
 void print_extracted(const Session& session, const PolygonMesh& mesh, const std::string& extractor,

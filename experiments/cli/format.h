@@ -7,14 +7,14 @@
 
 namespace hermesh::cli {
 
-/// Six significant digits.
+/// The number with six significant digits.
 inline std::string text(double value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.6g", value);
   return buffer;
 }
 
-/// As many as tell a number of single precision from all others.
+/// The number with as many digits as tell it from all others of single precision.
 inline std::string exact_text(float value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.9g", double(value));

@@ -33,7 +33,7 @@ struct Arguments {
 
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
 
-/// The object with its polygons, which `source` keeps.
+/// Reads the object to break; its polygons, if it has any, are kept in `source`.
 FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh>& source, Session& session) {
   FractureObject object;
   const bool sized = arguments.voxelizing.voxel_size || arguments.voxelizing.resolution;
@@ -108,7 +108,7 @@ bool report_ledger(const validation::FractureLedger& ledger, RunContext& context
   return ledger.is_consistent();
 }
 
-/// What was asked for and nothing would look at.
+/// Refuses options that were given and that nothing would look at. @throws UsageError
 void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, const CLI::App& command) {
   using Kind = CutterSpec::Kind;
   if (is_volume(arguments.paths.in))

@@ -23,7 +23,7 @@ struct Arguments {
   std::optional<double> replacement;
 };
 
-/// Three numbers with commas between them. @throws UsageError
+/// Reads three numbers with commas between them. @throws UsageError
 template <class T>
 std::array<T, 3> three_numbers(const std::string& option, const std::string& given) {
   std::array<T, 3> numbers{};

@@ -50,7 +50,7 @@ void print_grid(const GridSummary& grid) {
   std::cout << "\n  memory       " << grid.memory_bytes << " bytes\n";
 }
 
-/// What describe_vdb() cannot tell of grids that hold Hermite data.
+/// Prints what describe_vdb() cannot tell of grids that hold Hermite data.
 void print_hermite(const std::filesystem::path& path, RunContext& context) {
   const HermiteSummary hermite = summary_of(read_hermite(path, context));
   std::cout << "Hermite data\n  voxels       " << hermite.representation << "\n  normals      " << hermite.normal_code

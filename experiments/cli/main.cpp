@@ -17,7 +17,7 @@
 namespace hermesh::cli {
 namespace {
 
-/// Of an error or a note, in bytes. What is quoted from files is shorter; the names of files may be long.
+/// Longest error or note, in bytes. What is quoted from files is shorter; the names of files may be long.
 constexpr std::size_t kLongest = 1500;
 
 int fail(int exit_code, const std::string& sentence) {
@@ -32,7 +32,7 @@ void print_notes(Session& session) {
   session.context.notes.clear();
 }
 
-/// TBB reserves memory for as many as it is told that there may be.
+/// Most threads that can be asked for: TBB reserves memory for as many as it is told that there may be.
 constexpr int kMostThreads = 1024;
 
 void add_common_options(CLI::App& app, Session& session) {
@@ -79,8 +79,8 @@ int run_to_exit_code(Session& session) {
   }
 }
 
-/// An option whose value is an empty string, as a variable of a script that was not set leaves it; it would be taken for
-/// one that was not given. Empty if there is none.
+/// Name of an option whose value is an empty string, as a variable of a script that was not set leaves it; it would be
+/// taken for one that was not given. Empty if there is no such option.
 std::string option_without_value(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& given : option->results())

@@ -14,6 +14,7 @@
 
 namespace hermesh::cli {
 
+/// What became of a run of the program.
 struct Outcome {
   int exit_code = -1;  ///< −1 if a signal killed it
   std::string out, err;
@@ -35,11 +36,11 @@ class ProgramTest : public testing::Test {
   /// stdin.
   Outcome run(const std::vector<std::string>& arguments, std::optional<Interruption> interruption = {});
 
-  /// A limit (RLIMIT_…) for the programs that are run from now on.
+  /// Sets a limit (RLIMIT_…) for the programs that are run from now on.
   void limit(int resource, std::uint64_t value) { limits_.emplace_back(resource, value); }
 
   std::filesystem::path path(const std::string& name) const { return folder_ / name; }
-  /// The same with a terminal for stderr; returns all that the terminal was sent.
+  /// Runs `hermesh` as run() does, with a terminal for stderr; returns all that the terminal was sent.
   std::string terminal_output(const std::vector<std::string>& arguments);
 
   void write(const std::string& name, const std::string& content);
@@ -53,7 +54,8 @@ class ProgramTest : public testing::Test {
   void write_sphere();
 
  private:
-  /// In the child: the streams and the folder are set; `err` is a file descriptor.
+  /// Becomes the program, in the child process: streams, folder and limits are set first; `err` is
+  /// a file descriptor for stderr.
   [[noreturn]] void execute(std::vector<std::string> words, int err) const;
 
   std::filesystem::path folder_, streams_;

@@ -8,12 +8,12 @@
 
 namespace hermesh::cli {
 
-/// Counts, places of the first offenders, distances and the verdict; `unmet` are the requirements that are
-/// not met.
+/// The report as text: counts, places of the first offenders, distances and the verdict; `unmet` are the
+/// requirements that are not met.
 std::string report_text(const validation::MeshReport& report, const std::string& file,
                         const std::vector<std::string>& unmet);
 
-/// The object of validation::to_json(), with `mesh`, the file, and `unmet_requirements`, a list.
+/// The report as JSON: the object of validation::to_json(), with `mesh`, the file, and `unmet_requirements`, a list.
 std::string report_json(const validation::MeshReport& report, const std::string& file,
                         const std::vector<std::string>& unmet);
 

@@ -15,7 +15,7 @@ class App;
 
 namespace hermesh::cli {
 
-/// 130 and 143 (128 + the signal's number) stand for a cancelled run.
+/// Exit codes of the program. 130 and 143 (128 + the signal's number) stand for a cancelled run.
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNotMet = 3 };
 
 /// A command line that asks for something that does not exist or cannot be: exit code 2.
@@ -37,21 +37,21 @@ auto as_usage(Check check) {
 struct Session {
   RunContext context;
   bool quiet = false;
-  bool json = false;             ///< what was done as one JSON object instead of summaries
-  std::optional<int> threads;    ///< none: as many as the machine has
-  std::function<int()> command;  ///< the one that was asked for; returns an ExitCode
+  bool json = false;             ///< prints what was done as one JSON object instead of summaries
+  std::optional<int> threads;    ///< number of threads; none: as many as the machine has
+  std::function<int()> command;  ///< runs the command that was asked for; returns an ExitCode
 };
 
 // Each adds its commands, which set session.command when they are parsed.
 void add_list(CLI::App& app, Session& session);
 void add_voxelize(CLI::App& app, Session& session);
 void add_import(CLI::App& app, Session& session);
-void add_conversions(CLI::App& app, Session& session);  ///< extract, remesh
+void add_conversions(CLI::App& app, Session& session);  ///< adds extract and remesh
 void add_combine(CLI::App& app, Session& session);
 void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
-void add_experiments(CLI::App& app, Session& session);  ///< run, report, compare
+void add_experiments(CLI::App& app, Session& session);  ///< adds run, report and compare
 
 /// Lets a command that makes volumes or surfaces print what it did as JSON: its notes, figures and times of stages.
 void add_json_option(CLI::App& command, Session& session);
@@ -59,7 +59,7 @@ void add_json_option(CLI::App& command, Session& session);
 /// Refuses the options that were given though nothing would look at them. @throws UsageError that ends with `why`.
 void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
-/// A subcommand with the options that all of them take.
+/// Adds a subcommand with the options that all subcommands take, and returns it.
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary);
 
 }  // namespace hermesh::cli

@@ -12,11 +12,11 @@ namespace hermesh::cli {
 /// end. The others stay ignored then, as nohup has it. Files that become too large (SIGXFSZ) are errors.
 const std::atomic<bool>& handle_signals();
 
-/// The work is done and its output stands under its name: a signal from now on changes nothing. Does not
+/// Says that the work is done and its output stands under its name: a signal from now on changes nothing. Does not
 /// return if the watchdog is ending the process at this moment.
 void work_is_finished() noexcept;
 
-/// 128 plus the number of the signal that came; 0 if none did.
+/// The exit code for the signal that came, 128 plus its number; 0 if none came.
 int signal_exit_code() noexcept;
 
 /// Removes unfinished files and ends the process without running destructors, which a waiting user gains

@@ -24,7 +24,7 @@ class TerminalProgress {
   std::chrono::steady_clock::time_point next_ = {};
 };
 
-/// Erases the line if one is shown; from any thread.
+/// Erases the line of progress if one is shown; may be called from any thread.
 void erase_progress_line() noexcept;
 
 }  // namespace hermesh::cli

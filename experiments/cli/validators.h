@@ -19,8 +19,8 @@ inline CLI::Validator finite_number() {
       "");
 }
 
-/// An option of a variant. Elsewhere -o is often the output, so that is what a value without '=' is taken
-/// for.
+/// Accepts key=value, an option of a variant. Elsewhere -o is often the output, so a value without '=' is
+/// taken for one that was meant so.
 inline CLI::Validator key_value() {
   return CLI::Validator(
       [](const std::string& given) {

@@ -23,7 +23,7 @@ struct Arguments {
   bool fog_exterior = false;
 };
 
-/// @throws Error
+/// Refuses `--like` for what cannot take it. @throws Error
 void check_like(const Arguments& arguments, const VolumeRequest& request) {
   if (!arguments.voxelizing.like) return;
   if (arguments.voxelizing.voxelizer != "hermesh")
@@ -52,7 +52,8 @@ std::string names_of(const std::vector<openvdb::GridBase::Ptr>& grids) {
   return names;
 }
 
-/// "attributes" asks for what there is, so that attributes that cannot be read stop nothing.
+/// Takes attributes that cannot be read out of the request. The word "attributes" asks for
+/// what there is, so that attributes that cannot be read stop nothing.
 void drop_unreadable(VolumeRequest& request, const std::string& file, Session& session) {
   request.all_attributes = false;
   const bool nothing_else = !request.sdf && !request.udf && !request.triangle_id && !request.closest_point &&
@@ -62,7 +63,7 @@ void drop_unreadable(VolumeRequest& request, const std::string& file, Session& s
   session.context.note("'" + file + "' has no attribute that can be read, so the volume is its sdf");
 }
 
-/// With what the request needs to know of the file.
+/// Reads the mesh of a file, and completes the request by what it needs to know of the file.
 PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& session) {
   MeshFile file = read_mesh_file(path, session.context,
                                  {.attributes = request.any_attributes(),
@@ -76,7 +77,7 @@ PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& s
   return mesh;
 }
 
-/// By the voxelizer that knows which triangle is nearest.
+/// Makes the grids of the request by the voxelizer that knows which triangle is nearest, and writes them.
 void write_outputs(const Arguments& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
                    Session& session) {
   const Paths& paths = arguments.paths;

@@ -19,10 +19,10 @@ struct Paths {
 struct VoxelizeArguments {
   std::optional<double> voxel_size;  ///< world units
   std::optional<std::int64_t> resolution;
-  std::optional<std::string> like;                  ///< a volume whose lattice to take
+  std::optional<std::string> like;                  ///< file of a volume whose lattice is taken
   double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
   std::string voxelizer = "hermesh";
-  std::optional<std::string> signs;  ///< shorthand for the option of that name
+  std::optional<std::string> signs;  ///< value of the voxelizer's option `signs`, which it is a shorthand for
   std::vector<std::string> options;  ///< key=value
 };
 
@@ -33,24 +33,26 @@ struct ChosenVoxelizer {
 };
 
 void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
-/// `with_like`: the command also takes the lattice of a volume.
+/// Adds the options of VoxelizeArguments, with `with_like` also `--like`, which takes the lattice of a volume.
 void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
 
-/// key=value texts, checked. @throws Error also for an option that is given twice.
+/// Options from texts key=value, checked against `declared`. @throws Error also for an option that is given twice.
 Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,
                       const std::vector<std::string>& texts);
-/// @throws UsageError
+/// Looks the voxelizer up and checks its options. @throws UsageError for a name or an option that there is not.
 ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments);
 
-/// A mesh to voxelize: its quads are cut along the better diagonal.
+/// Reads a mesh to voxelize: its quads are cut along the better diagonal. @throws Error if it cannot be read.
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options = {});
 
+/// What the chosen voxelizer gets, with the voxel size in world units that the arguments ask for.
 /// @throws Error where a resolution is asked of a mesh without extent.
 VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,
                                      const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
                                      Session& session);
 
-/// With a line of summary. @throws Error
+/// Voxelizes the mesh of `file` and prints a line of summary. @throws Error as
+/// voxelization_input() and the voxelizer do.
 LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session);
 

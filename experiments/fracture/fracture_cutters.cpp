@@ -76,7 +76,7 @@ std::function<double(const Vector3d&)> density_of(const CutterChoices& choices, 
   return density_about(*choices.impact, radius);
 }
 
-/// What is between neighbouring seeds if each has an equal share of the solid.
+/// Distance between neighbouring seeds (world units) if each has an equal share of the solid.
 double spacing(const LabelledSolid& solid, std::size_t count) {
   const double volume = double(solid.samples) * std::abs(solid.placement.linear.determinant());
   return std::cbrt(volume / double(count));

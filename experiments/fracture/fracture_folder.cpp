@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 using Json = nlohmann::ordered_json;
 
 constexpr int kPixels = 900;
-/// Triangles that are drawn as they are; the pieces beyond are sketched, so that a picture takes little
+/// How many triangles are drawn as they are; the pieces beyond are sketched, so that a picture takes little
 /// memory.
 constexpr std::size_t kExact = 3'000'000;
 /// Pieces move this part of their way from the object's middle, away from it.
@@ -61,7 +61,7 @@ Json json_of(const LabelledFracture& fracture) {
           {"small_pieces_kept", fracture.small_kept}, {"merged_slivers", std::move(merged)}};
 }
 
-/// Points moved to the middles of cubes of that size, triangles that lose their area left out.
+/// The mesh with its points moved to the middles of cubes of that size, without the triangles that lose their area.
 PolygonMesh sketched(const PolygonMesh& mesh, double size) {
   PolygonMesh result;
   result.origin = mesh.origin;

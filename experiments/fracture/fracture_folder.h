@@ -13,23 +13,26 @@
 
 namespace hermesh {
 
-/// Made aside and renamed by commit(), so that the folder is there with all of its files or not at all. No
-/// time and no path of the machine goes into it: the same fracture gives the same bytes.
+/// The folder in the making: it is made aside and renamed by commit(), so that it is there with all of its files or not
+/// at all. No time and no path of the machine goes into it: the same fracture gives the same bytes.
 class FractureFolder {
  public:
   /// @throws Error if the folder cannot be made, or is there already and not empty.
   FractureFolder(const std::filesystem::path& target, const Bounds& object);
 
-  /// Writes piece_0001.ply, …
+  /// Writes one piece as piece_0001.ply and so on, and notes it for pieces.json. @throws Error if it cannot be written.
   void add(PieceOutput&& piece, RunContext& context);
 
-  /// `head` is what pieces.json begins with: how the fracture was made.
+  /// Writes pieces.json and, with `picture`, exploded.png, and gives the folder its name. `head` is what pieces.json
+  /// begins with: how the fracture was made.
   void commit(nlohmann::ordered_json head, const FractureSummary& summary, bool picture, RunContext& context);
 
-  /// The pieces' files read back, judged, also against the volumes recorded of them and that of the uncut
-  /// object's mesh if it is given. @throws Error; Cancelled
+  /// Reads the pieces' files back and judges them, also against the volumes that were recorded when they
+  /// were added, and against that of the uncut object's mesh if it is given. @throws Error for a file
+  /// that cannot be read; Cancelled
   validation::FractureLedger judge(RunContext& context, std::optional<double> uncut_volume = {}) const;
 
+  /// Name of the file of piece number `piece`, which counts from 1 on.
   static std::string file_name(std::uint32_t piece);
 
  private:
@@ -39,7 +42,7 @@ class FractureFolder {
   Bounds object_;
   nlohmann::ordered_json pieces_ = nlohmann::ordered_json::array();
   double volume_ = 0.0;
-  /// Where there are many triangles, with points snapped to half a pixel of the picture.
+  /// A piece as the picture shows it; where there are many triangles, with points snapped to half a pixel.
   struct Sketch {
     PolygonMesh mesh;
     Eigen::Vector3d centre;

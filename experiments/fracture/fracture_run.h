@@ -13,13 +13,15 @@
 
 namespace hermesh {
 
+/// A solid to break.
 struct FractureObject {
   FloatHermite hermite;
   LevelSet level_set;
   const PolygonMesh* source = nullptr;  ///< whose attributes the pieces take over; null: none
 };
 
-/// Of its mesh before it is broken, at tolerance 0 (world units); 0 if no sample is inside. @throws Cancelled.
+/// Volume of the object's mesh before it is broken, at tolerance 0 (cubic world units); 0 if no sample
+/// is inside. @throws Cancelled.
 double uncut_volume(const FractureObject& object, RunContext& context);
 
 struct FractureMethod {
@@ -33,29 +35,30 @@ struct FractureMethod {
 struct PieceOutput {
   std::uint32_t number = 0;  ///< from 1 on
   std::string name;
-  std::optional<std::uint64_t> samples;  ///< of the labelled grid
+  std::optional<std::uint64_t> samples;  ///< how many samples of the labelled grid are the piece's
   PolygonMesh mesh;
   MassProperties mass;
-  /// By the neighbour's number the triangles and the area (world units) of their seam; of tagged pieces.
+  /// Triangles and area (square world units) of the seam with each neighbour, by its number; only of tagged pieces.
   std::map<std::int32_t, std::pair<std::uint64_t, double>> neighbours;
   double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
 };
 
 struct FractureSummary {
   std::uint32_t pieces = 0;
-  std::vector<CutterRecord> cutters;         ///< of `labelled`
+  std::vector<CutterRecord> cutters;         ///< what each cutter took, by the method `labelled`
   std::optional<LabelledFracture> labelled;  ///< without its mesh
-  std::vector<std::string> empty;            ///< names of cutters that took nothing, of the other methods
+  std::vector<std::string> empty;            ///< names of cutters that took nothing, by the other methods
   double seconds =
-      0.0;  ///< of the method itself: neither handing pieces over nor making polygons of OpenVDB's cutters
+      0.0;  ///< time of the method itself: neither handing pieces over nor making polygons of OpenVDB's cutters
 };
 
+/// Breaks the object by the method and hands its pieces over, one after the other.
 /// @throws Error for a method that does not exist, or a tolerance that it does not take; Cancelled.
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
                              const FractureMethod& method,
                              const std::function<void(PieceOutput&&)>& hand_over, RunContext& context);
 
-/// @throws Error as run_fracture() does.
+/// Refuses a method that run_fracture() would refuse. @throws Error as that does.
 void check_method(const FractureMethod& method);
 
 }  // namespace hermesh

@@ -13,22 +13,23 @@ namespace hermesh {
 /// A model at the size of the thesis's figures, or of the case.
 struct FractureSubject {
   std::string label;
-  std::string source;               ///< case that it is made from
+  std::string source;               ///< case that the subject is made from
   std::array<double, 3> size = {};  ///< voxels along each axis; 0: the case's own proportions
   double longest = 0.0;             ///< voxels
 };
 
-/// Neither object of the figures is at hand: a rough ball and the Armadillo take their places, stretched to
-/// their boxes.
+/// All subjects. Neither object of the figures is at hand: a rough ball and the Armadillo take their
+/// places, stretched to their boxes.
 const std::vector<FractureSubject>& fracture_subjects();
 
+/// The mesh of a subject's case, stretched to its proportions. @throws Error as load_case() does.
 PolygonMesh load_subject(const FractureSubject& subject, const MeasurementInput& input);
 
 struct SampledSubject {
   FractureObject object;
-  double hermite_seconds = 0.0;  ///< that its Hermite data took
+  double hermite_seconds = 0.0;  ///< time that the Hermite data took
 };
-/// With so many voxels along the longest side.
+/// The mesh as an object to break, sampled with so many voxels along its longest side.
 SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input);
 
 }  // namespace hermesh

@@ -11,11 +11,11 @@
 
 namespace hermesh {
 
-/// Polygons, a quad being one.
+/// Counts of polygons, a quad being one.
 struct TagCounts {
   std::int64_t polygons = 0;
   std::int64_t at_rims = 0;  ///< left out: their middle is within a voxel of both surfaces
-  std::int64_t tagged_cut = 0, truly_cut = 0, rightly_cut = 0;  ///< of the others
+  std::int64_t tagged_cut = 0, truly_cut = 0, rightly_cut = 0;  ///< counts of all other polygons
 
   double precision() const { return tagged_cut == 0 ? 1.0 : double(rightly_cut) / double(tagged_cut); }
   double recall() const { return truly_cut == 0 ? 1.0 : double(rightly_cut) / double(truly_cut); }
@@ -29,11 +29,11 @@ double distance_to_walls(const std::vector<Eigen::Vector3d>& seeds, const Eigen:
 /// between cells than to the input.
 class TagJudge {
  public:
-  /// @param input the input's triangles, which have to outlive it, in voxels relative to `origin` (world units)
-  /// @param seeds of the cells, world units
+  /// `input` knows the input's triangles, in voxels of `voxel_size` world units relative to `origin` (world units), and
+  /// has to outlive this object; `seeds` are those of the cells, world units.
   TagJudge(const DistanceOracle& input, const Eigen::Vector3d& origin, double voxel_size,
            std::vector<Eigen::Vector3d> seeds);
-  /// @throws Error for a piece without the polygon attribute `surface`.
+  /// Counts the polygons of a piece. @throws Error for a piece without the polygon attribute `surface`.
   void add(const PolygonMesh& piece);
   const TagCounts& counts() const { return counts_; }
 

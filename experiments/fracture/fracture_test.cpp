@@ -119,7 +119,7 @@ struct Case {
   const char* cutters;
   std::size_t count;
 };
-/// Without it a test would be named after the addresses of the texts.
+/// How a test names its case, which would else be named after the addresses of the texts.
 void PrintTo(const Case& c, std::ostream* out) { *out << c.object << " " << c.cutters << " " << c.count; }
 
 class Fracture : public testing::TestWithParam<Case> {};
@@ -157,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"rock", "voronoi", 8}, Case{"rock", "voronoi", 20}, Case{"rock", "planes", 4},
                     Case{"rock", "chunks", 8}, Case{"rock", "chunks", 20}));
 
-/// Codes at random for cubes of two samples, and crossings anywhere on their edges: joints of all patterns
+/// Cutters with random codes for cubes of two samples, and crossings anywhere on their edges: joints of all patterns
 /// and shapes.
 class RandomCodes : public Cutters {
  public:
@@ -226,7 +226,7 @@ TEST(FractureTags, OfAWallNearlyTangentToTheObjectKeepWithinAVoxel) {
   }
 }
 
-/// Of radius kHalf.
+/// A ball of radius kHalf.
 PolygonMesh ball_of_polygons(const Vector3d& centre) {
   RunContext context;
   PolygonMesh ball = make_recipe("uv-sphere", {{"radius", kHalf}}, context);
@@ -301,8 +301,9 @@ TEST(FractureOfPolygons, BalancesWhereNormalsJoinTwoPiecesAcrossAFace) {
   }
 }
 
-/// How many have a gap in place of a seam: parts thinner than a voxel, which come apart where no lattice edge
-/// is cut. That is a known fault; the judge fails it, and the fracture must have said so.
+/// Expects the books of trials to balance. Returns how many have a gap in place of a seam: parts thinner
+/// than a voxel, which come apart where no lattice edge is cut. That is a known fault; the judge fails it,
+/// and the fracture must have said so.
 int expect_balance(std::uint64_t first, std::uint64_t count) {
   int gaps = 0;
   for (std::uint64_t number = first; number < first + count; ++number) {

@@ -24,7 +24,7 @@ class Assembly {
   explicit Assembly(std::uint64_t seed) : random_(static_cast<double>(seed)) {}
 
   double uniform(double low, double high) { return random_.uniform(low, high); }
-  /// From `least` to `most`.
+  /// A random whole number from `least` to `most`.
   int whole(int least, int most) {
     return least + static_cast<int>(random_.bits() % static_cast<std::uint64_t>(most - least + 1));
   }
@@ -38,7 +38,7 @@ class Assembly {
     return {{"about_x", x}, {"about_y", y}, {"about_z", z}};
   }
 
-  /// The part scaled along its own axes, turned and moved.
+  /// Adds the part, scaled along its own axes, turned and moved.
   void add(const PolygonMesh& part, const Vector3d& scale, const RecipeParameters& turn,
            const Vector3d& centre, bool inwards = false) {
     const std::uint32_t first = recipes::next_index(mesh);
@@ -50,7 +50,7 @@ class Assembly {
     }
   }
 
-  /// Balls, boxes and rings of any size, most of which overlap.
+  /// Adds balls, boxes and rings of any size, most of which overlap.
   void add_solids() {
     for (int left = whole(2, 7); left > 0; --left) {
       const int shape = whole(0, 2);
@@ -67,13 +67,13 @@ class Assembly {
       }
     }
   }
-  /// Plates of half a voxel to two voxels, that cross one another.
+  /// Adds plates of half a voxel to two voxels, that cross one another.
   void add_plates(double voxel) {
     for (int left = whole(1, 3); left > 0; --left)
       add(unit_box(), {uniform(1.0, 2.0), uniform(0.6, 1.6), voxel * uniform(0.5, 2.0)}, turn(),
           somewhere(0.2));
   }
-  /// A hollow ball with a wall of half a voxel to two voxels.
+  /// Adds a hollow ball with a wall of half a voxel to two voxels.
   void add_shell(double voxel) {
     const PolygonMesh ball = recipes::octahedral_sphere(12);
     const double radius = uniform(0.7, 1.0), wall = voxel * uniform(0.5, 2.0);
@@ -83,7 +83,7 @@ class Assembly {
     add(ball, scale, turned, centre);
     add(ball, scale - Vector3d::Constant(wall), turned, centre, true);
   }
-  /// Thin bars through one another.
+  /// Adds thin bars that run through one another.
   void add_bars(double voxel) {
     for (int left = whole(3, 8); left > 0; --left)
       add(unit_box(), {uniform(1.0, 2.2), voxel * uniform(0.7, 2.5), voxel * uniform(0.7, 2.5)}, turn(),

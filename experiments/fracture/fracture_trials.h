@@ -16,7 +16,7 @@ struct FractureTrial {
   std::string cutters;   ///< as parse_cutters() takes it: one to three planes, or two to twenty cells
 };
 
-/// The kinds take turns. The same on every machine.
+/// Trial number `number`, the same on every machine. The kinds take turns.
 FractureTrial fracture_trial(std::uint64_t number);
 
 }  // namespace hermesh

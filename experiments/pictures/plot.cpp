@@ -35,8 +35,8 @@ std::optional<double> number_in(const std::string& column, const Json& row) {
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
-/// The first column gives a curve for every label or variant. The others do not depend on who competes: they are taken
-/// from the rows of the first label alone, and are called by their column's header.
+/// The curves of a plot. The first column gives a curve for every label or variant. The others do not depend on who
+/// competes: they are taken from the rows of the first label alone, and are called by their column's header.
 std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
   std::vector<Curve> curves;
   const char* const who = plot.by_variant ? "/variant/name" : "/variant/label";
@@ -115,7 +115,8 @@ void write_data(const std::filesystem::path& file, const std::vector<Curve>& cur
   if (!out.flush()) throw Error("cannot write " + file.string());
 }
 
-/// Paths in the script are relative to its folder, so that it can be run again anywhere.
+/// Writes the script that draws the curves. Paths in it are relative to its folder, so that
+/// it can be run again anywhere.
 void write_script(const std::filesystem::path& file, const Plot& plot, const std::vector<Curve>& curves) {
   std::ofstream out(file);
   out << "# gnuplot " << file.filename().string() << kFrame;

@@ -17,7 +17,8 @@ struct Camera {
   Eigen::Vector3d right, up, towards;
 };
 
-/// The y axis points up. Degrees: azimuth 0 looks at the +z side, 90 at the +x side; elevation within ±89.
+/// The camera that looks at the scene from a direction in degrees, the y axis pointing up: azimuth 0 looks at the +z
+/// side, 90 at the +x side; elevation within ±89.
 Camera make_camera(double azimuth, double elevation);
 
 struct View {
@@ -28,7 +29,7 @@ struct View {
   double occlusion_radius = 0.1;  ///< world units; how far away a surface still darkens
 };
 
-/// Rows from the top, 0xffrrggbb, opaque: what Cairo calls CAIRO_FORMAT_RGB24.
+/// An opaque picture: rows from the top, pixels 0xffrrggbb, which Cairo calls CAIRO_FORMAT_RGB24.
 struct Image {
   int width = 0, height = 0;
   std::vector<std::uint32_t> pixels;
@@ -42,8 +43,8 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Each face in one tone (so that facets show) under a key light with ambient occlusion, 2×2 samples a
-  /// pixel. Deterministic at any thread count. @throws Cancelled.
+  /// The picture of the mesh: each face in one tone (so that facets show) under a key light with ambient occlusion, 2×2
+  /// samples a pixel. Deterministic at any thread count. @throws Cancelled.
   Image render(const Camera& camera, const View& view, RunContext& context) const;
 
  private:

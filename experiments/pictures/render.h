@@ -41,7 +41,7 @@ struct Sheet {
   int columns = 5;        ///< pictures side by side before the next row begins
 };
 
-/// All meshes from one camera on one sheet: for each, the whole object shaded and a close-up with the
+/// Draws all meshes from one camera on one sheet, a PNG file: for each, the whole object shaded and a close-up with the
 /// polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red, an empty mesh says
 /// "empty". The same sheet gives the same pixels at any thread count. Written aside and renamed.
 /// @throws Error if the path cannot be written; Cancelled.

@@ -40,7 +40,7 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
                GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends)
         .mesh;
   }
-  /// What it promises, and no boundary; returns how many triangles there are.
+  /// Expects of the extractor's mesh what it promises, and no boundary; returns how many triangles there are.
   std::size_t expect_closed(const FloatGrid::Ptr& grid, double isovalue) {
     SCOPED_TRACE("isovalue " + std::to_string(isovalue));
     const PolygonMesh mesh = extract(grid, isovalue);

@@ -33,7 +33,7 @@ using test_solids::solid;
 struct Pair {
   PolygonMesh a, b;
   double voxel_size;
-  /// Nothing that the two bound is thinner than a voxel but where their surfaces cross.
+  /// True if nothing that the two bound is thinner than a voxel but where their surfaces cross, so that volumes add up.
   bool adds_up = false;
 };
 
@@ -42,7 +42,7 @@ PolygonMesh turned_solid(Random& random, const Vector3d& at, double scale = 1.0)
   return placed(solid(which), scale * random_turn(random), at);
 }
 
-/// The tips of a gear's teeth are thinner than a voxel, however small voxels are.
+/// Numbers of solids. The tips of a gear's teeth are thinner than a voxel, however small voxels are.
 constexpr std::uint64_t kBall = 0, kGear = 2, kTorus = 3;
 
 /// Solids in general position: turned, and about half as far apart as they are wide.
@@ -70,7 +70,7 @@ Pair touching(Random& random) {
           voxel, true};
 }
 
-/// The same solid twice; the same surface in part.
+/// A solid and itself, or two solids that share a part of their surface.
 Pair coincident(Random& random) {
   const double voxel = 2.0 / random.uniform(36.0, 48.0);
   const Matrix3d turn = random.bits() % 3 == 0 ? Matrix3d(Matrix3d::Identity()) : random_turn(random);
@@ -84,7 +84,7 @@ Pair coincident(Random& random) {
           placed(cuboid({-1, -1, -0.25}, {2, 1.5, 0.75}), turn, at), voxel, true};
 }
 
-/// One within a ball or a box half as large again.
+/// A solid within a ball or a box half as large again.
 Pair inside(Random& random) {
   const Vector3d at = random_vector(random, 1.0);
   const std::uint64_t which = random.bits();

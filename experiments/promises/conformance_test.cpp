@@ -16,7 +16,7 @@
 #include <ostream>
 #include <random>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/variants.h"
 #include "experiments/cases/test_volumes.h"
 #include "validation/mesh_report.h"
@@ -85,8 +85,8 @@ class Conformance : public testing::TestWithParam<Extractor> {
     return std::any_of(extractor().options.begin(), extractor().options.end(),
                        [](const OptionSpec& option) { return option.name == "tolerance"; });
   }
-  /// A variant that proves its tolerance takes its time over noise, of which nothing can be merged: so `size`
-  /// as its uniform mesh, and `smaller` as it comes.
+  /// Expects the variant's promises on noise. One that proves its tolerance takes its time over noise, in which nothing
+  /// can be merged: it gets the volume of `size` as its uniform mesh, and that of `smaller` as it comes.
   void expect_on_noise(int size, int smaller, const std::function<LevelSet(int)>& volume,
                        double isovalue = 0.0) const {
     if (!proves()) return expect_on(volume(size), isovalue);
@@ -123,11 +123,11 @@ Extractor careless_extractor() {
   Extractor careless = find_variant(our_extractors(), "marching-cubes");
   careless.name = "careless";
   careless.extract = [](const ExtractionInput& input) {
-    const BlockGrid grid(input.level_set, input.isovalue, input.context);
+    const LeafTable table(input.level_set, input.isovalue, input.context);
     PolygonMesh mesh;
-    for (std::size_t b = 0; b < grid.blocks().size(); ++b) {
-      const auto far = grid.locate(static_cast<std::int32_t>(b), 8, 8, 8);
-      mesh.points.emplace_back(float(grid.signed_value(grid.blocks()[std::size_t(far.block)], far.sample)), 0, 0);
+    for (std::size_t leaf = 0; leaf < table.size(); ++leaf) {
+      const LeafTable::Location far = table.locate(leaf, 8, 8, 8);
+      mesh.points.emplace_back(table.values(far.leaf)[far.sample], 0, 0);
     }
     return mesh;
   };
@@ -140,7 +140,7 @@ void expect_no_signal(const Extractor& extractor) {
   for (const LevelSet& volume : volumes_with_open_ends()) {
     EXPECT_EXIT(extract_and_exit(extractor, volume), testing::ExitedWithCode(0), "")
         << "the extractor " << extractor.name << " does not get through volume " << number
-        << "; it may read where the grid has no block (BlockGrid::locate)";
+        << "; it may read where the volume has no leaf (LeafTable::locate)";
     ++number;
   }
 }
@@ -148,7 +148,7 @@ void expect_no_signal(const Extractor& extractor) {
 TEST(Carelessness, IsToldInASentenceAndNotByASignal) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   EXPECT_EXIT(extract_and_exit(careless_extractor(), volumes_with_open_ends()[1]), testing::ExitedWithCode(1),
-              "the grid has no block");
+              "the volume has no leaf");
 }
 
 TEST_P(Conformance, EndsWithoutASignal) { expect_no_signal(extractor()); }

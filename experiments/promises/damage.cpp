@@ -38,7 +38,7 @@ struct Shared {
   char wrong[600];
 };
 
-/// Empty if the attempt ends as it should.
+/// What is wrong with the way in which attempt(i) ends; empty if nothing is.
 std::string verdict(int i, const std::function<void(int)>& attempt) {
   std::ofstream("/proc/self/clear_refs") << "5";  // the peak starts anew
   const long before = status_of("VmRSS");

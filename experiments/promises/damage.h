@@ -9,12 +9,12 @@
 
 namespace hermesh::damage {
 
-/// Changes of bytes, cuts, exchanges of numbers, and parts of other files, the same for the same seed.
+/// Damages files by changes of bytes, cuts, exchanges of numbers, and parts of other files, alike for each seed.
 class Mutator {
  public:
   explicit Mutator(std::uint64_t seed) : random_(seed) {}
 
-  /// One of `whole`, changed once to three times; `text` changes numbers as they are written.
+  /// A file of `whole`, changed once to three times; `text` changes numbers as they are written in digits.
   std::string operator()(const std::vector<std::string>& whole, bool text = false);
 
  private:

@@ -46,7 +46,7 @@ class Damage : public testing::Test {
   }
   ~Damage() override { fs::remove_all(folder); }
 
-  /// `read` gets the number of an attempt; it writes and reads the damaged file.
+  /// Expects all attempts to end as they should; `read` gets the number of one, and writes and reads the damaged file.
   static void expect_answers(int count, const std::function<void(int)>& read) {
     for (const std::string& failure : damage::failures(count, read)) ADD_FAILURE() << failure;
   }
@@ -92,7 +92,7 @@ openvdb::FloatGrid::Ptr frustum() {
   return grid;
 }
 
-/// Tiles at each depth, active and not.
+/// A grid with tiles at each depth, active and not.
 openvdb::FloatGrid::Ptr tiled() {
   auto grid = openvdb::FloatGrid::create(0.0f);
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
@@ -146,7 +146,7 @@ Files foreign_files(const fs::path& path) {
   return files;
 }
 
-/// All that commands read of volumes.
+/// Reads of a volume all that commands read.
 void read_volume(const fs::path& path) {
   RunContext context;
   std::optional<Error> first;
@@ -182,7 +182,7 @@ void Damage::foreign(int count) {
   expect_answers(count, [&](int i) { read_volume(put("a.vdb", Mutator(std::uint64_t(i))(whole))); });
 }
 
-/// The checksum at the end made to fit again.
+/// The file with the checksum at its end made to fit again.
 std::string resealed(std::string bytes) {
   if (bytes.size() < 100) return bytes;
   const std::size_t size = bytes.size() - 12;

@@ -28,7 +28,7 @@ class Files {
   }
   ~Files() { std::filesystem::remove_all(folder_); }
 
-  /// What `hermesh remesh` does. @throws Error if it is refused
+  /// The mesh as `hermesh remesh` would write it, read back. @throws Error if it is refused
   MeshFile written(const PolygonMesh& mesh, double voxel_size, const std::string& extension,
                    const std::map<std::string, std::string>& given) {
     RunContext context;

@@ -24,7 +24,7 @@ namespace {
 using Cell = std::array<int, 3>;
 using Cells = std::set<Cell>;
 
-/// Whole-numbered polygons.
+/// Polygons whose corners have whole numbers as coordinates.
 struct Soup {
   std::vector<Cell> points;
   std::vector<std::array<std::uint32_t, 4>> quads;
@@ -43,7 +43,7 @@ struct Soup {
     add(b), add(c), add(d);
     quads.push_back(up ? std::array{n, n + 1, n + 2, n + 3} : std::array{n, n + 3, n + 2, n + 1});
   }
-  /// `out`: 1 for a solid, −1 for a cavity.
+  /// Adds the faces of a box; `out` is 1 for a solid and −1 for a cavity.
   void add_box(const Cell& low, const Cell& high, int out = 1) {
     for (int axis = 0; axis < 3; ++axis)
       for (const bool upper : {false, true}) {
@@ -78,14 +78,14 @@ void fill(Cells& cells, const Cell& low, const Cell& high) {
 
 /// What a solid amounts to, in units of its cells.
 struct Amounts {
-  int components = 0;  ///< of its surface
+  int components = 0;  ///< components of the solid's surface
   double volume = 0.0, area = 0.0;
 };
 
 struct Solid {
   std::string name;
   Soup soup;
-  Amounts flooded, wound;  ///< by each rule
+  Amounts flooded, wound;  ///< what each rule for signs must find
   bool parity = false;     ///< whether rays that count crossings find the wound solid, too
 };
 
@@ -145,7 +145,7 @@ std::vector<Solid> solids() {
   return all;
 }
 
-/// Maps the axes and their signs.
+/// A map of the lattice onto itself that exchanges axes and turns their signs.
 struct Turn {
   std::array<int, 3> axis{0, 1, 2}, sign{1, 1, 1};
 
@@ -171,7 +171,7 @@ std::vector<Turn> turns() {
   return all;
 }
 
-/// Turned, in an octant of space, a cell `unit` world units wide.
+/// The polygons as a mesh: turned, in an octant of space, a cell `unit` world units wide.
 PolygonMesh to_mesh(const Soup& soup, const Turn& turn, unsigned octant, float unit) {
   PolygonMesh mesh;
   Cell low{1 << 20, 1 << 20, 1 << 20}, high{-(1 << 20), -(1 << 20), -(1 << 20)};
@@ -222,7 +222,8 @@ void expect_amounts(const validation::MeshReport& report, const Amounts& right, 
   EXPECT_EQ(report.boundary_edges, 0);
 }
 
-/// The oracle takes a hundred times as long as the rest, and is asked where it is told to.
+/// Expects all rules to find what the solid amounts to. The oracle takes a hundred times as long as the rest, and is
+/// asked `with_oracle` alone.
 void check(const Solid& solid, const Turn& turn, unsigned octant, double voxel_size, bool with_oracle) {
   constexpr double kUnit = 10.0;  // a multiple of every voxel size
   const PolygonMesh mesh = to_mesh(solid.soup, turn, octant, float(kUnit));
@@ -282,8 +283,8 @@ TEST(LatticeSolids, ThinSlabsStay) {
   check({"fin", fin, right, right, true}, all[0], 0, 10.0, true);
 }
 
-/// The walls of the overlap lie in planes of samples, too. Inside of both cubes the surface is nearest where one is left by
-/// a side that the other has been left by already.
+/// Two cubes overlap, and the walls of the overlap lie in planes of samples, too. From within both cubes the nearest
+/// surface is a side of one of them that lies outside of the other.
 TEST(LatticeSolids, DistancesPassOverWallsWithin) {
   Soup soup;
   soup.add_box({0, 0, 0}, {2, 2, 2});
@@ -366,7 +367,7 @@ Border measure(const Cells& cells) {
   return result;
 }
 
-/// 500 of them in the slow tier.
+/// Checks so many random unions of boxes whose border is a manifold; the slow tier takes 500.
 void check_random_unions(int count, unsigned seed) {
   std::mt19937 random(seed);
   const auto number = [&](int low, int high) { return low + int(random() % unsigned(high - low + 1)); };

@@ -33,14 +33,14 @@ openvdb::FloatGrid::Ptr dense(const Coord& lower, const Coord& upper, float back
   return grid;
 }
 
-/// Greater inside, as in a scan: a ball about (10, 9, z), radius 6.3.
+/// A ball about (10, 9, z) of radius 6.3 whose values are greater inside, as in a scan.
 openvdb::FloatGrid::Ptr ball(double z) {
   return dense(Coord(0, 0, 0), Coord(20, 19, 15), -100.0f, [=](int x, int y, int k) {
     return static_cast<float>(100.0 * (6.3 - std::hypot(x - 10.0, y - 9.0, k - z)));
   });
 }
 
-/// About the origin; OpenVDB's own makes none with a band of a voxel or less.
+/// A level set of a sphere about the origin; OpenVDB's own function makes none with a band of a voxel or less.
 openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width) {
   initialize_openvdb();
   const float background = width * voxel;
@@ -57,7 +57,8 @@ openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width)
   return grid;
 }
 
-/// As openvdb::tools::clip() leaves a grid: what is not kept is inactive background. (Those do not compile as C++20.)
+/// The grid as openvdb::tools::clip() leaves it, which does not compile as C++20: what is not kept is inactive
+/// background.
 openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach, const std::function<bool(const Coord&)>& keep) {
   const openvdb::FloatGrid::Ptr clipped = grid->deepCopy();
   for (const Coord& at : openvdb::CoordBBox(Coord(-reach), Coord(reach)))
@@ -131,7 +132,8 @@ TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
   EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, off());
 }
 
-/// Moving points onto the caps' planes made the mesh of a CT intersect itself.
+/// Nothing may meet after the ends are closed: moving points onto the caps' planes made the
+/// mesh of a CT intersect itself.
 TEST_P(VolumeEnds, CapsKeepThePromiseThatNothingMeets) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> value(0.0f, 100.0f);

@@ -1,5 +1,5 @@
 // Which points of a fine mesh hang together within blocks of 16, 8, 4 and 2 voxels: the first step of a decimation, and
-// a bold one, for nothing is proved of it yet.
+// an unproven one, for nothing is proved of it yet.
 #pragma once
 
 #include <span>

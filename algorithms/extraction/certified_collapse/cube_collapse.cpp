@@ -36,7 +36,7 @@ CubeCollapse::CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints
       distance_(mesh, local_, collapse_) {
   // What the cube's border forbids now may be done in the next round, whose borders lie elsewhere.
   for (std::uint32_t v = 0; v < local_.vertices.size(); ++v)
-    if (local_.vertices[v].here && !local_.vertices[v].free) stir(v);
+    if (local_.vertices[v].here && !local_.vertices[v].free) mark_dirty(v);
 }
 
 WideQuadric CubeCollapse::quadric_about(std::uint32_t u, std::uint32_t v, const Vector3d& anchor) const {
@@ -49,7 +49,7 @@ WideQuadric CubeCollapse::quadric_about(std::uint32_t u, std::uint32_t v, const 
 bool CubeCollapse::gather(std::uint32_t going, std::uint32_t v, const Vector3d& x) {
   // Points stay in the cube, or triangles that belong to it could reach into another one.
   if (!cube_.holds(x)) {
-    stir(v);
+    mark_dirty(v);
     return false;
   }
   collapse_.v = v;
@@ -90,7 +90,7 @@ bool CubeCollapse::make_faces(std::uint32_t moved) {
 bool CubeCollapse::is_short(const Corners& at, std::uint32_t moved) {
   const double limit = cube_.longest_edge * cube_.longest_edge;
   const bool is = (at[1] - at[0]).squaredNorm() <= limit && (at[2] - at[0]).squaredNorm() <= limit;
-  if (!is) stir(moved);
+  if (!is) mark_dirty(moved);
   return is;
 }
 
@@ -130,9 +130,9 @@ void CubeCollapse::apply() {
   }
   // What has changed is worth another look in the next round; points of other cubes are not ours to write.
   merge_vertices();
-  stir(collapse_.v);
+  mark_dirty(collapse_.v);
   for (const Collapse::NewFace& made : collapse_.made)
-    if (local_.vertices[made.others[0]].here) stir(made.others[0]);
+    if (local_.vertices[made.others[0]].here) mark_dirty(made.others[0]);
 }
 
 void CubeCollapse::merge_vertices() {

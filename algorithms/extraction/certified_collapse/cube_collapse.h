@@ -30,9 +30,9 @@ class CubeCollapse {
   WideQuadric quadric_about(std::uint32_t u, std::uint32_t v, const Eigen::Vector3d& anchor) const;
 
   float tolerance_at(std::uint32_t v) const { return mesh_.least_tolerance[local_.vertices[v].global]; }
-  bool is_stirred(std::uint32_t v) const { return mesh_.stirred[local_.vertices[v].global] != 0; }
+  bool is_dirty(std::uint32_t v) const { return mesh_.dirty[local_.vertices[v].global] != 0; }
   /// Has the edges at a vertex looked at in the next round: what failed there may succeed then.
-  void stir(std::uint32_t v) { mesh_.stirred_next[local_.vertices[v].global] = 1; }
+  void mark_dirty(std::uint32_t v) { mesh_.dirty_next[local_.vertices[v].global] = 1; }
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const { return file_.rounded(p); }
 
  private:

@@ -42,7 +42,7 @@ class EdgeCollapses {
         const std::uint32_t u = face.corners[i], v = face.corners[(i + 1) % 3];
         // Each edge between two own faces once. One at the border of these may be left out: both its ends have a face
         // that is not the cube's, and neither may move.
-        if (u < v && (collapses_.is_stirred(u) || collapses_.is_stirred(v))) propose(u, v);
+        if (u < v && (collapses_.is_dirty(u) || collapses_.is_dirty(v))) propose(u, v);
       }
     }
     for (std::size_t step = 0; !heap_.empty(); ++step) {

@@ -155,8 +155,8 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const F
   mesh.quadrics.resize(n);
   mesh.least_tolerance.resize(n);
   mesh.unmoved.resize(n);
-  mesh.stirred.resize(n);
-  mesh.stirred_next.resize(n);
+  mesh.dirty.resize(n);
+  mesh.dirty_next.resize(n);
   mesh.fine_triangle = merged.origin;
   mesh.first_sample.assign(merged.origin.size(), kNoSample);
   mesh.next_sample.assign(n, kNoSample);
@@ -165,7 +165,7 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const F
   });
   parallel_blocks(merged.leaders.size(), context, [&](std::size_t i) {
     const std::uint32_t p = merged.leaders[i], set = forest.set_of(p);
-    mesh.stirred[p] = 1;
+    mesh.dirty[p] = 1;
     mesh.points[p] = merged.mesh->points()[i];
     mesh.least_tolerance[p] = tolerance[p];
     if (set == MergeForest::kNone) {
@@ -200,8 +200,8 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMes
     for (const auto& joins : round.run(kind, file, context))
       for (const Join& join : joins) forest.join(join.going, join.node);
     forget_the_dead(mesh);
-    mesh.stirred.swap(mesh.stirred_next);
-    std::fill(mesh.stirred_next.begin(), mesh.stirred_next.end(), 0);
+    mesh.dirty.swap(mesh.dirty_next);
+    std::fill(mesh.dirty_next.begin(), mesh.dirty_next.end(), 0);
     // Then the limit of edges binds no more, and as the first cube begins 0.382 sides before the box, that cube has
     // held the whole mesh.
     if (kLongestEdge * side > largest) break;

@@ -37,7 +37,7 @@ struct DecimatedMesh {
   std::vector<std::uint32_t> next_sample;    ///< the next sample of the same list, or kNoSample
   /// Whether an edge at a point is worth another look in this round, and in the next. An edge that failed fails again,
   /// unless something near it has changed or it was a cube's border that forbade it.
-  std::vector<std::uint8_t> stirred, stirred_next;
+  std::vector<std::uint8_t> dirty, dirty_next;
 
   bool alive(std::size_t triangle) const { return triangles[triangle][0] != kNoTriangle; }
 };

@@ -12,7 +12,7 @@ namespace hermesh {
 
 /// A forest: a node is a set of two or more points, its children are the sets and single points that it is made of. The
 /// points that a mesh has are the greatest sets that merge, and those that are in none. A set that is split gives way to
-/// its children; so whatever was too bold is taken back right there, and at last one has the fine mesh again.
+/// its children; so whatever was unproven is taken back right there, and at last one has the fine mesh again.
 class MergeForest {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;

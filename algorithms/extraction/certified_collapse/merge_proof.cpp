@@ -37,7 +37,7 @@ constexpr std::size_t kFew = 512;
 constexpr int kPatience = 8;
 
 /// Splits sets of a forest until the merged mesh is proved. What was proved of a triangle is kept until a set near it
-/// is split. Sets are called bold from many threads, by bits that are only ever set, and split by one: so the outcome
+/// is split. Sets are called unproven from many threads, by bits that are only ever set, and split by one: so the outcome
 /// does not depend on threads.
 class MergeProof {
  public:
@@ -49,7 +49,7 @@ class MergeProof {
         tolerance_(tolerance),
         context_(context),
         proofs_(fine.triangles().size()),
-        bold_(forest.size()),
+        unproven_(forest.size()),
         overlays_([&fine] { return TriangleOverlay(fine.triangles().size()); }) {
     parallel_blocks(proofs_.size(), context_, [&](std::size_t i) {
       const auto t = static_cast<std::uint32_t>(i);
@@ -65,13 +65,13 @@ class MergeProof {
 
   /// Looks and splits until nothing fails; `geometry` asks for more than the topology. The tests that cost least come
   /// first, and the next ones once these have little left to say. The mesh returned has passed all tests in one round:
-  /// where none calls a set bold, none is left out.
+  /// where none calls a set unproven, none is left out.
   MergedMesh run(bool geometry) {
     do {
       look_at_topology();
       if (geometry) look_at_merged();
-      if (geometry && few_are_bold()) look_at_fine();
-      if (geometry && few_are_bold()) look_at_contacts();
+      if (geometry && few_are_unproven()) look_at_fine();
+      if (geometry && few_are_unproven()) look_at_contacts();
     } while (split());
     return std::move(merged_);
   }
@@ -117,9 +117,9 @@ class MergeProof {
     merged_.mesh.emplace(std::move(points), std::move(triangles));
   }
 
-  /// Calls one set at a fine triangle's corners bold: the one with the largest error, among the new ones if there are
+  /// Calls one set at a fine triangle's corners unproven: the one with the largest error, among the new ones if there are
   /// any, for without them the mesh is what was proved before.
-  void call_bold(std::uint32_t t) {
+  void call_unproven(std::uint32_t t) {
     std::array<std::uint32_t, 3> sets;
     int count = 0;
     bool any_new = false;
@@ -131,15 +131,15 @@ class MergeProof {
     std::uint32_t worst = kNone;
     for (int i = 0; i < count; ++i) {
       if (any_new && sets[i] < proved_) continue;
-      if (splits_ >= kPatience) std::atomic_ref(bold_[sets[i]]).store(1, std::memory_order_relaxed);
+      if (splits_ >= kPatience) std::atomic_ref(unproven_[sets[i]]).store(1, std::memory_order_relaxed);
       const float error = forest_.node(sets[i]).error, most = worst == kNone ? 0.0f : forest_.node(worst).error;
       // Ties by number; the first one if its error is no number. So there always is a worst set, and the proof goes on.
       if (worst == kNone || error > most || (error == most && sets[i] > worst)) worst = sets[i];
     }
-    if (worst != kNone) std::atomic_ref(bold_[worst]).store(1, std::memory_order_relaxed);
+    if (worst != kNone) std::atomic_ref(unproven_[worst]).store(1, std::memory_order_relaxed);
   }
 
-  /// Calls sets bold where an edge goes from one point to another twice. Every set is a disc: a block's by its Euler
+  /// Calls sets unproven where an edge goes from one point to another twice. Every set is a disc: a block's by its Euler
   /// characteristic, two that an edge joined by the link condition. Two sets share one piece of border at most if there
   /// is no such edge; then the merged mesh is a triangulation of the same surface. (Edges of the fine mesh itself may
   /// be those of several patches.)
@@ -153,8 +153,8 @@ class MergeProof {
         for (std::size_t j = i + 1; j < around.size(); ++j) {
           const std::uint32_t next = mesh.next(around[i], point);
           if (next != mesh.next(around[j], point) || (!is_set(point) && !is_set(next))) continue;
-          call_bold(merged_.origin[around[i]]);
-          call_bold(merged_.origin[around[j]]);
+          call_unproven(merged_.origin[around[i]]);
+          call_unproven(merged_.origin[around[j]]);
         }
     });
   }
@@ -180,7 +180,7 @@ class MergeProof {
                                      [&](std::uint32_t f) { return bound(f); }, covered))
         prove(t, kNear);
       else
-        call_bold(t);
+        call_unproven(t);
     });
   }
 
@@ -213,7 +213,7 @@ class MergeProof {
       // Not from a single point, which may be one of other patches too.
       int in_set = 0;
       while (forest_.set_of(fine_.triangles()[t][in_set]) == kNone) ++in_set;
-      if (points[in_set] == kNone) return call_bold(t);  // all that hangs together here has vanished
+      if (points[in_set] == kNone) return call_unproven(t);  // all that hangs together here has vanished
       // The proof is kept only if it rests on triangles that forget_covered() finds again when one of them changes.
       bool known = true;
       const double within = bound(t);
@@ -226,7 +226,7 @@ class MergeProof {
       };
       if (!DistanceCertificate(mesh, overlays_.local())
                .holds(fine_.corners(t), mesh.around(points[in_set]).front(), hear, [](std::uint32_t) {}))
-        call_bold(t);
+        call_unproven(t);
       else if (known)
         prove(t, touched ? kCovered : Proof(kCovered | kFar));
     });
@@ -257,36 +257,36 @@ class MergeProof {
         const bool asks = grid.level(u) > grid.level(t) ? is_new(t) || is_new(u) : !is_new(u) || t < u;
         if (u == t || !asks || !boxes[t].overlaps(boxes[u])) return;
         if (certainly_apart(mesh.triangles()[t], mesh.triangles()[u], mesh.points())) return;
-        call_bold(merged_.origin[t]);
-        call_bold(merged_.origin[u]);
+        call_unproven(merged_.origin[t]);
+        call_unproven(merged_.origin[u]);
       });
     });
-    // Those that did meet have a bold set, and lose the mark when it is split.
+    // Those that did meet have an unproven set, and lose the mark when it is split.
     for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
   }
 
   /// Whether so few sets are to be split that the other tests can be had in the same round, and not one after a split
   /// for every handful.
-  bool few_are_bold() const {
-    return kFew * static_cast<std::size_t>(std::ranges::count(bold_, 1)) <= merged_.origin.size();
+  bool few_are_unproven() const {
+    return kFew * static_cast<std::size_t>(std::ranges::count(unproven_, 1)) <= merged_.origin.size();
   }
 
-  std::vector<std::uint32_t> bold_sets() const {
+  std::vector<std::uint32_t> unproven_sets() const {
     std::vector<std::uint32_t> sets;
-    for (std::uint32_t s = 0; s < bold_.size(); ++s)
-      if (bold_[s]) sets.push_back(s);
+    for (std::uint32_t s = 0; s < unproven_.size(); ++s)
+      if (unproven_[s]) sets.push_back(s);
     return sets;
   }
 
-  /// Splits the bold sets and makes the mesh anew; false if there is nothing to split. A merged triangle stays when its
+  /// Splits the unproven sets and makes the mesh anew; false if there is nothing to split. A merged triangle stays when its
   /// sets become smaller, and others come anew.
   bool split() {
-    const std::vector<std::uint32_t> sets = bold_sets();
+    const std::vector<std::uint32_t> sets = unproven_sets();
     if (sets.empty()) return false;
     ++splits_;
     std::vector<std::uint32_t> changed;
     for (const std::uint32_t set : sets) {
-      bold_[set] = 0;
+      unproven_[set] = 0;
       forest_.split(set);
       const auto members = forest_.members(set);
       changed.insert(changed.end(), members.begin(), members.end());
@@ -348,7 +348,7 @@ class MergeProof {
   const std::span<const float> tolerance_;
   RunContext& context_;
   std::vector<std::uint8_t> proofs_;
-  std::vector<std::uint8_t> bold_;   ///< sets to be split
+  std::vector<std::uint8_t> unproven_;   ///< sets to be split
   std::vector<std::uint32_t> open_;  ///< fine triangles that are not proved to be covered
   int splits_ = 0;
   MergedMesh merged_;

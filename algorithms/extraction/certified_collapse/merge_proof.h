@@ -1,4 +1,4 @@
-// What is too bold among the merges of a forest is taken back, until the rest is proved.
+// What is unproven among the merges of a forest is taken back, until the rest is proved.
 #pragma once
 
 #include <optional>

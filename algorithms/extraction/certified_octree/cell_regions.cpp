@@ -15,10 +15,9 @@ using Eigen::Vector3d;
 BlockMask moved_up(const BlockMask& mask, const BlockMask& below, int axis) {
   BlockMask result;
   for (std::size_t x = 0; x < 8; ++x) {
-    constexpr std::uint64_t kLast = 0x8080808080808080u;
     result[x] = axis == 0   ? (x == 0 ? below[7] : mask[x - 1])
                 : axis == 1 ? (mask[x] << 8 | below[x] >> 56)
-                            : ((mask[x] & ~kLast) << 1 | (below[x] & kLast) >> 7);
+                            : ((mask[x] & ~kLastZ) << 1 | (below[x] & kLastZ) >> 7);
   }
   return result;
 }

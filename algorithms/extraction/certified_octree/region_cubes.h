@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
 
 namespace hermesh {
 

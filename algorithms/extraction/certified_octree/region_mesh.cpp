@@ -394,8 +394,8 @@ template <class Connect>
 RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
                  RunContext& context) {
   RegionPolygons merged(regions, points, context);
-  const auto call_bold = [&](const std::vector<CellBlocks::Edge>& meeting) {
-    for (const CellBlocks::Edge& edge : meeting) proof.call_bold(edge);
+  const auto call_unproven = [&](const std::vector<CellBlocks::Edge>& meeting) {
+    for (const CellBlocks::Edge& edge : meeting) proof.call_unproven(edge);
     return !meeting.empty();
   };
   // What each turn finds it splits, so there are at most as many turns as cubes. Distances are proved first;
@@ -405,9 +405,9 @@ RegionMesh merge(const CellRegions& regions, const UniformPoints& points, Region
     splits += proof.run();
     const LargeArray<BlockMask> changed = proof.take_changed();
     merged.update(changed, context);
-    if (call_bold(merged.loose_that_meet(changed, context))) continue;
+    if (call_unproven(merged.loose_that_meet(changed, context))) continue;
     const auto& fine = connect(merged.lone_edges());
-    if (call_bold(merged.loose_that_meet(fine, context))) continue;
+    if (call_unproven(merged.loose_that_meet(fine, context))) continue;
     context.figure("split_regions", double(splits));
     context.figure("loose_polygons", double(merged.loose_count()));
     return merged.take_mesh(fine, context);

@@ -13,6 +13,7 @@
 #include "algorithms/extraction/certified_octree/region_proof.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {

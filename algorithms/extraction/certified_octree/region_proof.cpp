@@ -50,11 +50,11 @@ RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionS
       shell_(shell),
       uniform_(uniform),
       context_(context),
-      bold_(cells_.size()),
-      any_bold_(cells_.size()),
+      unproven_(cells_.size()),
+      any_unproven_(cells_.size()),
       changed_(filled(cells_.size(), kAll, context)),
-      fresh_(filled(cells_.size(), kAll, context)),
-      stirred_(filled(cells_.size(), kAll, context)),
+      split_cells_(filled(cells_.size(), kAll, context)),
+      dirty_(filled(cells_.size(), kAll, context)),
       open_(shell ? cells_.size() : 0),
       loose_(slabs ? cells_.size() : 0) {
   // Nothing is looked at then, so no turns are needed.
@@ -69,7 +69,7 @@ RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionS
 
 std::size_t RegionProof::run() {
   Stage stage(context_, "prove regions");
-  std::size_t splits = std::exchange(is_fresh_, false) ? 0 : split();  // what was called bold meanwhile
+  std::size_t splits = std::exchange(is_new_, false) ? 0 : split();  // what was called unproven meanwhile
   // Each round splits a cube at least, until no polygon fails; at worst all cells are alone and T is S.
   for (;;) {
     // Cells that are alone have points in polygons of T; they are made as cubes fall apart.
@@ -92,7 +92,7 @@ void RegionProof::place_lone_points() {
   LargeArray<BlockMask> alone(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     // Elsewhere no cell has become alone since the last time.
-    alone[b] = any(fresh_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
+    alone[b] = any(split_cells_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
   });
   uniform_->place(alone, context_);
 }
@@ -100,9 +100,9 @@ void RegionProof::place_lone_points() {
 /// Calls f(cube) for the cubes of a block that may have new polygons.
 template <class F>
 void RegionProof::for_each_touched(std::size_t b, F&& f) const {
-  if (!any(stirred_[b])) return;
+  if (!any(dirty_[b])) return;
   regions_.for_each_cube(static_cast<std::int32_t>(b), [&](const Region& cube) {
-    if (overlap(stirred_[b], cube)) f(cube);
+    if (overlap(dirty_[b], cube)) f(cube);
   });
 }
 
@@ -112,7 +112,7 @@ void RegionProof::begin_slabs() {
   slabs_->make_room();
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     for_each_touched(b, [&](const Region& cube) {
-      if (overlap(fresh_[b], cube)) slabs_->begin(cube);
+      if (overlap(split_cells_[b], cube)) slabs_->begin(cube);
     });
   });
 }
@@ -128,20 +128,20 @@ void RegionProof::look_at_polygons() {
 /// cubes.
 void RegionProof::look_at_polygons(std::size_t b) {
   const auto block = static_cast<std::int32_t>(b);
-  const bool is_stirred = any(stirred_[b]);
+  const bool is_dirty = any(dirty_[b]);
   const bool may_touch = slabs_ && (any(loose_[b][0]) || any(loose_[b][1]) || any(loose_[b][2])) &&
                          std::ranges::any_of(cells_.source(block).neighbours, [&](std::int32_t there) {
-                           return there >= 0 && any(fresh_[static_cast<std::size_t>(there)]);
+                           return there >= 0 && any(split_cells_[static_cast<std::size_t>(there)]);
                          });
   const bool is_open = shell_ && (any(open_[b][0]) || any(open_[b][1]) || any(open_[b][2]));
-  if (!is_stirred && !may_touch && !is_open) return;
+  if (!is_dirty && !may_touch && !is_open) return;
   const std::array<BlockMask, 3> edges = regions_.merged_edges(block);
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     BlockMask looked_at;
     for (std::size_t word = 0; word < 8; ++word) {
       // With slabs a polygon is never open: it is the cubes that are asked, once all polygons are in.
-      looked_at[word] = edges[a][word] & (stirred_[b][word] | (shell_ ? open_[b][a][word] : 0));
+      looked_at[word] = edges[a][word] & (dirty_[b][word] | (shell_ ? open_[b][a][word] : 0));
       if (slabs_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
     }
     // A loose polygon may reach into any cube near it, so it is added again where new ones have been begun; to
@@ -161,7 +161,7 @@ void RegionProof::look_at_polygons(std::size_t b) {
       // A polygon of a cube that is split anyway is gone in the next round, and stays open. Slabs want all
       // polygons, and in any order.
       if (shell_ && std::any_of(ring.regions.begin(), ring.regions.begin() + ring.corners,
-                                [&](const Region& region) { return region.merged() && is_bold(region); }))
+                                [&](const Region& region) { return region.merged() && is_unproven(region); }))
         return set(open_[b][a]);
       const RegionPolygon polygon = polygon_of(regions_, edge, ring);
       if (slabs_) {
@@ -170,7 +170,7 @@ void RegionProof::look_at_polygons(std::size_t b) {
       }
       // Kept to its envelope, a polygon needs nothing with slabs but that its cubes' slabs hold.
       if (shell_ ? shell_->holds(polygon) : !polygon.loose || slabs_->holds(polygon)) return;
-      call_bold(ring.largest());
+      call_unproven(ring.largest());
       if (shell_) set(open_[b][a]);
     });
   }
@@ -180,43 +180,43 @@ void RegionProof::look_at_polygons(std::size_t b) {
 void RegionProof::look_at_slabs() {
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     for_each_touched(b, [&](const Region& cube) {
-      if (!slabs_->holds(cube)) call_bold(cube);
+      if (!slabs_->holds(cube)) call_unproven(cube);
     });
   });
 }
 
-void RegionProof::call_bold(const CellBlocks::Edge& edge) { call_bold(ring_of(regions_, edge).largest()); }
+void RegionProof::call_unproven(const CellBlocks::Edge& edge) { call_unproven(ring_of(regions_, edge).largest()); }
 
-void RegionProof::call_bold(const Region& cube) {
+void RegionProof::call_unproven(const Region& cube) {
   // Bits that are only ever set while others look; split() reads them when all are done.
-  std::atomic_ref(any_bold_[static_cast<std::size_t>(cube.block)]).store(1, std::memory_order_relaxed);
-  std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
+  std::atomic_ref(any_unproven_[static_cast<std::size_t>(cube.block)]).store(1, std::memory_order_relaxed);
+  std::atomic_ref(unproven_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
       .fetch_or(std::uint64_t{1} << cube_of(cube.cell, cube.level), std::memory_order_relaxed);
 }
 
-bool RegionProof::is_bold(const Region& cube) {
-  const auto bits = std::atomic_ref(bold_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
+bool RegionProof::is_unproven(const Region& cube) {
+  const auto bits = std::atomic_ref(unproven_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
                         .load(std::memory_order_relaxed);
   return (bits >> cube_of(cube.cell, cube.level)) & 1;
 }
 
-/// Splits the cubes that were called bold, proposes smaller ones in their place, and marks what has changed.
+/// Splits the cubes that were called unproven, proposes smaller ones in their place, and marks what has changed.
 /// Returns how many cubes were split.
 std::size_t RegionProof::split() {
   std::vector<std::uint32_t> splits(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-    fresh_[b] = {};
-    if (!std::exchange(any_bold_[b], 0)) return;
+    split_cells_[b] = {};
+    if (!std::exchange(any_unproven_[b], 0)) return;
     const auto block = static_cast<std::int32_t>(b);
     std::vector<Region>& here = split_.local();
     here.clear();
     regions_.for_each_cube(block, [&](const Region& cube) {
-      if (is_bold(cube)) here.push_back(cube);
+      if (is_unproven(cube)) here.push_back(cube);
     });
-    bold_[b] = {};
+    unproven_[b] = {};
     for (const Region& cube : here) {
       regions_.split(cube);
-      add(fresh_[b], cube);
+      add(split_cells_[b], cube);
     }
     splits[b] = static_cast<std::uint32_t>(here.size());
   });
@@ -226,18 +226,18 @@ std::size_t RegionProof::split() {
   regions_.propose_parts(context_);
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     const auto& neighbours = cells_.source(static_cast<std::int32_t>(b)).neighbours;
-    stirred_[b] = {};
+    dirty_[b] = {};
     if (std::ranges::none_of(neighbours, [&](std::int32_t there) {
           return there >= 0 && splits[static_cast<std::size_t>(there)] > 0;
         }))
       return;
     // A polygon has changed if a region around its edge has: its edge starts in one of the split cubes or
     // next to it.
-    stirred_[b] = widened<1>([&](int x, int y, int z) -> const BlockMask* {
+    dirty_[b] = widened<1>([&](int x, int y, int z) -> const BlockMask* {
       const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(x, y, z))];
-      return there < 0 ? nullptr : &fresh_[static_cast<std::size_t>(there)];
+      return there < 0 ? nullptr : &split_cells_[static_cast<std::size_t>(there)];
     });
-    for (std::size_t word = 0; word < 8; ++word) changed_[b][word] |= stirred_[b][word];
+    for (std::size_t word = 0; word < 8; ++word) changed_[b][word] |= dirty_[b][word];
   });
   return all;
 }

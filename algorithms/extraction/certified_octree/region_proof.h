@@ -65,7 +65,7 @@ class RegionProof {
   LargeArray<BlockMask> take_changed();
 
   /// Has the largest cube around the edge split when run() is called again.
-  void call_bold(const CellBlocks::Edge& edge);
+  void call_unproven(const CellBlocks::Edge& edge);
 
  private:
   RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionShell* shell, UniformCells* uniform,
@@ -78,8 +78,8 @@ class RegionProof {
   void look_at_slabs();
   std::size_t split();
 
-  void call_bold(const Region& region);
-  bool is_bold(const Region& region);
+  void call_unproven(const Region& region);
+  bool is_unproven(const Region& region);
   template <class F>
   void for_each_touched(std::size_t block, F&& f) const;
 
@@ -91,13 +91,13 @@ class RegionProof {
   UniformCells* const uniform_;
   RunContext& context_;
   std::vector<std::array<std::uint64_t, CellRegions::kLevels>>
-      bold_;                            ///< cubes to be split, for each block at level − 1
-  std::vector<std::uint8_t> any_bold_;  ///< 1 for blocks that have one of these
-  LargeArray<BlockMask> changed_;       ///< cells stirred since take_changed()
+      unproven_;                            ///< cubes to be split, for each block at level − 1
+  std::vector<std::uint8_t> any_unproven_;  ///< 1 for blocks that have one of these
+  LargeArray<BlockMask> changed_;       ///< cells dirty since take_changed()
   // Cells of each block:
-  LargeArray<BlockMask> fresh_;     ///< cells of cubes that were split last (all at the beginning)
-  LargeArray<BlockMask> stirred_;   ///< fresh cells and those next to one
-  bool is_fresh_ = true;            ///< nothing was looked at yet
+  LargeArray<BlockMask> split_cells_;     ///< cells of cubes that were split last (all at the beginning)
+  LargeArray<BlockMask> dirty_;   ///< split cells and those next to one
+  bool is_new_ = true;            ///< nothing was looked at yet
   std::vector<std::array<BlockMask, 3>>
       open_;  ///< edges whose polygons are not shown, for each block and axis; with a shell
   std::vector<std::array<BlockMask, 3>> loose_;  ///< edges of loose polygons, likewise; with slabs

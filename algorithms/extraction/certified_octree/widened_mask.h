@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
 
 namespace hermesh {
 

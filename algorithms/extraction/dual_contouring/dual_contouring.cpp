@@ -40,6 +40,8 @@ class Contourer {
       : grid_(grid), options_(options), outputs_(grid.blocks().size()) {}
 
   PolygonMesh run(RunContext& context) {
+    // Count, scan, fill (core/parallel.h): in each pass a block writes its own entries and reads others' of passes
+    // before. So the mesh is the same for any number of threads.
     const std::size_t blocks = outputs_.size();
     std::vector<std::uint64_t> points(blocks), quads(blocks);
     PolygonMesh mesh;
@@ -54,6 +56,7 @@ class Contourer {
     }
     mesh.points.resize(exclusive_scan(points, "points"));
     mesh.quads.resize(exclusive_scan(quads, "quads"));
+    // Places are kept in voxels and double precision beside the mesh's points, for the choice of diagonals.
     positions_.resize(mesh.points.size());
     for (std::size_t b = 0; b < blocks; ++b) {
       outputs_[b].first_point = static_cast<std::uint32_t>(points[b]);
@@ -75,6 +78,7 @@ class Contourer {
     int sample;
   };
   Location locate(std::int32_t block, int x, int y, int z) const {
+    // Coordinates from −8 to 15: arithmetic shifts make −1, 0 or 1 of them.
     const std::int32_t there = grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
     return {there, sample_index(x & 7, y & 7, z & 7)};
   }
@@ -87,6 +91,8 @@ class Contourer {
     for (int axis = 0; axis < 3; ++axis)
       for (int step = 0; step < 4; ++step) {
         int d[3] = {0, 0, 0};
+        // The four edges of a cell along an axis start at its corners of the face across that axis: masks of edges,
+        // shifted back to the cell's first corner.
         d[(axis + 1) % 3] = step & 1;
         d[(axis + 2) % 3] = step >> 1;
         const BlockMask shifted =
@@ -105,6 +111,7 @@ class Contourer {
   }
 
   Qef gather(std::int32_t b, const int (&cell)[3], const Eigen::Vector3d& corner) const {
+    // About the cell's centre, from which no crossing is farther than the corners are.
     Qef qef(corner + Eigen::Vector3d::Constant(0.5));
     for (int axis = 0; axis < 3; ++axis)
       for (int step = 0; step < 4; ++step) {
@@ -112,6 +119,7 @@ class Contourer {
         d[(axis + 1) % 3] = step & 1;
         d[(axis + 2) % 3] = step >> 1;
         const Location at = locate(b, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
+        // Where there is no block no edge is crossed.
         if (at.block < 0) continue;
         if (!test(grid_.blocks()[at.block].crossing[axis], at.sample)) continue;
         const EdgeCrossing crossing = grid_.crossing(at.block, at.sample, axis);
@@ -136,6 +144,7 @@ class Contourer {
       positions_[point] = options_.placement == DualContouringOptions::Placement::average
                               ? qef.mass_point()
                               : place_optimally(qef, corner, options_);
+      // Rounded once, at the end: up to here everything is relative to the placement's base.
       mesh.points[point] = placement.local(positions_[point]).cast<float>();
     });
   }
@@ -156,11 +165,14 @@ class Contourer {
           cell[u] += kAround[i][0];
           cell[v] += kAround[i][1];
           const Location there = locate(b, cell[0], cell[1], cell[2]);
+          // Around a crossing edge all cells are active, and the view has a block for each active cell.
           quad[i] = outputs_[there.block].point_in(there.sample);
         }
         Eigen::Vector3d hit;
         for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
         hit[axis] += grid_.crossing(b, sample, axis).offset;
+        // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there. Where the
+        // sample before the crossing is inside, the outside lies along the axis; a map that mirrors turns that about.
         if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
         if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
         *next++ = quad;
@@ -169,6 +181,7 @@ class Contourer {
 
   /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.
   double height(const Quad& quad, std::array<int, 3> corners, const Eigen::Vector3d& hit, int axis) const {
+    // Relative to the crossing: a height of 0 means that the surface passes through it.
     const Eigen::Vector3d a = positions_[quad[corners[0]]] - hit;
     const Eigen::Vector3d normal =
         (positions_[quad[corners[1]]] - hit - a).cross(positions_[quad[corners[2]]] - hit - a);
@@ -183,10 +196,12 @@ class Contourer {
       const Eigen::Vector3d a = positions_[quad[i]] - hit, c = positions_[quad[j]] - hit;
       return a[u] * c[v] - a[v] * c[u] > 0;
     };
+    // The grid edge's line passes through one of the diagonal's two triangles, which the side of the diagonal tells.
     const double first = height(quad, left_of(0, 2) ? std::array{0, 2, 3} : std::array{0, 1, 2}, hit, axis);
     const double second = height(quad, left_of(1, 3) ? std::array{1, 3, 0} : std::array{1, 2, 3}, hit, axis);
     constexpr double kAlike = 1e-3;  // voxels
     const double difference = std::abs(first) - std::abs(second);
+    // A height that is no number compares as false, and leaves the choice to the lengths.
     if (std::abs(difference) > kAlike) return difference > 0;
     const double d02 = (positions_[quad[0]] - positions_[quad[2]]).squaredNorm();
     const double d13 = (positions_[quad[1]] - positions_[quad[3]]).squaredNorm();
@@ -204,6 +219,8 @@ class Contourer {
 Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options) {
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
   const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
+  // Within the cell first. Only where that place is far off the planes (a sum over them, so that the threshold is one,
+  // too), the free minimiser is looked at, and taken if it lies within reach.
   const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options.truncation);
   if (options.reach <= 0 || qef.error(held) <= kWorthLeaving * kWorthLeaving * qef.planes()) return held;
   const Eigen::Vector3d free = qef.minimiser(options.truncation);
@@ -231,6 +248,8 @@ DualContouringOptions read_dual_contouring_options(const Options& given) {
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
   const DualContouringOptions options = read_dual_contouring_options(input.options);
+  // Crossings that nobody else wants are best found a leaf at a time and not kept. The polygons
+  // are the same but for rounding.
   if (from_level_set_alone(input) && can_contour_level_set(options))
     return contour_level_set(input.level_set, input.isovalue, options, input.context);
   const bool needs_normals = options.placement == DualContouringOptions::Placement::optimal;

@@ -29,16 +29,17 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
 
 class Qef;  // qef.h
 
-/// Optimal placement of the cell with its first corner there; in voxels.
+/// The place that optimal placement gives the point of the cell with its first corner at `corner`, in the frame of
+/// `qef` (voxels): its minimiser, within the cell or up to `reach` outside.
 Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options);
 
 /// Reads options that were checked against dual_contouring_options().
 DualContouringOptions read_dual_contouring_options(const Options& options);
-/// Reads all of them but `reach`, for an extractor whose table has none.
+/// Reads all options of dual_contouring_options() but `reach`, for an extractor whose table has none.
 DualContouringOptions read_placement_options(const Options& options);
 
-/// The table's entry: samples the Hermite data first, from the level set or, where asked, from the source
-/// polygons.
+/// Dual contouring as the table of variants calls it: samples the Hermite data first, from the level set or, where
+/// asked, from the source polygons. @throws Error as hermite_input() does; Cancelled.
 PolygonMesh dual_contouring(const ExtractionInput& input);
 std::vector<OptionSpec> dual_contouring_options();
 

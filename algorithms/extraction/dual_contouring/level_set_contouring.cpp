@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "algorithms/core/large_array.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
@@ -25,7 +26,6 @@ using leaf_kernels::LeafCells;
 using leaf_kernels::UpperSigns;
 using openvdb::Coord;
 
-constexpr std::uint64_t kLastY = std::uint64_t{0xff} << 56, kLastZ = 0x8080808080808080u;
 
 /// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more than filling it.
 template <class T>
@@ -39,7 +39,7 @@ void reserve_huge(std::vector<T>& array, std::size_t n) {
 #endif
 }
 
-/// Cells that the vector code leaves over, in the way of the general contouring.
+/// Places the cells that the vector code leaves over, in the way of the general contouring.
 class Plain final : public leaf_kernels::PlainCode {
  public:
   explicit Plain(const DualContouringOptions& options) : options_(options) {}
@@ -48,6 +48,7 @@ class Plain final : public leaf_kernels::PlainCode {
     Qef qef(Eigen::Vector3d::Zero());
     for (int i = 0; i < count; ++i)
       qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(), Eigen::Vector3f(planes[i].normal).cast<double>());
+    // Planes are relative to the cell's centre, so that its first corner is at −½.
     const Eigen::Vector3d found = place_optimally(qef, Eigen::Vector3d::Constant(-0.5), options_);
     for (int k = 0; k < 3; ++k) place[k] = static_cast<float>(found[k]);
   }
@@ -81,9 +82,11 @@ class LevelSetContourer {
       const leaf_kernels::LowerNeeds needs = kernels_.count(upper_signs(upper_[leaf]), cells_[leaf]);
       points[leaf] = cells_[leaf].points;
       quads[leaf] = cells_[leaf].quads;
+      // Slot 7 is a step down along all axes; a cell around an edge lies down along two at most.
       for (int slot = 1; slot < 7; ++slot) {
         const int dx = slot & 1, dy = slot >> 1 & 1, dz = slot >> 2;
         if (!(needs >> slot & 1) || table_.neighbour(leaf, -dx, -dy, -dz) >= 0) continue;
+        // The order of this list depends on the threads, but not the tree that has its leaves.
         const std::scoped_lock hold(lock);
         missing.push_back(table_.lower(leaf).offsetBy(-8 * dx, -8 * dy, -8 * dz));
       }
@@ -91,6 +94,7 @@ class LevelSetContourer {
     points_ = exclusive_scan(points, "points");
     quads_ = exclusive_scan(quads, "quads");
     for (std::size_t leaf = 0; leaf < table_.size(); ++leaf) {
+      // The passes to come look at leaves with work alone.
       if (cells_[leaf].points == 0 && cells_[leaf].quads == 0) continue;
       cells_[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
       cells_[leaf].first_quad = static_cast<std::uint32_t>(quads[leaf]);
@@ -111,6 +115,7 @@ class LevelSetContourer {
       place_all({mesh.points.data()->data(), offsets.data()});
     }
     const Stage stage(context_, "connect");
+    // All points are there: a leaf reads those of its lower neighbours' cells and writes its own quads.
     const bool mirrors = placement_.mirrors();
     const Eigen::Matrix3d to_voxels = placement_.linear.inverse();
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
@@ -128,6 +133,7 @@ class LevelSetContourer {
       }
       const Neighbours lower = table_.neighbours(live_[i], -1);
       for (int slot = 0; slot < 8; ++slot)
+        // A tile below has no cells, and none that is needed: contour_level_set() has made leaves of all that had some.
         input.cells[slot] = lower[slot] >= 0 ? &cells_[static_cast<std::size_t>(lower[slot])] : nullptr;
       kernels_.connect(input, mesh.quads[cells.first_quad].data());
     });
@@ -179,13 +185,14 @@ class LevelSetContourer {
       if (slot & ~touched) continue;
       const int dx = slot & 1, dy = slot >> 1 & 1, dz = static_cast<int>(slot >> 2);
       const std::int32_t there = upper_[leaf][slot];
+      // A tile is spread out as the samples of a leaf, so that the kernels need not tell the two apart.
       if (there < 0) tiles[slot].fill(table_.tree().getValue(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)));
       input.values[neighbour_slot(dx, dy, dz)] =
           there >= 0 ? table_.values(there) : tiles[slot].data();
     }
   }
 
-  /// @param output of the first leaf
+  /// Places the points of all leaves; `output` is where those of the first leaf go.
   void place_all(const leaf_kernels::PlaceOutput& output) {
     const Plain plain(options_);
     leaf_kernels::PlaceRules rules{};
@@ -194,9 +201,12 @@ class LevelSetContourer {
     rules.truncation = static_cast<float>(options_.truncation);
     rules.reach = static_cast<float>(options_.reach);
     rules.plain = &plain;
+    // Which cells share a vector depends on the threads. That changes no byte, because
+    // lanes know nothing of each other.
     tbb::enumerable_thread_specific<std::unique_ptr<leaf_kernels::LaterCells>> later_cells(
         [] { return std::make_unique_for_overwrite<leaf_kernels::LaterCells>(); });
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
+      // The next leaf but one is mostly this thread's, because threads take leaves in runs.
       if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
       leaf_kernels::LaterCells& later = *later_cells.local();
       place(live_[i], rules, output, later);
@@ -222,6 +232,7 @@ class LevelSetContourer {
     input.scale = table_.rule().scale;
     const Eigen::Vector3d corner = corner_of(leaf);
     for (int axis = 0; axis < 3; ++axis) input.corner[axis] = corner[axis];
+    // The ranges of this leaf, which no other one writes.
     output.points += 3 * std::size_t{cells.first_point};
     output.offsets += cells.first_quad;
     if (optimal)
@@ -236,8 +247,8 @@ class LevelSetContourer {
   const DualContouringOptions& options_;
   RunContext& context_;
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
-  LargeArray<LeafCells> cells_;      ///< by leaf
-  LargeArray<Neighbours> upper_;     ///< by leaf: saved, for each pass over the leaves needs them
+  LargeArray<LeafCells> cells_;      ///< active cells of each leaf, and their numbers
+  LargeArray<Neighbours> upper_;     ///< upper neighbours of each leaf, kept because every pass needs them
   std::vector<std::uint32_t> live_;  ///< leaves with points or quads
   std::uint64_t points_ = 0, quads_ = 0;
 };

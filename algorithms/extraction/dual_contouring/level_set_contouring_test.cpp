@@ -115,9 +115,9 @@ class Correspondence {
   std::vector<std::pair<std::size_t, int>> cells_;  ///< block and cell of each point
 };
 
-/// The same quads around the same cells, but for a share of diagonals; points within 0.002 voxel. Where a place is the
-/// best of several within rounding, the other way may take another: then both must fit the planes equally well, but for a
-/// share of cells at the threshold to being let out.
+/// Expects both ways to give the same quads around the same cells, but for a share of diagonals; points within 0.002
+/// voxel. Where a place is the best of several within rounding, the other way may take another: then both must fit the
+/// planes equally well, but for a share of cells at the threshold to being let out.
 void expect_same_polygons(const LevelSet& volume, double isovalue, Placement placement, std::size_t at_least,
                           double share) {
   SCOPED_TRACE(placement == Placement::average ? "average" : "optimal");

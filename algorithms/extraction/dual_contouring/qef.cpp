@@ -6,6 +6,7 @@
 namespace hermesh {
 
 void Qef::add_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& unit_normal) {
+  // All sums are about the anchor, near which the planes are, so that no digits are lost far from the origin.
   const Eigen::Vector3d local = point - anchor_;
   const double distance = unit_normal.dot(local);
   ata_ += unit_normal * unit_normal.transpose();
@@ -17,12 +18,13 @@ void Qef::add_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& unit_no
 
 double Qef::error(const Eigen::Vector3d& x) const {
   const Eigen::Vector3d local = x - anchor_;
+  // Expanded, the sum of squares may come out below 0 by rounding.
   return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
 }
 
-/// Where the planes are nearly parallel, as in most cells, two singular values are dropped for certain, and the third one's
-/// vector is found by a few products: whatever a start along the largest column has of the others shrinks by
-/// truncation² / 2 in each.
+/// True where the planes are nearly parallel, as in most cells, so that two singular values are dropped for certain.
+/// Then `axis` is the vector of the third one and `value` its square, found by a few products: whatever a start along
+/// the largest column has of the others shrinks by truncation² / 2 in each.
 bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const {
   int largest = 0;
   ata_.diagonal().maxCoeff(&largest);
@@ -34,12 +36,15 @@ bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const
   }
   axis.normalize();
   value = axis.dot(ata_ * axis);
+  // The trace is the sum of the eigenvalues, and `value` no greater than the largest: what
+  // is left bounds the other two.
   return ata_.trace() - value < 0.5 * truncation * truncation * value;
 }
 
 Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncation) const {
   Eigen::Vector3d axis;
   double value;
+  // A step along the one axis that is kept; across it the start stays where it is.
   if (is_flat(truncation, axis, value)) return start + axis.dot(atb_ - ata_ * (start - anchor_)) / value * axis;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
   const Eigen::Vector3d& values = solver.eigenvalues();  // squares of the singular values of A, ascending
@@ -59,6 +64,7 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved
   // for.
   const Eigen::Vector3d low = lower - anchor_, high = upper - anchor_;
+  // Free coordinates start at the mass point, moved into the box. It also is the answer where no choice is better.
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
   double best_error = error(anchor_ + mass);
@@ -87,6 +93,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
         for (int i = 0; i < count; ++i) x[axes[i]] += along * solver.eigenvectors()(i, k);
       }
     }
+    // A minimum outside of the box is passed over: the box's own then lies on one more
+    // side, which another choice holds.
     if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) continue;
     const double candidate = error(anchor_ + x);
     if (candidate < best_error) best = x, best_error = candidate;

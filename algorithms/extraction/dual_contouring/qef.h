@@ -6,7 +6,7 @@
 namespace hermesh {
 
 /// Sum of squared distances to tangent planes, E(x) = Σ (nᵢ·(x − pᵢ))² (eq. 6.1), gathered about an anchor so
-/// that small differences of large coordinates never arise. Any length unit; here voxels.
+/// that small differences of large coordinates never arise. It takes any unit of length; here voxels.
 class Qef {
  public:
   /// `anchor` is a point near the cell; plane points are given in the same frame.
@@ -24,7 +24,7 @@ class Qef {
   /// The minimiser nearest to `start` instead: where the error has a line or a plane of minima, another of them.
   Eigen::Vector3d minimiser_near(const Eigen::Vector3d& start, double truncation) const;
 
-  /// Minimiser within the box; the same as minimiser() where that lies inside. Each face, edge and corner of
+  /// Minimiser within the box, which is minimiser() where that lies inside. Each face, edge and corner of
   /// the box is tried in turn for the smallest error, with the same truncation in the remaining directions.
   Eigen::Vector3d minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                                    double truncation) const;

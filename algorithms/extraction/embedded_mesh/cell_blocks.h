@@ -19,6 +19,7 @@
 #include "algorithms/extraction/embedded_mesh/by_block.h"
 #include "algorithms/extraction/embedded_mesh/cell_sheets.h"
 #include "algorithms/hermite/hermite_view.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

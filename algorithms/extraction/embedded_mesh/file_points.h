@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 

@@ -104,7 +104,7 @@ class Star {
 }  // namespace
 
 void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
-                 const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
+                 const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
                  UniformPoints& points, RunContext& context) {
   Stage stage(context, "move points");
   const PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
@@ -113,20 +113,20 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells.size(), context, [&](std::size_t b) {
-        if (wishes[b].empty()) return;
+        if (targets[b].empty()) return;
         const auto block = static_cast<std::int32_t>(b);
         const auto& lower = cells.grid().blocks()[b].lower;
         if (((lower[0] >> 3 & 1) | (lower[1] >> 3 & 1) << 1 | (lower[2] >> 3 & 1) << 2) != parity) return;
         Star star(cells, mesh, points);
-        for (const PointWish& wish : wishes[b]) {
-          const Vector3d from = points[cells.point(block, wish.cell, 0)];
-          if ((wish.place - from).norm() < kFulfilled || polygons.is_crowded({block, wish.cell})) continue;
-          star.gather(block, wish.cell, {wish.place, wish.nearer});
-          const Vector3d between = 0.5 * (wish.place + wish.nearer), halfway = 0.5 * (from + wish.nearer);
-          // From the best place to the least move: the wish, half way from it to the nearer place, that, and the way
+        for (const PointTarget& target : targets[b]) {
+          const Vector3d from = points[cells.point(block, target.cell, 0)];
+          if ((target.place - from).norm() < kFulfilled || polygons.is_crowded({block, target.cell})) continue;
+          star.gather(block, target.cell, {target.place, target.nearer});
+          const Vector3d between = 0.5 * (target.place + target.nearer), halfway = 0.5 * (from + target.nearer);
+          // From the best place to the least move: the target, half way from it to the nearer place, that, and the way
           // there by halves.
           for (const Vector3d& place :
-               {wish.place, between, wish.nearer, halfway, Vector3d(0.5 * (from + halfway))}) {
+               {target.place, between, target.nearer, halfway, Vector3d(0.5 * (from + halfway))}) {
             if ((place - from).norm() < kFulfilled) break;
             if (star.moves_to(file.rounded(place))) break;
           }

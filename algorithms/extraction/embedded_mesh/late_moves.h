@@ -14,19 +14,19 @@ namespace hermesh {
 
 /// Where the point of a cell of one sheet, or of a joint, would rather be, outside of its cell; index space relative to
 /// the placement's base.
-struct PointWish {
+struct PointTarget {
   int cell;
   Eigen::Vector3d place;
   Eigen::Vector3d nearer;  ///< as near to the planes, but nearer to where the point is within its cell
 };
 
-/// Moves points to the places wished for, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but
+/// Moves points to the places aimed at, or part of the way. The rule of tetrahedra suffices for an embedded mesh, but
 /// is not necessary: here a point moves if its polygons as they would be meet no other polygon nearby and not one
-/// another (triangle_contact.h), so a mesh free of self-intersection stays so. `wishes` are by block; places that are
-/// fulfilled already, and wishes in crowded cells (EdgePolygons::is_crowded()), are passed over. The result is the same
+/// another (triangle_contact.h), so a mesh free of self-intersection stays so. `targets` are by block; places that are
+/// fulfilled already, and targets in crowded cells (EdgePolygons::is_crowded()), are passed over. The result is the same
 /// for every number of threads. @throws Cancelled
 void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
-                 const std::vector<std::vector<PointWish>>& wishes, const FilePoints& file,
+                 const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
                  UniformPoints& points, RunContext& context);
 
 }  // namespace hermesh

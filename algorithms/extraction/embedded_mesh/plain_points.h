@@ -20,8 +20,7 @@ class PlainPoints {
       const std::int32_t there =
           cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(-d[0], -d[1], -d[2]))];
       if (there < 0) continue;
-      const std::uint64_t rows = (d[1] ? std::uint64_t{0xff} << 56 : ~std::uint64_t{0}) &
-                                 (d[2] ? 0x8080808080808080u : ~std::uint64_t{0});
+      const std::uint64_t rows = last_layers(d[1], d[2]);
       const CellBlocks::Block& own = cells[there];
       for (int x = d[0] ? 7 : 0; x < 8; ++x)
         for (std::uint64_t word = own.active[static_cast<std::size_t>(x)] & rows; word != 0;

@@ -55,8 +55,7 @@ class CellRecords {
       const std::int32_t there =
           cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(d[0], d[1], d[2]))];
       if (there < 0) continue;
-      const std::uint64_t rows =
-          (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
+      const std::uint64_t rows = first_layers(d[1], d[2]);
       for (int axis = 0; axis < 3; ++axis) {
         if (d[axis]) continue;
         for (int x = 0; x < (d[0] ? 1 : 8); ++x)
@@ -98,7 +97,7 @@ class Contourer {
         options_(options),
         reach_(std::min(options.reach, kFarthestFromCell)),
         file_(file),
-        wishes_(cells_.size()),
+        targets_(cells_.size()),
         points_(UniformPoints::of_few(cells_.point_count())) {
     counts_.cells = cells_.cell_count();
     if (grid.cuts().empty()) return;  // no joints
@@ -119,9 +118,9 @@ class Contourer {
     UniformMesh mesh;
     fill(polygons, mesh, context);
     if (numbers_) number_polygons(polygons, mesh, context);
-    move_points(cells_, polygons, wishes_, file_, points_, context);
-    // Only points that wished to leave can have left.
-    for_each_wisher([&](double outside) { counts_.escaped += outside > 0; });
+    move_points(cells_, polygons, targets_, file_, points_, context);
+    // Only points with a target outside can have left.
+    for_each_with_target([&](double outside) { counts_.escaped += outside > 0; });
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
     return mesh;
@@ -160,7 +159,7 @@ class Contourer {
     } else {
       // How far any point is out of its cell bounds where the polygons near another have their edges.
       double farthest = 0;
-      for_each_wisher([&](double outside) { farthest = std::max(farthest, outside); });
+      for_each_with_target([&](double outside) { farthest = std::max(farthest, outside); });
       for (const CellBlocks::Cell& cell :
            hold_cells_that_meet(cells_, polygons, file_, points_, farthest, context))
         counts_.meeting_joints.emplace_back(cell.block, cell.cell);
@@ -177,7 +176,7 @@ class Contourer {
   void place_points_of(Wanted&& wanted, RunContext& context) {
     Stage stage(context, "place points");
     std::vector<std::uint32_t> several(cells_.size());
-    // A block writes the points and wishes of its own cells alone; wishes end up in the order of cells.
+    // A block writes the points and targets of its own cells alone; targets end up in the order of cells.
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       const BlockMask asked = wanted(b);
@@ -225,7 +224,7 @@ class Contourer {
       kernels_.place_mean(plain, out);
       is_placed.fill(1);
     } else {
-      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the wish. Where
+      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the target. Where
       // they may not, any error will do.
       kernels_.place_flat(plain,
                           {.truncation = static_cast<float>(options_.truncation),
@@ -283,7 +282,7 @@ class Contourer {
   }
 
   /// The place within the cell, margin() off its faces, with the least error. If even that is far from the planes, as
-  /// beside a sharp feature that passes outside, the free minimiser is wished for.
+  /// beside a sharp feature that passes outside, the free minimiser is aimed at.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
@@ -297,7 +296,7 @@ class Contourer {
       };
       // Where minima form a line or a plane, the one next to the place in the cell needs the shorter move.
       const Vector3d free = qef.minimiser(options_.truncation), nearer = qef.minimiser_near(held, options_.truncation);
-      if (is_near(free)) wishes_[block].push_back({cell, free, is_near(nearer) ? nearer : free});
+      if (is_near(free)) targets_[block].push_back({cell, free, is_near(nearer) ? nearer : free});
     }
     return held;
   }
@@ -308,40 +307,40 @@ class Contourer {
     Stage stage(context, "let points leave");
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-        for (const PointWish& wish : wishes_[b]) {
-          const int x = wish.cell >> 6, y = (wish.cell >> 3) & 7, z = wish.cell & 7;
-          if (((x & 1) | (y & 1) << 1 | (z & 1) << 2) == parity) leave(static_cast<std::int32_t>(b), wish);
+        for (const PointTarget& target : targets_[b]) {
+          const int x = target.cell >> 6, y = (target.cell >> 3) & 7, z = target.cell & 7;
+          if (((x & 1) | (y & 1) << 1 | (z & 1) << 2) == parity) leave(static_cast<std::int32_t>(b), target);
         }
       });
   }
 
   /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather be outside.
   template <class F>
-  void for_each_wisher(F&& f) const {
+  void for_each_with_target(F&& f) const {
     for (std::size_t b = 0; b < cells_.size(); ++b)
-      for (const PointWish& wish : wishes_[b]) {
+      for (const PointTarget& target : targets_[b]) {
         const auto block = static_cast<std::int32_t>(b);
-        const Vector3d from_middle = points_[cells_.point(block, wish.cell, 0)] -
-                                     cells_.corner(block, wish.cell) - Vector3d::Constant(0.5);
+        const Vector3d from_middle = points_[cells_.point(block, target.cell, 0)] -
+                                     cells_.corner(block, target.cell) - Vector3d::Constant(0.5);
         f(from_middle.cwiseAbs().maxCoeff() - 0.5);
       }
   }
 
-  /// Moves the point of one cell as far towards its wish as its 24 tetrahedra stay positive. Cells with explicit faces,
+  /// Moves the point of one cell as far towards its target as its 24 tetrahedra stay positive. Cells with explicit faces,
   /// and those beside such, keep to their cells: the cones over their segments need it (uniform_mesh.h).
-  void leave(std::int32_t block, const PointWish& wish) {
-    if (cells_.has_explicit_face(block, wish.cell)) return;
-    Vector3d& point = points_[cells_.point(block, wish.cell, 0)];
-    const Vector3d corner = cells_.corner(block, wish.cell);
+  void leave(std::int32_t block, const PointTarget& target) {
+    if (cells_.has_explicit_face(block, target.cell)) return;
+    Vector3d& point = points_[cells_.point(block, target.cell, 0)];
+    const Vector3d corner = cells_.corner(block, target.cell);
     std::array<Vector3d, 6> beside;
     for (int face = 0; face < 6; ++face) {
-      const std::optional<Vector3d> there = point_beside(block, wish.cell, face);
+      const std::optional<Vector3d> there = point_beside(block, target.cell, face);
       if (!there) return;
       beside[face] = *there;
     }
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
-      // Tested as the file will hold it. Shares of the way, because the wish may be just out of reach.
-      const Vector3d candidate = file_.rounded(point + share * (wish.place - point));
+      // Tested as the file will hold it. Shares of the way, because the target may be just out of reach.
+      const Vector3d candidate = file_.rounded(point + share * (target.place - point));
       if (!tetrahedra_are_positive(corner, candidate, beside)) continue;
       point = candidate;
       return;
@@ -429,7 +428,7 @@ class Contourer {
   const double reach_;  ///< how far points may be from their cells, voxels
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
-  std::vector<std::vector<PointWish>> wishes_;  ///< one list per block, ascending by cell
+  std::vector<std::vector<PointTarget>> targets_;  ///< one list per block, ascending by cell
   UniformPoints points_;
   UniformCounts counts_;
   /// The cells held, found when polygons are made first: all edges that the answer depends on are among those asked for

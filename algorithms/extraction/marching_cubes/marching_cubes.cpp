@@ -3,20 +3,22 @@
 #include <algorithm>
 #include <optional>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
 #include "algorithms/hermite/representation.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/leaf_table.h"
 
 namespace hermesh {
 namespace {
 
-/// What one block adds to the mesh, and where in it.
-struct BlockOutput {
+/// What one leaf adds to the mesh, and where in it.
+struct LeafOutput {
   std::array<BlockMask, 3> edges{};
-  std::array<std::array<std::uint32_t, 8>, 3> rank{};  ///< points of this block before each word, by axis
+  std::array<std::array<std::uint32_t, 8>, 3> rank{};  ///< points of this leaf before each word, by axis
   std::uint32_t first_point = 0, first_triangle = 0;
 
   std::uint32_t point_on(int axis, int sample) const {
@@ -25,59 +27,122 @@ struct BlockOutput {
   }
 };
 
-/// Calls f(x, y, z, pattern) for the block's active cells.
-template <class F>
-void for_each_active_cell(const BlockGrid& grid, std::int32_t block, F&& f) {
-  std::array<BlockMask, 8> corner;
-  BlockMask active{};
-  for (int c = 0; c < 8; ++c) corner[c] = grid.shifted_inside(block, c & 1, (c >> 1) & 1, c >> 2);
-  for (int word = 0; word < 8; ++word) {
-    std::uint64_t some = 0, every = ~0ull;
-    for (const BlockMask& mask : corner) some |= mask[word], every &= mask[word];
-    active[word] = some & ~every;
-  }
-  for_each_bit(active, [&](int sample) {
-    int pattern = 0;
-    for (int c = 0; c < 8; ++c) pattern |= static_cast<int>(test(corner[c], sample)) << c;
-    f(sample >> 6, (sample >> 3) & 7, sample & 7, pattern);
-  });
-}
+/// The leaves, and cells and samples beyond them.
+class Leaves {
+ public:
+  Leaves(const LevelSet& level_set, double isovalue, RunContext& context)
+      : table_(level_set, isovalue, context), placement_(placement_of(*level_set.grid().grid)), isovalue_(isovalue) {}
 
-/// Where the surface meets an edge of a block, 0 to 1 along it: by linear interpolation of the samples, or, where there
+  std::size_t size() const { return table_.size(); }
+  const IndexToWorld& placement() const { return placement_; }
+  const LeafTable& table() const { return table_; }
+
+  /// Calls f(x, y, z, pattern) for each active cell that the leaf owns, with its first corner relative to the
+  /// leaf. A leaf owns the cells that start in it. The surface may also pass through cells that start beside the
+  /// leaves and reach into one; of all leaves that the block of such cells touches above, the first in the order
+  /// of is_first_above() owns them.
+  template <class F>
+  void for_each_active_cell(std::size_t leaf, F&& f) const {
+    for_each_active_cell_of_block(leaf, {0, 0, 0}, f);
+    for (int below = 1; below < 8; ++below) {
+      const std::array<int, 3> offset{-(below & 1), -(below >> 1 & 1), -(below >> 2)};
+      if (table_.neighbour(leaf, offset[0], offset[1], offset[2]) < 0 && is_first_above(leaf, offset))
+        for_each_active_cell_of_block(leaf, offset, f);
+    }
+  }
+
+  /// The sample at (x, y, z) from a leaf's first, each 0 to 8; negative inside, in units of the volume's values.
+  double signed_value(std::size_t leaf, int x, int y, int z) const {
+    const std::int32_t there = table_.neighbour(leaf, x >> 3, y >> 3, z >> 3);
+    // An edge that ends in a tile is rare, so that a search through the tree is no matter.
+    const float value = there < 0 ? table_.tree().getValue(table_.lower(leaf).offsetBy(x, y, z))
+                                  : table_.values(there)[sample_index(x & 7, y & 7, z & 7)];
+    return double(table_.rule().scale) * (double(value) - isovalue_);
+  }
+
+ private:
+  /// Signs of the eight corners of the cells that start in the block at `offset` (in blocks, each 0 or −1) from a leaf.
+  std::array<BlockMask, 8> corner_signs(std::size_t leaf, const std::array<int, 3>& offset) const {
+    std::array<BlockMask, 8> corner;
+    for (int c = 0; c < 8; ++c)
+      corner[c] = shifted_mask(c & 1, c >> 1 & 1, c >> 2, [&](int ax, int ay, int az) -> const BlockMask& {
+        const int dx = offset[0] + ax, dy = offset[1] + ay, dz = offset[2] + az;
+        if (dx == 0 && dy == 0 && dz == 0) return table_.inside(leaf);
+        return table_.signs(table_.neighbour(leaf, dx, dy, dz));
+      });
+    return corner;
+  }
+
+  /// Whether `leaf` comes first among the leaves in the blocks above the block at `offset`.
+  bool is_first_above(std::size_t leaf, const std::array<int, 3>& offset) const {
+    for (int above = 1; above < 8; ++above) {
+      const int dx = offset[0] + (above & 1), dy = offset[1] + (above >> 1 & 1), dz = offset[2] + (above >> 2);
+      if (dx == 0 && dy == 0 && dz == 0) return true;
+      if (table_.neighbour(leaf, dx, dy, dz) >= 0) return false;
+    }
+    return true;
+  }
+
+  template <class F>
+  void for_each_active_cell_of_block(std::size_t leaf, const std::array<int, 3>& offset, F&& f) const {
+    const std::array<BlockMask, 8> corner = corner_signs(leaf, offset);
+    BlockMask active{};
+    for (int word = 0; word < 8; ++word) {
+      // A cell is active if some of its corners are inside, but not every one.
+      std::uint64_t some = 0, every = ~0ull;
+      for (const BlockMask& mask : corner) some |= mask[word], every &= mask[word];
+      active[word] = some & ~every;
+    }
+    for_each_bit(active, [&](int sample) {
+      int pattern = 0;
+      for (int c = 0; c < 8; ++c) pattern |= static_cast<int>(test(corner[c], sample)) << c;
+      f(8 * offset[0] + (sample >> 6), 8 * offset[1] + (sample >> 3 & 7), 8 * offset[2] + (sample & 7), pattern);
+    });
+  }
+
+  const LeafTable table_;
+  const IndexToWorld placement_;
+  const double isovalue_;
+};
+
+/// Where the surface meets an edge of a leaf, 0 to 1 along it: by linear interpolation of the samples, or, where there
 /// are crossings, theirs, which are in the order of the edges.
-void write_points(const BlockGrid& grid, std::int32_t index, const FloatHermite* hermite, const BlockOutput& output,
+void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* hermite, const LeafOutput& output,
                   PolygonMesh& mesh) {
-  const Block& block = grid.blocks()[index];
-  const IndexToWorld& placement = grid.placement();
-  const SignLeaf* leaf = hermite ? hermite->find(block.lower) : nullptr;
-  const EdgeCrossing* crossing = leaf ? hermite->crossings.data() + leaf->first : nullptr;
+  const IndexToWorld& placement = leaves.placement();
+  const openvdb::Coord lower = leaves.table().lower(leaf);
+  const SignLeaf* signs = hermite ? hermite->find({lower.x(), lower.y(), lower.z()}) : nullptr;
+  const EdgeCrossing* crossing = signs ? hermite->crossings.data() + signs->first : nullptr;
   for (int axis = 0; axis < 3; ++axis)
     for_each_bit(output.edges[axis], [&](int sample) {
       const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
-      const auto end =
-          grid.locate(index, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
-      const double from = grid.signed_value(block, sample);
-      const double to = grid.signed_value(grid.blocks()[end.block], end.sample);
+      const double from = leaves.signed_value(leaf, local[0], local[1], local[2]);
+      const double to =
+          leaves.signed_value(leaf, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
       Eigen::Vector3d position;
-      for (int a = 0; a < 3; ++a) position[a] = block.lower[a] - placement.base[a] + local[a];
+      for (int a = 0; a < 3; ++a) position[a] = lower[a] - placement.base[a] + local[a];
+      // Differences of signed values at both ends cannot be 0, for the signs differ. Held off
+      // the ends, no two points meet.
       const double offset = crossing ? double((crossing++)->offset) : from / (from - to);
       position[axis] += std::clamp(offset, kCrossingMargin, 1.0 - kCrossingMargin);
       mesh.points[output.point_on(axis, sample)] = placement.local(position).cast<float>();
     });
 }
 
-void write_triangles(const BlockGrid& grid, std::int32_t index, const std::vector<BlockOutput>& outputs,
+void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<LeafOutput>& outputs,
                      PolygonMesh& mesh) {
-  const bool mirrors = grid.placement().mirrors();
-  Triangle* next = mesh.triangles.data() + outputs[index].first_triangle;
-  for_each_active_cell(grid, index, [&](int x, int y, int z, int pattern) {
+  const bool mirrors = leaves.placement().mirrors();
+  // Points of neighbouring leaves are known by number alone, from their ranks, whether or not they are written yet.
+  Triangle* next = mesh.triangles.data() + outputs[leaf].first_triangle;
+  leaves.for_each_active_cell(leaf, [&](int x, int y, int z, int pattern) {
     const CellTriangles& cell = kTriangulation[pattern];
     for (int t = 0; t < cell.count; ++t, ++next)
       for (int corner = 0; corner < 3; ++corner) {
         const CellEdge edge = kCellEdges[cell.triangles[t][mirrors ? 2 - corner : corner]];
-        const auto at = grid.locate(index, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1),
-                                    z + (edge.first_corner >> 2));
-        (*next)[corner] = outputs[at.block].point_on(edge.axis, at.sample);
+        // An edge that changes sign starts in a leaf, as the table promises.
+        const LeafTable::Location at = leaves.table().locate(
+            leaf, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1), z + (edge.first_corner >> 2));
+        (*next)[corner] = outputs[static_cast<std::size_t>(at.leaf)].point_on(edge.axis, at.sample);
       }
   });
 }
@@ -101,43 +166,44 @@ std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
 
 PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const FloatHermite* crossings,
                            RunContext& context) {
-  const BlockGrid grid = [&] {
+  const Leaves leaves = [&] {
     Stage stage(context, "read signs");
-    return BlockGrid(level_set, isovalue, context);
+    return Leaves(level_set, isovalue, context);
   }();
-  const std::size_t blocks = grid.blocks().size();
-  std::vector<BlockOutput> outputs(blocks);
-  std::vector<std::uint64_t> points(blocks), triangles(blocks);
+  // Count, scan, fill (core/parallel.h): a leaf writes its own entry, then its own range of points and triangles. The
+  // order of the mesh is that of the leaves, whatever the threads do.
+  std::vector<LeafOutput> outputs(leaves.size());
+  std::vector<std::uint64_t> points(leaves.size()), triangles(leaves.size());
   {
     Stage stage(context, "count");
-    parallel_blocks(blocks, context, [&](std::size_t i) {
-      const auto index = static_cast<std::int32_t>(i);
-      BlockOutput& output = outputs[i];
-      output.edges = grid.crossing_edges(index);
+    parallel_blocks(leaves.size(), context, [&](std::size_t leaf) {
+      LeafOutput& output = outputs[leaf];
+      output.edges = leaves.table().crossing_edges(leaf);
       std::uint32_t before = 0;
       for (int axis = 0; axis < 3; ++axis)
         for (int word = 0; word < 8; ++word) {
+          // Points are numbered by axis, in that by sample, as crossings are in Hermite data.
           output.rank[axis][word] = before;
           before += static_cast<std::uint32_t>(std::popcount(output.edges[axis][word]));
         }
-      points[i] = before;
-      for_each_active_cell(
-          grid, index, [&](int, int, int, int pattern) { triangles[i] += kTriangulation[pattern].count; });
+      points[leaf] = before;
+      leaves.for_each_active_cell(
+          leaf, [&](int, int, int, int pattern) { triangles[leaf] += kTriangulation[pattern].count; });
     });
   }
   PolygonMesh mesh;
-  mesh.origin = grid.placement().origin;
+  mesh.origin = leaves.placement().origin;
   mesh.points.resize(exclusive_scan(points, "points"));
   mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
-  for (std::size_t i = 0; i < blocks; ++i) {
-    outputs[i].first_point = static_cast<std::uint32_t>(points[i]);
-    outputs[i].first_triangle = static_cast<std::uint32_t>(triangles[i]);
+  // From here on point_on() gives numbers of the mesh. The fill reads the outputs of other leaves and changes none.
+  for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+    outputs[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
+    outputs[leaf].first_triangle = static_cast<std::uint32_t>(triangles[leaf]);
   }
   Stage stage(context, "fill");
-  parallel_blocks(blocks, context, [&](std::size_t i) {
-    const auto index = static_cast<std::int32_t>(i);
-    write_points(grid, index, crossings, outputs[i], mesh);
-    write_triangles(grid, index, outputs, mesh);
+  parallel_blocks(leaves.size(), context, [&](std::size_t leaf) {
+    write_points(leaves, leaf, crossings, outputs[leaf], mesh);
+    write_triangles(leaves, leaf, outputs, mesh);
   });
   return mesh;
 }

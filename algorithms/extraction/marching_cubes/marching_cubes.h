@@ -21,7 +21,8 @@ inline constexpr double kCrossingMargin = 1.0 / 1024.0;
 PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const FloatHermite* crossings,
                            RunContext& context);
 
-/// The table's entry.
+/// Marching cubes with the options of marching_cubes_options(), as the table of variants calls it.
+/// @throws Error for exact crossings where there are no polygons at the isovalue; Cancelled.
 PolygonMesh marching_cubes(const ExtractionInput& input);
 std::vector<OptionSpec> marching_cubes_options();
 

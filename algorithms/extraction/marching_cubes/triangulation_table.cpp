@@ -8,6 +8,7 @@ constexpr std::array<std::array<int, 4>, 6> kFaces{
     {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
 
 constexpr int edge_between(int a, int b) {
+  // The two corners differ in one bit, which is the axis; the edge starts at the corner without it.
   const int first = a < b ? a : b;
   const int axis = (a ^ b) == 1 ? 0 : (a ^ b) == 2 ? 1 : 2;
   for (int e = 0; e < 12; ++e)
@@ -36,6 +37,7 @@ constexpr std::array<int, 12> segments(int pattern) {
   for (const auto& face : kFaces)
     for (int i = 0; i < 4; ++i) {
       const auto inside = [&](int k) { return ((pattern >> face[k & 3]) & 1) != 0; };
+      // On an ambiguous face there are two such places, and each run of inside corners is one.
       if (inside(i) || !inside(i + 1)) continue;
       int leave = i + 1;
       while (inside(leave + 1)) ++leave;
@@ -58,6 +60,8 @@ constexpr bool diagonal_allowed(const Loop& loop, int i, int j) {
 /// allowed.
 constexpr bool triangulate(const Loop& loop, int i, int j, CellTriangles& result) {
   if (j - i < 2) return true;
+  // The side from i to j belongs to one triangle, with its third corner k between: all k are
+  // tried, and both rests in turn.
   for (int k = i + 1; k < j; ++k) {
     if (!diagonal_allowed(loop, i, k) || !diagonal_allowed(loop, k, j)) continue;
     const int before = result.count;
@@ -74,6 +78,8 @@ constexpr CellTriangles triangulate_pattern(int pattern) {
   CellTriangles result;
   const std::array<int, 12> next = segments(pattern);
   std::array<bool, 12> done{};
+  // Two faces share an edge and walk along it in opposite directions, so that it is entered on one and left on the
+  // other: each crossing edge has one successor and one predecessor, and the segments form closed loops.
   for (int start = 0; start < 12; ++start) {
     if (next[start] < 0 || done[start]) continue;
     Loop loop;

@@ -29,7 +29,7 @@ struct CellTriangles {
   std::array<std::array<std::uint8_t, 3>, 5> triangles{};
 };
 
-/// By the pattern of inside corners: bit c is set if corner c is inside.
+/// Triangles of each cell by the pattern of its inside corners: bit c is set if corner c is inside.
 extern const std::array<CellTriangles, 256> kTriangulation;
 
 /// True if two edges of the cell lie on a common face.

@@ -7,15 +7,17 @@
 
 namespace hermesh {
 
-/// `sse2` is what every target is compiled for (x86-64-v2): vectors of four. `avx512` is what Ice Lake and Zen 4 were the
-/// first to have: F, BW, DQ, VL and VBMI2.
+/// Levels of vector code, in ascending order. `sse2` is what every target is compiled for (x86-64-v2): vectors of four.
+/// `avx512` is what Ice Lake and Zen 4 were the first to have: F, BW, DQ, VL and VBMI2.
 enum class SimdLevel { sse2, avx2, avx512 };
 
+/// The name that HERMESH_SIMD takes: "sse2", "avx2" or "avx512".
 std::string_view name(SimdLevel level);
 
-/// Those that this machine can run, in ascending order.
+/// The levels that this machine can run, in ascending order.
 std::vector<SimdLevel> available_simd_levels();
 
+/// The level of that name.
 /// @throws Error for a name that is no level and for a level that this machine cannot run.
 SimdLevel parse_simd_level(std::string_view name);
 
@@ -23,7 +25,7 @@ SimdLevel parse_simd_level(std::string_view name);
 /// parse_simd_level() does.
 SimdLevel chosen_simd_level();
 
-/// What was compiled for a level, of the same for each of them.
+/// The one of three things (kernels, tables of functions) that was compiled for the level.
 template <class T>
 const T& of_level(SimdLevel level, const T& sse2, const T& avx2, const T& avx512) {
   return level == SimdLevel::avx512 ? avx512 : level == SimdLevel::avx2 ? avx2 : sse2;

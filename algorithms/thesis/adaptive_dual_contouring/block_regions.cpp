@@ -63,7 +63,7 @@ Plane plane_of(const EdgeCrossing& crossing, int axis, const int (&at)[3]) {
 Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, int axis, const int (&d)[3],
                     Plane* plane) {
   // Of an upper neighbour the first layers count.
-  const std::uint64_t layer = (d[1] ? 0xffu : ~std::uint64_t{0}) & (d[2] ? 0x0101010101010101u : ~std::uint64_t{0});
+  const std::uint64_t layer = first_layers(d[1], d[2]);
   std::uint64_t wanted = 0;
   for (int x = 0; x < (d[0] ? 1 : 8); ++x) wanted |= owner.crossing[axis][x];
   if (!(wanted & layer)) return plane;

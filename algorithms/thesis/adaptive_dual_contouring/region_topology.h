@@ -5,7 +5,7 @@
 #include <bit>
 #include <cstdint>
 
-#include "algorithms/lattice/blocks.h"
+#include "algorithms/lattice/block_mask.h"
 
 namespace hermesh {
 

@@ -20,7 +20,7 @@ constexpr std::size_t kInSlab = 1 << 16;
 constexpr std::size_t kMostSlabs = 16;
 /// A thread that asks in any order keeps the bins around its block, and more while they are small: up to as many
 /// bins, or as many triangles.
-constexpr std::size_t kLentBins = 64, kLentTriangles = 1 << 16;
+constexpr std::size_t kCachedBins = 64, kCachedTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kMany = 256;
 
@@ -441,13 +441,13 @@ std::size_t TriangleBins::bytes_in_memory() const {
 /// The files of a bin for this thread alone, made when it first asks. They serve few questions, so the triangles stay
 /// in the mesh's order: where that goes along the surface, its sixteens are compact, too.
 const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
-  std::unordered_map<std::uint32_t, Files>& lent = lent_.local();
-  const auto known = lent.find(bin);
-  if (known != lent.end()) return known->second;
+  std::unordered_map<std::uint32_t, Files>& cache = cache_.local();
+  const auto known = cache.find(bin);
+  if (known != cache.end()) return known->second;
   std::size_t triangles = 0;
-  for (const auto& [other, files] : lent) triangles += files.order.size();
-  if (lent.size() >= kLentBins && triangles > kLentTriangles) lent.clear();
-  return lent.emplace(bin, make_files({bin}, Purpose::few_questions)).first->second;
+  for (const auto& [other, files] : cache) triangles += files.order.size();
+  if (cache.size() >= kCachedBins && triangles > kCachedTriangles) cache.clear();
+  return cache.emplace(bin, make_files({bin}, Purpose::few_questions)).first->second;
 }
 
 /// Buffers for the sorting of one bin after the other by one thread.

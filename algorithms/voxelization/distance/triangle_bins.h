@@ -149,7 +149,7 @@ class TriangleBins {
   std::vector<std::uint64_t> first_large_;
   std::vector<std::uint32_t> large_;
   /// Files of single bins, by thread, for those who ask in any order.
-  mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> lent_;
+  mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> cache_;
 };
 
 inline bool TriangleBins::meet(const VoxelBox& a, const VoxelBox& b) {

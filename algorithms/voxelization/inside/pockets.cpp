@@ -37,7 +37,7 @@ struct Pocket {
 };
 
 /// Bits of the voxels of a block that are at most `far` from a voxel on each axis.
-VoxelBits cube_bits(const BlockAt& block, const Voxel& middle, std::int32_t far) {
+BlockMask cube_bits(const BlockAt& block, const Voxel& middle, std::int32_t far) {
   return box_bits(block, {middle[0] - far, middle[1] - far, middle[2] - far},
                   {middle[0] + far, middle[1] + far, middle[2] + far});
 }
@@ -126,7 +126,7 @@ class PocketOpener {
   /// Puts the voxels of all goals into `goal_bits_`, or those of the pockets that were opened in the last round.
   void mark_goals(bool all) {
     if (all) {
-      goal_bits_.assign(blocks_.size(), VoxelBits{});
+      goal_bits_.assign(blocks_.size(), BlockMask{});
       for (std::size_t i = 0; i < blocks_.size(); ++i)
         for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
           if (goals_[regions_.components[c].region])
@@ -134,7 +134,7 @@ class PocketOpener {
       all_marked_ = true;
       return;
     }
-    if (std::exchange(all_marked_, false)) goal_bits_.assign(blocks_.size(), VoxelBits{});
+    if (std::exchange(all_marked_, false)) goal_bits_.assign(blocks_.size(), BlockMask{});
     for (const std::uint32_t block : marked_blocks_) goal_bits_[block] = {};
     marked_blocks_.clear();
     for (const std::uint32_t pocket : opened_)
@@ -253,7 +253,7 @@ class PocketOpener {
       }
   }
 
-  static void add_voxels(const BlockAt& block, const VoxelBits& bits, std::vector<Voxel>& voxels) {
+  static void add_voxels(const BlockAt& block, const BlockMask& bits, std::vector<Voxel>& voxels) {
     for (std::int32_t x = 0; x < 8; ++x)
       for (std::uint64_t word = bits[std::size_t(x)]; word; word &= word - 1) {
         const int place = __builtin_ctzll(word);
@@ -280,7 +280,7 @@ class PocketOpener {
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
         for (std::int32_t z = low[2]; z <= high[2]; ++z)
           if (const std::uint32_t block = bins_.blocks().find({x, y, z});
-              block != BlockTable::kNone && goal_bits_[block] != VoxelBits{})
+              block != BlockTable::kNone && goal_bits_[block] != BlockMask{})
             near.push_back(block);
     // Near ones first, which are the likeliest to be seen.
     for (std::int32_t far = 1; far <= far_; ++far)
@@ -292,7 +292,7 @@ class PocketOpener {
   /// Whether a goal's voxel in the block is seen whose distance, the largest of the three axes', is `far`.
   bool sees_goal_in(std::uint32_t block, const Voxel& voxel, std::int32_t far, CellObstacles& obstacles) const {
     const BlockAt& at = blocks_[block];
-    const VoxelBits within = cube_bits(at, voxel, far), nearer = cube_bits(at, voxel, far - 1);
+    const BlockMask within = cube_bits(at, voxel, far), nearer = cube_bits(at, voxel, far - 1);
     for (std::int32_t x = 0; x < 8; ++x)
       for (std::uint64_t bits = goal_bits_[block][std::size_t(x)] & within[std::size_t(x)] & ~nearer[std::size_t(x)];
            bits; bits &= bits - 1) {
@@ -319,7 +319,7 @@ class PocketOpener {
   std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< the pockets of each block
   std::vector<std::uint32_t> opened_;                   ///< pockets opened in the last round
   std::int32_t far_ = 0;
-  std::vector<VoxelBits> goal_bits_;  ///< voxels of the goals, by block
+  std::vector<BlockMask> goal_bits_;  ///< voxels of the goals, by block
   bool all_marked_ = false;                  ///< whether `goal_bits_` has all goals, or those opened last
   std::vector<std::uint32_t> marked_blocks_;  ///< blocks with bits of the latter
   std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet

@@ -8,12 +8,9 @@
 namespace hermesh {
 namespace {
 
-/// Bits of the voxels with z = 0.
-constexpr std::uint64_t kBottomZ = 0x0101010101010101ull;
-
 /// The voxels of a block from which one may step to the upper neighbour within the block, by axis.
 struct Steps {
-  VoxelBits up[3];
+  BlockMask up[3];
 };
 
 /// Steps between voxels that no triangle separates. Along x nobody steps from the last word.
@@ -28,7 +25,7 @@ Steps steps_between(const kernels::EdgeBits& crossed) {
 }
 
 /// Steps between neighbours both of which are in `free`: cells without a block on a coarse level.
-Steps steps_among(const VoxelBits& free) {
+Steps steps_among(const BlockMask& free) {
   Steps steps;
   for (std::size_t x = 0; x < 8; ++x) {
     steps.up[0][x] = x < 7 ? free[x] & free[x + 1] : 0;
@@ -50,8 +47,8 @@ std::uint64_t spread_in_word(std::uint64_t m, std::uint64_t up_y, std::uint64_t 
 }
 
 /// Finds all voxels of `free` that can be reached from its first one.
-VoxelBits reach_from_first(const VoxelBits& free, const Steps& steps) {
-  VoxelBits reached{};
+BlockMask reach_from_first(const BlockMask& free, const Steps& steps) {
+  BlockMask reached{};
   for (std::size_t x = 0; x < 8; ++x)
     if (free[x]) {
       // Only the lowest bit, the first in the order of the voxels.
@@ -79,7 +76,7 @@ VoxelBits reach_from_first(const VoxelBits& free, const Steps& steps) {
 }
 
 /// Parts `free` into connected sets, in the order of their first voxels.
-void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& components) {
+void add_components(BlockMask free, const Steps& steps, std::vector<BlockMask>& components) {
   const auto any = [&] {
     std::uint64_t bits = 0;
     for (const std::uint64_t word : free) bits |= word;
@@ -96,7 +93,7 @@ void add_components(VoxelBits free, const Steps& steps, std::vector<VoxelBits>& 
 struct Level {
   std::vector<BlockAt> blocks;
   std::vector<std::uint32_t> first;  ///< component of each block, as a node
-  std::vector<VoxelBits> components;
+  std::vector<BlockMask> components;
   std::uint32_t node = 0;  ///< number of the first component's node
 };
 
@@ -106,7 +103,7 @@ template <class F>
 void find_components(Level& level, const RunContext& context, F&& components_of) {
   const std::size_t n = level.blocks.size();
   constexpr std::size_t kChunk = 256;
-  std::vector<std::vector<VoxelBits>> found((n + kChunk - 1) / kChunk);
+  std::vector<std::vector<BlockMask>> found((n + kChunk - 1) / kChunk);
   level.first.assign(n + 1, 0);
   tbb::parallel_for(std::size_t(0), found.size(), [&](std::size_t chunk) {
     context.check();
@@ -118,7 +115,7 @@ void find_components(Level& level, const RunContext& context, F&& components_of)
   });
   for (std::size_t i = 0; i < n; ++i) level.first[i + 1] += level.first[i];
   level.components.reserve(level.first[n]);
-  for (std::vector<VoxelBits>& chunk : found) {
+  for (std::vector<BlockMask>& chunk : found) {
     level.components.insert(level.components.end(), chunk.begin(), chunk.end());
     chunk = {};
   }
@@ -133,8 +130,8 @@ class Hierarchy {
     tables_.push_back(&table);
     levels_.emplace_back();
     levels_[0].blocks = table.blocks();
-    find_components(levels_[0], context, [&](std::size_t i, std::vector<VoxelBits>& out) {
-      VoxelBits free;
+    find_components(levels_[0], context, [&](std::size_t i, std::vector<BlockMask>& out) {
+      BlockMask free;
       free.fill(~0ull);
       add_components(free, steps_between(crossed[i]), out);
     });
@@ -170,9 +167,9 @@ class Hierarchy {
     tables_.push_back(own_.back().get());
     Level& level = levels_.emplace_back();
     level.blocks = tables_.back()->blocks();
-    find_components(level, context_, [&](std::size_t i, std::vector<VoxelBits>& out) {
+    find_components(level, context_, [&](std::size_t i, std::vector<BlockMask>& out) {
       // A bit of a tile is a block of the level below, so that the others are empty cells.
-      VoxelBits free = below.tiles()[below.find_tile(level.blocks[i])].mask;
+      BlockMask free = below.tiles()[below.find_tile(level.blocks[i])].mask;
       for (std::uint64_t& word : free) word = ~word;
       add_components(free, steps_among(free), out);
     });
@@ -228,7 +225,7 @@ class Hierarchy {
     std::uint64_t open = ~0ull;
     // Only voxels have triangles between them; empty cells that touch are one space.
     if (l == 0) {
-      VoxelBits bits;
+      BlockMask bits;
       for (std::size_t x = 0; x < 8; ++x) bits[x] = crossed_[lower].word[axis][x];
       open = ~face(bits, axis, 1);
     }
@@ -250,14 +247,14 @@ class Hierarchy {
 
 }  // namespace
 
-std::uint64_t face(const VoxelBits& bits, int axis, int side) {
+std::uint64_t face(const BlockMask& bits, int axis, int side) {
   if (axis == 0) return bits[side ? 7 : 0];
   std::uint64_t result = 0;
   for (std::size_t x = 0; x < 8; ++x) {
     if (axis == 1) {
       result |= (bits[x] >> (side ? 56 : 0) & 255u) << (8 * x);
     } else {
-      const std::uint64_t column = bits[x] >> (side ? 7 : 0) & kBottomZ;
+      const std::uint64_t column = bits[x] >> (side ? 7 : 0) & kFirstZ;
       // The product gathers the eight bits of a column, one in each byte, in its top byte.
       result |= (column * 0x0102040810204080ull >> 56) << (8 * x);
     }
@@ -265,8 +262,8 @@ std::uint64_t face(const VoxelBits& bits, int axis, int side) {
   return result;
 }
 
-VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis) {
-  VoxelBits result;
+BlockMask differs_from_upper(const BlockMask& bits, const BlockMask& upper, int axis) {
+  BlockMask result;
   for (std::size_t x = 0; x < 8; ++x) {
     std::uint64_t next;
     if (axis == 0)
@@ -274,7 +271,7 @@ VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int 
     else if (axis == 1)
       next = bits[x] >> 8 | upper[x] << 56;
     else
-      next = (bits[x] >> 1 & kBelowTopZ) | (upper[x] & kBottomZ) << 7;
+      next = (bits[x] >> 1 & kBelowTopZ) | (upper[x] & kFirstZ) << 7;
     result[x] = bits[x] ^ next;
   }
   return result;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "algorithms/lattice/block_mask.h"
 #include "algorithms/lattice/block_table.h"
 #include "algorithms/voxelization/distance/kernels/kernels.h"
 
@@ -14,12 +15,9 @@ namespace hermesh {
 
 class RunContext;
 
-/// A set of voxels of a block: bit 8y + z of word x.
-using VoxelBits = std::array<std::uint64_t, 8>;
-
 /// Voxels of one block that are connected within it.
 struct BlockComponent {
-  VoxelBits voxels;
+  BlockMask voxels;
   std::uint32_t region;
 };
 
@@ -34,13 +32,13 @@ struct Regions {
 };
 
 /// Bits of the voxels in a word whose upper neighbour in y, or in z, is in the same word, as a block has them.
-inline constexpr std::uint64_t kBelowTopY = 0x00FFFFFFFFFFFFFFull, kBelowTopZ = 0x7F7F7F7F7F7F7F7Full;
+inline constexpr std::uint64_t kBelowTopY = ~kLastY, kBelowTopZ = ~kLastZ;
 
 /// The bits of the 64 voxels on one side of a block, 0 lower and 1 upper, in the order of the two other axes.
-std::uint64_t face(const VoxelBits& bits, int axis, int side);
+std::uint64_t face(const BlockMask& bits, int axis, int side);
 
 /// Bits of the voxels whose upper neighbour along the axis (in `upper`, beyond the block) differs from them.
-VoxelBits differs_from_upper(const VoxelBits& bits, const VoxelBits& upper, int axis);
+BlockMask differs_from_upper(const BlockMask& bits, const BlockMask& upper, int axis);
 
 /// Finds the regions of voxels. `table` numbers the blocks, `crossed` has an entry for each.
 /// @throws Cancelled.

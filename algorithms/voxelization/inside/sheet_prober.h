@@ -1,4 +1,4 @@
-// What a face of a triangle has on its two sides: the question of inner_sheets.h, asked of one face.
+// What a face of a triangle has on its two sides: the question of interior_faces.h, asked of one face.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -17,7 +17,7 @@ namespace hermesh {
 
 /// The voxels around which sheets may be inner.
 struct Suspects {
-  std::vector<VoxelBits> voxels;      ///< by block
+  std::vector<BlockMask> voxels;      ///< by block
   std::vector<std::uint32_t> blocks;  ///< those with some
 };
 
@@ -59,7 +59,7 @@ class Suspicion {
  private:
   /// Whether one of the block's suspicious voxels is in the box.
   bool has(std::uint32_t block, const BlockAt& at, const Voxel& from, const Voxel& to) const {
-    const VoxelBits bits = box_bits(at, from, to);
+    const BlockMask bits = box_bits(at, from, to);
     for (std::size_t x = 0; x < 8; ++x)
       if (suspects_.voxels[block][x] & bits[x]) return true;
     return false;
@@ -103,7 +103,7 @@ inline std::array<Eigen::Vector3d, 2> places_beside(const TriangleFace& face, co
 class Prober {
  public:
   Prober(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const std::vector<VoxelBits>& inside, const Suspects& suspects)
+         const std::vector<BlockMask>& inside, const Suspects& suspects)
       : probe_(soup, bins, inside), suspicion_(suspects, band, bins.blocks()) {}
 
   /// Finds out what is on the two sides of a face. All places of a whole face have the same around them, so that one

@@ -12,8 +12,8 @@ namespace hermesh {
 namespace {
 
 /// The voxels of each block that are not connected to infinity: the inside as the flood sees it.
-std::vector<VoxelBits> enclosed_voxels(const Regions& regions, std::size_t blocks) {
-  std::vector<VoxelBits> result(blocks, VoxelBits{});
+std::vector<BlockMask> enclosed_voxels(const Regions& regions, std::size_t blocks) {
+  std::vector<BlockMask> result(blocks, BlockMask{});
   for (std::size_t i = 0; i < blocks; ++i)
     for (std::uint32_t c = regions.first[i]; c < regions.first[i + 1]; ++c)
       if (regions.components[c].region != Regions::kOutside)
@@ -33,7 +33,7 @@ struct CrossedEdges {
   OpenEdge example;
 };
 
-CrossedEdges crossed_edges(const Band& band, std::size_t block, const VoxelBits& inside) {
+CrossedEdges crossed_edges(const Band& band, std::size_t block, const BlockMask& inside) {
   CrossedEdges result;
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t x = 0; x < (axis == 0 ? 7u : 8u); ++x) {
@@ -68,7 +68,7 @@ struct Flood {
 
 /// Counts the open edges block by block. Nearly all edges of a block are open where the flood leaked in, and at a
 /// plate thinner than a voxel. Single open edges are at thin features and mean nothing.
-Flood look_at_flood(const Band& band, const std::vector<VoxelBits>& inside, const RunContext& context) {
+Flood look_at_flood(const Band& band, const std::vector<BlockMask>& inside, const RunContext& context) {
   constexpr int kEnough = 12;
   std::vector<CrossedEdges> edges(band.blocks.size());
   parallel_blocks(edges.size(), context,

@@ -34,7 +34,7 @@ CellObstacles::Voxel corner(const CellObstacles::Voxel& cell, unsigned i) {
 }  // namespace
 
 SurfaceProbe::SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins,
-                           const std::vector<VoxelBits>& inside)
+                           const std::vector<BlockMask>& inside)
     : inside_(inside), finder_(bins.blocks()), obstacles_(soup, bins, kKept) {}
 
 /// Whether a voxel is inside: 0 or 1, or 2 where there is no block and nobody knows.

@@ -16,7 +16,7 @@ enum class Side { outer, inner, unknown };
 class SurfaceProbe {
  public:
   /// Keeps references. `inside` has the voxels inside each block of the bins, by number.
-  SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<VoxelBits>& inside);
+  SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockMask>& inside);
 
   /// What is around a place off the surface, in voxels, by straight ways to the corners of the cell that it is in.
   Side seen_from(const Eigen::Vector3d& p);
@@ -31,7 +31,7 @@ class SurfaceProbe {
   void enter(const Voxel& cell);
   double centre(Eigen::Vector3d& p, const Eigen::Vector3d& normal);
 
-  const std::vector<VoxelBits>& inside_;
+  const std::vector<BlockMask>& inside_;
   BlockFinder finder_;
   CellObstacles obstacles_;
   /// The cell that was looked into last.

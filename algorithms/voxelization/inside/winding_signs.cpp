@@ -29,9 +29,7 @@ constexpr std::array<unsigned, 512> kAllPlaces = [] {
 
 using Samples = std::array<float, 512>;  ///< winding numbers of a block, in OpenVDB's order
 
-bool holds(const VoxelBits& bits, unsigned place) { return bits[place >> 6] >> (place & 63) & 1; }
-
-unsigned first_voxel(const VoxelBits& bits) {
+unsigned first_voxel(const BlockMask& bits) {
   for (unsigned x = 0; x < 8; ++x)
     if (bits[x]) return x << 6 | unsigned(__builtin_ctzll(bits[x]));
   return 0;
@@ -46,7 +44,7 @@ Eigen::Vector3d voxel_at(const BlockAt& block, unsigned place) {
 /// A block every voxel of which was asked, with its winding numbers and the sides that they give.
 struct Asked {
   std::unique_ptr<Samples> winding;
-  VoxelBits inside;
+  BlockMask inside;
 };
 
 /// One run of winding_signs().
@@ -76,12 +74,12 @@ class WindingSigns {
 
  private:
   /// Finds the voxel of a component that is farthest from the triangles, where the number is least in doubt.
-  unsigned representative(std::size_t block, const VoxelBits& voxels) const {
+  unsigned representative(std::size_t block, const BlockMask& voxels) const {
     unsigned best = first_voxel(voxels);
     if (!band_.leaves[block]) return best;
     const float* distance = band_.leaves[block]->buffer().data();
     for (unsigned place = 0; place < 512; ++place)
-      if (holds(voxels, place) && distance[place] > distance[best]) best = place;
+      if (test(voxels, int(place)) && distance[place] > distance[best]) best = place;
     return best;
   }
 
@@ -108,7 +106,7 @@ class WindingSigns {
   /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the number
   /// changes within the component, which is in doubt whatever its one voxel says.
   bool goes_round(std::uint32_t block, std::uint32_t component) const {
-    const VoxelBits& voxels = regions_.components[component].voxels;
+    const BlockMask& voxels = regions_.components[component].voxels;
     const auto& crossed = band_.crossed[block].word;
     for (std::size_t x = 0; x < 8; ++x) {
       const std::uint64_t v = voxels[x];
@@ -141,7 +139,7 @@ class WindingSigns {
 
   /// Whether components of two neighbouring blocks are on different sides and connected across the face between.
   bool disagree(std::uint32_t lower, std::uint32_t upper, int axis) const {
-    VoxelBits crossed;
+    BlockMask crossed;
     for (std::size_t x = 0; x < 8; ++x) crossed[x] = band_.crossed[lower].word[axis][x];
     const std::uint64_t open = ~face(crossed, axis, 1);
     for (std::uint32_t a = regions_.first[lower]; a < regions_.first[lower + 1]; ++a)
@@ -205,7 +203,7 @@ class WindingSigns {
     std::map<BlockAt, int> next;
     for (const BlockAt& block : from) {
       context_.check();
-      const VoxelBits& inside = asked_.at(block).inside;
+      const BlockMask& inside = asked_.at(block).inside;
       for (int axis = 0; axis < 3; ++axis)
         for (int side = 0; side < 2; ++side) {
           BlockAt at = block;
@@ -225,13 +223,13 @@ class WindingSigns {
   /// Whether two samples on either side of a face differ without a triangle between.
   bool leads_to(const BlockAt& block, const BlockAt& at, int axis, int side) const {
     const BlockAt& lower = side ? block : at;
-    const VoxelBits crossed = crossed_along(lower, axis);
-    const VoxelBits a = inside_of(lower), b = inside_of(side ? at : block);
+    const BlockMask crossed = crossed_along(lower, axis);
+    const BlockMask a = inside_of(lower), b = inside_of(side ? at : block);
     return ((face(a, axis, 1) ^ face(b, axis, 0)) & ~face(crossed, axis, 1)) != 0;
   }
 
-  VoxelBits crossed_along(const BlockAt& block, int axis) const {
-    VoxelBits bits{};
+  BlockMask crossed_along(const BlockAt& block, int axis) const {
+    BlockMask bits{};
     const std::uint32_t i = table_.find(block);
     if (i != BlockTable::kNone)
       for (std::size_t x = 0; x < 8; ++x) bits[x] = band_.crossed[i].word[axis][x];
@@ -239,9 +237,9 @@ class WindingSigns {
   }
 
   /// What is known of a block's sides so far: voxel by voxel if it was asked, else by its components.
-  VoxelBits inside_of(const BlockAt& block) const {
+  BlockMask inside_of(const BlockAt& block) const {
     if (const auto asked = asked_.find(block); asked != asked_.end()) return asked->second.inside;
-    VoxelBits bits{};
+    BlockMask bits{};
     const std::uint32_t i = table_.find(block);
     if (i == BlockTable::kNone) return bits;
     for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
@@ -285,11 +283,11 @@ class WindingSigns {
       BlockAt above = block;
       ++above[std::size_t(axis)];
       const auto upper = asked_.find(above);
-      VoxelBits changes =
-          differs_from_upper(asked.inside, upper == asked_.end() ? VoxelBits{} : upper->second.inside, axis);
-      const VoxelBits crossed = crossed_along(block, axis);
+      BlockMask changes =
+          differs_from_upper(asked.inside, upper == asked_.end() ? BlockMask{} : upper->second.inside, axis);
+      const BlockMask crossed = crossed_along(block, axis);
       for (unsigned place = 0; place < 512; ++place) {
-        if (!holds(changes, place) || holds(crossed, place)) continue;
+        if (!test(changes, int(place)) || test(crossed, int(place))) continue;
         const unsigned stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
         const bool last = (place / stride) % 8 == 7;
         // Beyond what was asked nothing changes but at triangles.
@@ -346,7 +344,7 @@ class WindingSigns {
 
   /// Signs the blocks around those that were asked, which distances to caps reach: each is on one side of the surface
   /// as a whole unless it was asked itself, so that one of its voxels speaks for all.
-  void sign_beyond(int rings, std::map<BlockAt, VoxelBits>& beyond) const {
+  void sign_beyond(int rings, std::map<BlockAt, BlockMask>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();
       for (int x = -rings; x <= rings; ++x)
@@ -358,7 +356,7 @@ class WindingSigns {
               beyond[at] = known->second.inside;
               continue;
             }
-            VoxelBits bits;
+            BlockMask bits;
             bits.fill(winding_.at(voxel_at(at, 0)) > 0.5 ? ~0ull : 0);
             beyond[at] = bits;
           }

@@ -35,7 +35,8 @@ struct LeafCells {
 /// offsets turned positive: bit 1 is the neighbour below along x.
 using LowerNeeds = unsigned;
 
-/// The active cells and the numbers of points and quads; first_point and first_quad are left alone.
+/// Finds a leaf's active cells and how many points and quads it has; first_point and first_quad are left alone. Returns
+/// the lower neighbours that its quads need.
 using Count = LowerNeeds(const UpperSigns& signs, LeafCells& cells);
 
 /// A crossing as a tangent plane, in voxels from the cell's centre.
@@ -43,17 +44,17 @@ struct Plane {
   float point[3], normal[3];
 };
 
-/// The plain code for the rare cells that the vector code does not do.
+/// Interface of the plain code, in double precision, for the rare cells that the vector code leaves over.
 class PlainCode {
  public:
-  /// The cell's point, from its centre.
+  /// Finds the cell's point, in voxels from the cell's centre, from `count` planes; `place` gets three numbers.
   virtual void place(const Plane* planes, int count, float* place) const = 0;
 
  protected:
   ~PlainCode() = default;
 };
 
-/// The same for all leaves.
+/// What places are found by, for all leaves alike.
 struct PlaceRules {
   double linear[3][3];  ///< voxels to mesh, by row
   /// For optimal placement alone.
@@ -85,7 +86,7 @@ struct PlainCells {
   const std::uint16_t* cell;  ///< 64x + 8y + z; kLargestVector more can be read, and are cells, too
   int count;
 };
-/// What is flat enough.
+/// What PlaceFlat takes for flat enough.
 struct FlatPlaces {
   float truncation;  ///< no less than kLeastTruncation
   float margin;      ///< places are so far off the cell's faces
@@ -94,10 +95,10 @@ struct FlatPlaces {
   float most_error, most_error_held;
 };
 
-/// Where they go.
+/// Where the points and offsets of a leaf are written.
 struct PlaceOutput {
-  float* points;   ///< of the leaf's cells, in the mesh's coordinates, three numbers a point
-  float* offsets;  ///< of the leaf's crossing edges, from their first sample, in voxels
+  float* points;   ///< points of the leaf's cells, in the mesh's coordinates, three numbers a point
+  float* offsets;  ///< where the leaf's edges are crossed, from their first sample, in voxels
 };
 
 /// Cells of several leaves whose planes are not nearly parallel, or whose minimiser lies outside of them. A
@@ -108,10 +109,10 @@ struct LaterCells {
   static constexpr int kSums = 14;
 
   int count = 0;
-  float sums[kSums][kMost];     ///< of their planes
-  float place[3][kMost];        ///< from the cell's centre: of those that are not general, the minimiser
+  float sums[kSums][kMost];     ///< sums over the cells' planes, as Quadrics has them
+  float place[3][kMost];        ///< the minimiser, from the cell's centre, of cells that are not general
   bool general[kMost];          ///< has more than one large eigenvalue
-  float records[kMost][12][4];  ///< of the cell's edges, by axis, in that by place, as in a RecordCube
+  float records[kMost][12][4];  ///< crossings of the cell's edges, by axis, in that by place, as in a RecordCube
   struct Target {
     float* point;
     double corner[3];  ///< the leaf's
@@ -119,12 +120,12 @@ struct LaterCells {
   } target[kMost];
 };
 
-/// The mean of each cell's crossings.
+/// Places each cell at the mean of its crossings.
 using PlaceAverage = void(const PlaceInput& input, const PlaceOutput& output);
-/// The minimiser of each cell's quadratic error function, as dual_contouring() places it, but for the cells
-/// that are added to `later`, which has less than kEnough.
+/// Places each cell at the minimiser of its quadratic error function, as dual_contouring() does, or adds it to `later`,
+/// which has less than kEnough cells before.
 using PlaceOptimal = void(const PlaceInput& input, const PlaceOutput& output, LaterCells& later);
-/// Places them, and forgets them.
+/// Places the later cells, and forgets them.
 using PlaceLater = void(const PlaceRules& rules, LaterCells& later);
 
 /// What a leaf's quads are made from.
@@ -133,19 +134,19 @@ struct ConnectInput {
   /// Cells of the leaf and its lower neighbours, at dx + 2dy + 4dz with the offsets turned positive; null where there is
   /// no leaf or none of its cells is needed.
   const LeafCells* cells[8];
-  const float* points;   ///< of the mesh; one number more can be read
-  const float* offsets;  ///< of the leaf's crossing edges; kLargestVector more can be read
+  const float* points;   ///< the mesh's points; one number more can be read
+  const float* offsets;  ///< where the leaf's edges are crossed, as in PlaceOutput; kLargestVector more can be read
   float corner[3];       ///< where the leaf's first sample is in the mesh's coordinates
-  float to_voxels[3][4];  ///< by axis of the mesh: what a step along it is in voxels, and 0
+  float to_voxels[3][4];  ///< what a step along each axis of the mesh is in voxels, and 0
   bool mirrors;          ///< turns the quads about
 };
 
-/// Of each cell the minimiser of its quadratic error function, held within the cell; `placed` is 0 where it
-/// is another case: more than one large eigenvalue, or too large an error.
-/// @param place by axis, from the cell's first corner; room for kLargestVector more
+/// Places each cell at the minimiser of its quadratic error function, held within the cell. `place` gets the
+/// coordinates by axis, in voxels from the cell's first corner, and has room for kLargestVector more. `placed` is 0
+/// where the cell is another case: more than one large eigenvalue, or too large an error.
 using PlaceFlat = void(const PlainCells& cells, const FlatPlaces& flat, float* const* place,
                        std::uint8_t* placed);
-/// Of each cell the mean of its crossings. @param place as above
+/// Places each cell at the mean of its crossings; `place` is as for PlaceFlat.
 using PlaceMean = void(const PlainCells& cells, float* const* place);
 
 /// One quad for each crossing edge that starts in the leaf, four point numbers each, by axis, in that by sample.
@@ -161,7 +162,7 @@ struct Kernels {
   Connect* connect;
 };
 
-/// For the level of vector code that is chosen, see simd_level.h.
+/// The kernels of the level that chosen_simd_level() gives. @throws Error as that does.
 const Kernels& chosen();
 
 }  // namespace hermesh::leaf_kernels

@@ -11,7 +11,7 @@
 namespace hermesh {
 
 /// What of the mesh does not bound the solid.
-struct InnerSheets {
+struct InteriorFaces {
   /// Triangles that are inner, in part or altogether, ascending.
   std::vector<std::uint32_t> triangles;
   /// The outer pieces of those that are inner in part, in world units, and for each the triangle that it is a piece
@@ -30,7 +30,7 @@ struct InnerSheets {
 /// sides of one stays, and a note says so. `reach` is how far distances matter, in voxels; `voxel_size` is in world
 /// units.
 /// @throws Cancelled.
-InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
+InteriorFaces find_interior_faces(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
                               const Signs& signs, double reach, double voxel_size, RunContext& context);
 
 }  // namespace hermesh

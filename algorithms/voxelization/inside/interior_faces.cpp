@@ -1,4 +1,4 @@
-#include "algorithms/voxelization/inside/inner_sheets.h"
+#include "algorithms/voxelization/inside/interior_faces.h"
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -31,7 +31,7 @@ constexpr double kNearby = 1e-5;
 /// is some microseconds each.
 constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
 
-/// One run of find_inner_sheets(): suspicious places, triangles there, their faces, and what is on both sides of
+/// One run of find_interior_faces(): suspicious places, triangles there, their faces, and what is on both sides of
 /// these.
 class Finder {
  public:
@@ -39,13 +39,13 @@ class Finder {
          const Signs& signs, RunContext& context)
       : soup_(soup), bins_(bins), band_(band), inside_(signs.inside), caps_(signs.caps), context_(context) {}
 
-  InnerSheets run(double reach, double voxel_size) {
+  InteriorFaces run(double reach, double voxel_size) {
     find_suspects();
     triangles_ = find_triangles();
     cut_triangles();
     find_sides();
     settle_doubts();
-    InnerSheets sheets;
+    InteriorFaces sheets;
     // `sheets_` is in the order of `triangles_`. A triangle with one inner face goes out as a whole, and those of its
     // faces that stay come back as pieces.
     std::size_t next = 0;
@@ -66,10 +66,10 @@ class Finder {
  private:
   /// Finds the voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
   /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the solid; but
-  /// inner sheets near a seam look the same, so they count where a chain of such voxels leads to one with an odd
+  /// interior faces near a seam look the same, so they count where a chain of such voxels leads to one with an odd
   /// number.
   void find_suspects() {
-    std::vector<VoxelBits> marked(band_.blocks.size(), VoxelBits{}), counts = marked;
+    std::vector<BlockMask> marked(band_.blocks.size(), BlockMask{}), counts = marked;
     parallel_blocks(marked.size(), context_, [&](std::size_t i) {
       std::vector<InnerEdge> edges = inner_edges(std::uint32_t(i));
       if (edges.empty()) return;
@@ -84,16 +84,16 @@ class Finder {
       }
     });
     spread_over_neighbours(marked, counts);
-    suspects_.voxels.assign(band_.blocks.size(), VoxelBits{});
+    suspects_.voxels.assign(band_.blocks.size(), BlockMask{});
     for (std::uint32_t i = 0; i < marked.size(); ++i)
       for_each_voxel(counts, i, [&](const Voxel& voxel) { suspect_around(voxel); });
     for (std::uint32_t i = 0; i < marked.size(); ++i)
-      if (suspects_.voxels[i] != VoxelBits{}) suspects_.blocks.push_back(i);
+      if (suspects_.voxels[i] != BlockMask{}) suspects_.blocks.push_back(i);
   }
 
   /// Calls f(voxel) for the bits of a block.
   template <class F>
-  void for_each_voxel(const std::vector<VoxelBits>& bits_of, std::uint32_t block, F&& f) const {
+  void for_each_voxel(const std::vector<BlockMask>& bits_of, std::uint32_t block, F&& f) const {
     const BlockAt& at = band_.blocks[block];
     for (std::int32_t x = 0; x < 8; ++x)
       for (std::uint64_t bits = bits_of[block][std::size_t(x)]; bits; bits &= bits - 1) {
@@ -104,7 +104,7 @@ class Finder {
 
   /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that counts. What
   /// is reached does not depend on the order.
-  void spread_over_neighbours(const std::vector<VoxelBits>& marked, std::vector<VoxelBits>& counts) const {
+  void spread_over_neighbours(const std::vector<BlockMask>& marked, std::vector<BlockMask>& counts) const {
     std::vector<Voxel> stack;
     for (std::uint32_t i = 0; i < counts.size(); ++i)
       for_each_voxel(counts, i, [&](const Voxel& voxel) { stack.push_back(voxel); });
@@ -141,7 +141,7 @@ class Finder {
         for (std::int32_t z = low[2]; z <= high[2]; ++z) {
           const std::uint32_t block = bins_.blocks().find({x, y, z});
           if (block == BlockTable::kNone) continue;
-          const VoxelBits bits = box_bits({x, y, z}, from, to);
+          const BlockMask bits = box_bits({x, y, z}, from, to);
           for (std::size_t i = 0; i < 8; ++i) suspects_.voxels[block][i] |= bits[i];
         }
   }
@@ -200,7 +200,7 @@ class Finder {
     BlockFinder finder(bins_.blocks());
     const BlockAt& at = band_.blocks[block];
     for (int axis = 0; axis < 3; ++axis) {
-      const VoxelBits lower = inner_edges(block, axis, finder);
+      const BlockMask lower = inner_edges(block, axis, finder);
       for (std::size_t x = 0; x < 8; ++x)
         for (std::uint64_t bits = lower[x]; bits; bits &= bits - 1) {
           const int place = __builtin_ctzll(bits);
@@ -212,8 +212,8 @@ class Finder {
   }
 
   /// Bits of the voxels inside whose upper neighbour on the axis is inside, too, with a triangle between.
-  VoxelBits inner_edges(std::uint32_t block, int axis, BlockFinder& finder) const {
-    VoxelBits edges{};
+  BlockMask inner_edges(std::uint32_t block, int axis, BlockFinder& finder) const {
+    BlockMask edges{};
     std::uint64_t any = 0;
     for (std::size_t x = 0; x < 8; ++x)
       any |= edges[x] = band_.crossed[block].word[axis][x] & inside_[block][x];
@@ -221,8 +221,8 @@ class Finder {
     BlockAt above = band_.blocks[block];
     ++above[std::size_t(axis)];
     const std::uint32_t upper = finder.find(above);
-    const VoxelBits differs =
-        differs_from_upper(inside_[block], upper == BlockTable::kNone ? VoxelBits{} : inside_[upper], axis);
+    const BlockMask differs =
+        differs_from_upper(inside_[block], upper == BlockTable::kNone ? BlockMask{} : inside_[upper], axis);
     for (std::size_t x = 0; x < 8; ++x) edges[x] &= ~differs[x];
     return edges;
   }
@@ -386,7 +386,7 @@ class Finder {
   }
 
   /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
-  /// them, and only winding numbers tell an overlap from a gap. They are asked where inner sheets are the
+  /// them, and only winding numbers tell an overlap from a gap. They are asked where interior faces are the
   /// rule, and what is doubtful are the seams between them: parts of a model that overlap. Where as much is
   /// doubtful as is inner, these are the folds and crevices of a scan, of which nothing goes far; their walls
   /// stay. For winding numbers and the search for ways along a crevice take longer than all the rest of the
@@ -451,7 +451,7 @@ class Finder {
 
   /// Adds a face as a fan of triangles in world units.
   static void add_pieces(const TriangleFace& face, double voxel_size, std::uint32_t parent,
-                         InnerSheets& sheets) {
+                         InteriorFaces& sheets) {
     const std::uint32_t n = std::uint32_t(sheets.pieces.points.size());
     for (const Vector3d& corner : face.corners)
       sheets.pieces.points.push_back((corner * voxel_size).cast<float>());
@@ -462,7 +462,7 @@ class Finder {
   }
 
   /// Finds the blocks whose distances a left out triangle may have touched: those in its box, grown by the reach.
-  void find_blocks(double reach, InnerSheets& sheets) const {
+  void find_blocks(double reach, InteriorFaces& sheets) const {
     std::vector<char> near(band_.blocks.size(), 0);
     BlockFinder finder(bins_.blocks());
     for (const std::uint32_t t : sheets.triangles) {
@@ -484,7 +484,7 @@ class Finder {
   const IndexSoup& soup_;
   const TriangleBins& bins_;
   const Band& band_;
-  const std::vector<VoxelBits>& inside_;
+  const std::vector<BlockMask>& inside_;
   const std::vector<TriangleCorners>& caps_;
   RunContext& context_;
   Suspects suspects_;
@@ -495,7 +495,7 @@ class Finder {
 
 }  // namespace
 
-InnerSheets find_inner_sheets(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
+InteriorFaces find_interior_faces(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
                               const Signs& signs, double reach, double voxel_size, RunContext& context) {
   return Finder(soup, bins, band, signs, context).run(reach, voxel_size);
 }

@@ -1,0 +1,121 @@
+#include "algorithms/extraction/marching_cubes/marching_cubes.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+
+#include "algorithms/core/level_set_grid.h"
+
+namespace hermesh {
+namespace {
+
+using openvdb::Coord;
+
+openvdb::FloatGrid::Ptr outside_grid() {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+/// Whether each edge of a triangle is met by another triangle the other way round.
+bool is_closed(const PolygonMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sum;
+  for (const Triangle& t : mesh.triangles)
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t a = t[i], b = t[(i + 1) % 3];
+      sum[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  return std::ranges::all_of(sum, [](const auto& edge) { return edge.second == 0; });
+}
+
+/// The number of points, one for each edge that changes sign, of a mesh that must be closed.
+std::size_t points(const openvdb::FloatGrid::Ptr& grid, double isovalue) {
+  RunContext context;
+  const PolygonMesh mesh = marching_cubes(make_level_set(grid), isovalue, nullptr, context);
+  EXPECT_TRUE(is_closed(mesh));
+  return mesh.points.size();
+}
+
+TEST(MarchingCubes, OneInsideVoxelHasSixCrossingEdgesWhereverItLies) {
+  for (const Coord at :
+       {Coord(3, 3, 3), Coord(0, 0, 0), Coord(7, 7, 7), Coord(-1, 8, -8), Coord(4095, 0, -4096)}) {
+    auto grid = outside_grid();
+    grid->tree().setValue(at, -1.0f);
+    EXPECT_EQ(points(grid, 0.0), 6u) << at;
+  }
+}
+
+TEST(MarchingCubes, ATileOfTheOtherSignIsWalledIn) {
+  // An inside tile of 8³ alone in the background, where the tree has no leaf at all: 6 faces of 64 edges
+  // each.
+  auto grid = outside_grid();
+  grid->tree().addTile(1, Coord(16, 16, 16), -1.0f, true);
+  EXPECT_EQ(points(grid, 0.0), 6u * 64u);
+  // And one of 128³.
+  auto large = outside_grid();
+  large->tree().addTile(2, Coord(0, 0, 0), -1.0f, true);
+  EXPECT_EQ(points(large, 0.0), 6u * 128u * 128u);
+}
+
+TEST(MarchingCubes, AnActiveVoxelBesideATileOfTheOtherSign) {
+  auto grid = outside_grid();
+  grid->tree().addTile(1, Coord(0, 0, 0), -1.0f, true);
+  grid->tree().setValue(Coord(8, 3, 3), 0.5f);  // its leaf replaces nothing: the tile keeps its place
+  EXPECT_EQ(points(grid, 0.0), 6u * 64u);
+}
+
+TEST(MarchingCubes, AnIsovalueBeyondTheBackgroundHasNoSurfaceAndIsQuick) {
+  auto grid = outside_grid();
+  for (int i = 0; i < 100; ++i) grid->tree().setValue(Coord(1000 * i, -1000 * i, 0), -0.5f);
+  EXPECT_EQ(points(grid, 1.5), 0u);
+  EXPECT_EQ(points(grid, -1.5), 0u);
+}
+
+TEST(MarchingCubes, AnOutsideTileInAnInsideBackgroundIsWalledIn) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(-1.0f);
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->tree().addTile(2, Coord(0, 0, 0), 1.0f, true);
+  EXPECT_EQ(points(grid, 0.0), 6u * 128u * 128u);
+}
+
+TEST(MarchingCubes, ASampleAtTheIsovalueIsOutside) {
+  auto grid = outside_grid();
+  grid->tree().setValue(Coord(3, 3, 3), 0.0f);
+  EXPECT_EQ(points(grid, 0.0), 0u);
+  EXPECT_EQ(points(grid, 0.5), 6u);
+}
+
+TEST(MarchingCubes, DenseFogIsInside) {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(0.0f);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->tree().setValue(Coord(3, 3, 3), 1.0f);
+  EXPECT_EQ(points(grid, 0.5), 6u);
+}
+
+/// Cells that start where no leaf is, at all sides, edges and corners of leaves: each belongs to one leaf.
+TEST(MarchingCubes, CellsBelowLeavesAreMadeOnce) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 20; ++round) {
+    auto grid = outside_grid();
+    for (int i = 0; i < 60; ++i) {
+      const auto at = [&] { return static_cast<int>(random() % 5) * 8 - static_cast<int>(random() % 2); };
+      grid->tree().setValue(Coord(at(), at(), at()), -1.0f);
+    }
+    std::size_t edges = 0;
+    for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel)
+      for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {-1, 1}) {
+          Coord next = voxel.getCoord();
+          next[axis] += side;
+          edges += grid->tree().getValue(next) > 0;
+        }
+    EXPECT_EQ(points(grid, 0.0), edges) << round;
+  }
+}
+
+}  // namespace
+}  // namespace hermesh

@@ -1,0 +1,74 @@
+// The samples of a block of 8³ as bits: which edges cross and which cells are active are a few dozen
+// operations on 64-bit words a block.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+namespace hermesh {
+
+/// One bit a sample: word x holds sample (x,y,z) at bit 8y+z, the order of OpenVDB's leaves.
+using BlockMask = std::array<std::uint64_t, 8>;
+
+/// The samples of one word (one x) that are first or last along y or z.
+inline constexpr std::uint64_t kFirstY = 0xff, kLastY = kFirstY << 56, kFirstZ = 0x0101010101010101u,
+                               kLastZ = kFirstZ << 7;
+/// Samples of one word that are first along each of the axes that `y` and `z` ask for; all if neither is.
+constexpr std::uint64_t first_layers(bool y, bool z) {
+  return (y ? kFirstY : ~std::uint64_t{0}) & (z ? kFirstZ : ~std::uint64_t{0});
+}
+/// Samples of one word that are last along each of the axes that `y` and `z` ask for; all if neither is.
+constexpr std::uint64_t last_layers(bool y, bool z) {
+  return (y ? kLastY : ~std::uint64_t{0}) & (z ? kLastZ : ~std::uint64_t{0});
+}
+inline constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+
+constexpr int sample_index(int x, int y, int z) { return 64 * x + 8 * y + z; }
+constexpr bool test(const BlockMask& mask, int sample) { return (mask[sample >> 6] >> (sample & 63)) & 1; }
+constexpr int count(const BlockMask& mask) {
+  int sum = 0;
+  for (const std::uint64_t word : mask) sum += std::popcount(word);
+  return sum;
+}
+/// Number of set bits before `sample`.
+constexpr std::uint32_t rank_in(const BlockMask& mask, int sample) {
+  int before = std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1));
+  for (int word = 0; word < sample >> 6; ++word) before += std::popcount(mask[word]);
+  return static_cast<std::uint32_t>(before);
+}
+constexpr bool any(const BlockMask& mask) {
+  std::uint64_t all = 0;
+  for (const std::uint64_t word : mask) all |= word;
+  return all != 0;
+}
+/// Calls f(sample) for every set bit, in ascending order.
+template <class F>
+void for_each_bit(const BlockMask& mask, F&& f) {
+  for (int x = 0; x < 8; ++x)
+    for (std::uint64_t word = mask[x]; word != 0; word &= word - 1) f(64 * x + std::countr_zero(word));
+}
+
+/// Place of a neighbour in a list of 27, each offset −1, 0 or 1.
+constexpr int neighbour_slot(int dx, int dy, int dz) { return 9 * (dx + 1) + 3 * (dy + 1) + (dz + 1); }
+
+/// Values that stand in place of a block's index where there is no block: all samples there are outside, or all inside.
+inline constexpr std::int32_t kUniformOutside = -1, kUniformInside = -2;
+
+/// The mask of the samples (dx,dy,dz) further on, each 0 or 1; `upper(ax,ay,az)`: the mask of the block at that offset.
+template <class Upper>
+BlockMask shifted_mask(int dx, int dy, int dz, Upper&& upper) {
+  BlockMask result;
+  for (int x = 0; x < 8; ++x) {
+    const int ax = (x + dx) >> 3, word = (x + dx) & 7;
+    const auto row_shifted = [&](int az) {
+      const std::uint64_t own = upper(ax, 0, az)[word];
+      return dy == 0 ? own : (own >> 8) | (upper(ax, 1, az)[word] << 56);
+    };
+    const std::uint64_t own = row_shifted(0);
+    result[x] = dz == 0 ? own : ((own >> 1) & ~kLastZ) | ((row_shifted(1) << 7) & kLastZ);
+  }
+  return result;
+}
+
+}  // namespace hermesh

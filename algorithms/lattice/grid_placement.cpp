@@ -1,0 +1,96 @@
+#include "algorithms/lattice/grid_placement.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "algorithms/core/error.h"
+#include "algorithms/core/polygon_mesh.h"
+
+namespace hermesh {
+namespace {
+
+using openvdb::Coord;
+using Tree = openvdb::FloatTree;
+using Leaf = Tree::LeafNodeType;
+
+/// Extends the box by the leaf's active voxels, as Leaf::evalActiveBoundingBox() would by a look at one voxel after the
+/// other. Here a word of the mask is a layer along x, a byte of it a row along z.
+void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
+  Coord lowest(8), highest(-1);
+  std::uint64_t any_x = 0;
+  for (int x = 0; x < 8; ++x) {
+    const std::uint64_t word = leaf.getValueMask().getWord<std::uint64_t>(static_cast<openvdb::Index>(x));
+    if (word == 0) continue;
+    lowest.x() = std::min(lowest.x(), x), highest.x() = x;
+    any_x |= word;
+  }
+  if (any_x == 0) return;
+  // All layers over each other tell which rows along y hold a voxel; all rows over each
+  // other, in the lowest byte, tell z.
+  lowest.y() = std::countr_zero(any_x) / 8, highest.y() = 7 - std::countl_zero(any_x) / 8;
+  for (const int half : {32, 16, 8}) any_x |= any_x >> half;
+  const auto any_y = static_cast<std::uint8_t>(any_x);
+  lowest.z() = std::countr_zero(any_y), highest.z() = 7 - std::countl_zero(any_y);
+  box.expand(openvdb::CoordBBox(leaf.origin() + lowest, leaf.origin() + highest));
+}
+
+}  // namespace
+
+openvdb::CoordBBox active_box(const openvdb::FloatTree& tree) {
+  using Upper = Tree::RootNodeType::ChildNodeType;
+  using Lower = Upper::ChildNodeType;
+  // From large to small: what is active in large tiles often makes a look at the nodes and
+  // leaves within the box needless.
+  openvdb::CoordBBox box;
+  for (auto tile = tree.root().cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Upper::DIM);
+  for (auto upper = tree.root().cbeginChildOn(); upper; ++upper) {
+    for (auto tile = upper->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Lower::DIM);
+    for (auto lower = upper->cbeginChildOn(); lower; ++lower) {
+      if (box.isInside(lower->getNodeBoundingBox())) continue;
+      for (auto tile = lower->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Leaf::DIM);
+      for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
+        if (!box.isInside(openvdb::CoordBBox::createCube(leaf.getCoord(), Leaf::DIM))) include_active(*leaf, box);
+    }
+  }
+  return box;
+}
+
+IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
+  if (!grid.transform().isLinear())
+    throw Error(
+        "the volume has a perspective transform, which is not supported; resample it to a linear one");
+  // OpenVDB multiplies rows by matrices (p M), Eigen matrices by columns: the linear part is transposed.
+  const openvdb::Mat4R matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
+  IndexToWorld result;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) result.linear(row, column) = matrix(column, row);
+  const Eigen::Vector3d translation(matrix(3, 0), matrix(3, 1), matrix(3, 2));
+
+  const openvdb::CoordBBox box = active_box(grid.tree());
+  Bounds world;
+  if (!box.empty()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      // Far from index zero (four times the longest side of the data) the base moves along, so that index coordinates
+      // relative to it are small and exact. It is a multiple of 8, so that blocks remain blocks.
+      const double middle = 0.5 * (double(box.min()[axis]) + double(box.max()[axis]));
+      const double reach = 4.0 * box.extents().asVec3d()[box.maxExtent()];
+      result.base[axis] =
+          std::abs(middle) > reach ? 8 * static_cast<std::int32_t>(std::floor(middle / 8)) : 0;
+    }
+    // An affine map takes the box to a parallelepiped, whose bounds are those of its eight corners.
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d index((corner & 1 ? box.max() : box.min()).x(),
+                                  (corner & 2 ? box.max() : box.min()).y(),
+                                  (corner & 4 ? box.max() : box.min()).z());
+      world.add(result.linear * index + translation);
+    }
+    result.origin = choose_origin(world);
+  }
+  // Large numbers cancel here, once for the grid and in double precision, instead of at every sample.
+  const Eigen::Vector3d base(result.base[0], result.base[1], result.base[2]);
+  result.offset = result.linear * base + (translation - result.origin);
+  return result;
+}
+
+}  // namespace hermesh

@@ -1,0 +1,18 @@
+// Where the samples of an OpenVDB grid are. Heavy (OpenVDB): include it from .cpp files.
+#pragma once
+
+#include "algorithms/core/openvdb_trees.h"
+#include "algorithms/lattice/placement.h"
+
+namespace hermesh {
+
+/// Bounding box of the active voxels in index coordinates, as FloatTree::evalActiveVoxelBoundingBox() gives it, which
+/// reads where a leaf is from the leaf itself, and so waits for memory as often as there are leaves. Most leaves lie
+/// within the box of those before them, and then the node above tells.
+openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
+
+/// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
+/// @throws Error for a grid with perspective.
+IndexToWorld placement_of(const openvdb::FloatGrid& grid);
+
+}  // namespace hermesh
