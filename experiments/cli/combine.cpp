@@ -14,7 +14,7 @@
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/harness/rows.h"
+#include "experiments/pipeline.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh::cli {

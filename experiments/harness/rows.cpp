@@ -8,63 +8,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "algorithms/core/error.h"
+
 namespace hermesh {
-using validation::MeshReport;
-
-std::vector<std::string> promise_words(const Promises& promises) {
-  std::vector<std::string> words;
-  if (promises.closed) words.push_back("closed");
-  if (promises.manifold) words.push_back("manifold");
-  if (promises.oriented) words.push_back("oriented");
-  if (promises.no_self_intersection) words.push_back("no self-intersection");
-  return words;
-}
-
-PromiseCheck check_promises(const Promises& promises, const MeshReport& report) {
-  PromiseCheck check;
-  const auto counted = [](std::int64_t count, const char* what) {
-    return std::to_string(count) + " " + what;
-  };
-  if (promises.closed && !report.closed())
-    check.broken.push_back("closed (" + counted(report.boundary_edges, "boundary edges)"));
-  if (promises.manifold && !report.manifold())
-    check.broken.push_back("manifold (" + counted(report.non_manifold_edges, "edges and ") +
-                           counted(report.non_manifold_vertices, "vertices are not)"));
-  if (promises.oriented && !report.oriented())
-    check.broken.push_back("oriented (" + counted(report.inconsistent_edges, "inconsistent edges)"));
-  // Every polygon turned round leaves no inconsistent edge, but a closed surface then has a negative volume.
-  if (promises.oriented && report.oriented() && report.closed() && report.volume < 0.0)
-    check.broken.push_back("oriented (inside out, the volume is negative)");
-  if (promises.no_self_intersection) {
-    if (!report.self_intersections)
-      check.unchecked.push_back("no self-intersection");
-    else if (report.self_intersections->pairs > 0)
-      check.broken.push_back("no self-intersection (" + counted(report.self_intersections->pairs, "pairs)"));
-  }
-  return check;
-}
-
-std::string promise_verdict(const Promises& promises, const PromiseCheck& check) {
-  const auto joined = [](const std::vector<std::string>& words) {
-    std::string text;
-    for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-    return text;
-  };
-  if (!check.broken.empty()) return "BROKEN: " + joined(check.broken);
-  const std::vector<std::string> words = promise_words(promises);
-  if (words.empty()) return "promises nothing";
-  return "promises " + joined(words) + (check.unchecked.empty() ? ": kept" : ": not all checked");
-}
-
-std::string promise_letters(const Promises& promises, const PromiseCheck& check) {
-  std::string letters;
-  if (promises.closed) letters += 'c';
-  if (promises.manifold) letters += 'm';
-  if (promises.oriented) letters += 'o';
-  if (promises.no_self_intersection) letters += 'i';
-  if (letters.empty()) return "none";
-  return letters + (!check.broken.empty() ? " BROKEN" : check.unchecked.empty() ? " kept" : " unchecked");
-}
 
 void add_time_ratios(std::vector<Json>& rows) {
   const auto median_of = [](const Json& row) -> const Json* {

@@ -5,26 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/core/variant.h"
 #include "experiments/harness/columns.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
-
-/// The promises as words: "closed", "manifold", "oriented", "no self-intersection".
-std::vector<std::string> promise_words(const Promises& promises);
-
-struct PromiseCheck {
-  std::vector<std::string> broken;     ///< "closed (5 boundary edges)"
-  std::vector<std::string> unchecked;  ///< promised, but not judged in this run
-};
-PromiseCheck check_promises(const Promises& promises, const validation::MeshReport& report);
-
-/// For a picture's caption: "promises closed, oriented: kept", or "BROKEN: closed (5 boundary edges)".
-std::string promise_verdict(const Promises& promises, const PromiseCheck& check);
-/// For a narrow column, a letter for each promise (c, m, o, i): "co kept", "co BROKEN", "coi unchecked",
-/// "none".
-std::string promise_letters(const Promises& promises, const PromiseCheck& check);
 
 /// Sets `time_over_openvdb` in every timed row: its median time divided by that of the first row of variant
 /// "openvdb", below 1 where it is faster. The rows must be of one run, one case, one resolution. Without such

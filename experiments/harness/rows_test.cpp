@@ -11,8 +11,6 @@
 namespace hermesh {
 namespace {
 
-using validation::MeshReport;
-
 class Rows : public testing::Test {
  protected:
   void SetUp() override {
@@ -74,43 +72,6 @@ TEST(TimeRatios, AreAbsentWithoutOpenvdb) {
   std::vector<Json> rows = {row_of("toy", 1.0)};
   add_time_ratios(rows);
   EXPECT_FALSE(rows[0].contains("time_over_openvdb"));
-}
-
-TEST(PromiseCheck, AMeshThatIsInsideOutIsNotOriented) {
-  MeshReport report;
-  report.volume = -1.0;
-  EXPECT_EQ(check_promises({.oriented = true}, report).broken,
-            (std::vector<std::string>{"oriented (inside out, the volume is negative)"}));
-  EXPECT_TRUE(check_promises({.closed = true}, report).broken.empty());
-  report.volume = 1.0;
-  EXPECT_TRUE(check_promises({.oriented = true}, report).broken.empty());
-}
-
-TEST(PromiseCheck, NamesWhatIsBrokenAndWhatNobodyLookedAt) {
-  const Promises all{true, true, true, true};
-  MeshReport good;
-  EXPECT_TRUE(check_promises(all, good).broken.empty());
-  EXPECT_EQ(check_promises(all, good).unchecked, (std::vector<std::string>{"no self-intersection"}));
-
-  MeshReport bad;
-  bad.boundary_edges = 5;
-  bad.non_manifold_vertices = 2;
-  bad.inconsistent_edges = 1;
-  bad.self_intersections.emplace().pairs = 7;
-  const PromiseCheck check = check_promises(all, bad);
-  EXPECT_EQ(check.broken, (std::vector<std::string>{
-                              "closed (5 boundary edges)", "manifold (0 edges and 2 vertices are not)",
-                              "oriented (1 inconsistent edges)", "no self-intersection (7 pairs)"}));
-  EXPECT_TRUE(check.unchecked.empty());
-  EXPECT_EQ(promise_letters(all, check), "cmoi BROKEN");
-  EXPECT_EQ(promise_letters(all, check_promises(all, good)), "cmoi unchecked");
-  EXPECT_EQ(promise_letters({.manifold = true}, {}), "m kept");
-  EXPECT_EQ(promise_letters({}, {}), "none");
-  EXPECT_EQ(promise_verdict({.closed = true, .oriented = true}, {}), "promises closed, oriented: kept");
-  EXPECT_EQ(promise_verdict({.closed = true}, check_promises({.closed = true}, bad)),
-            "BROKEN: closed (5 boundary edges)");
-  EXPECT_TRUE(check_promises({}, bad).broken.empty());
-  EXPECT_EQ(check_promises({.manifold = true}, bad).broken.size(), 1u);
 }
 
 }  // namespace

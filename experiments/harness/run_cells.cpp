@@ -9,6 +9,7 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"
 #include "experiments/harness/provenance.h"
+#include "experiments/pipeline.h"
 #include "validation/geometry/distance.h"
 #include "validation/report_json.h"
 
@@ -16,8 +17,7 @@ namespace hermesh {
 namespace {
 
 struct Cell {
-  const Extractor* extractor = nullptr;
-  Options options;
+  ExtractRecipe recipe;
   Json row;
   std::string uniform;              ///< as in VariantEntry
   std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
@@ -29,9 +29,10 @@ class Group {
   Group(const GroupInput& group, RunContext& context)
       : in_(group),
         context_(context),
-        voxel_size_(bounds(group.input.mesh).size().maxCoeff() / group.resolution),
         name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)),
-        voxelizer_(find_variant(in_.tables.voxelizers, in_.voxelizer.name)) {
+        recipe_{.chosen = choose(in_.tables.voxelizers, in_.voxelizer.name, in_.voxelizer.options),
+                .resolution = double(group.resolution)},
+        voxel_size_(voxel_size_of(recipe_, group.input.mesh)) {
     if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.label));
   }
 
@@ -55,16 +56,15 @@ class Group {
  private:
   Cell make_cell(const VariantEntry& variant) const {
     Cell cell;
-    cell.extractor = &find_variant(in_.tables.extractors, variant.name);
-    cell.options = Options(variant.name, cell.extractor->options, variant.options);
+    cell.recipe.chosen = choose(in_.tables.extractors, variant.name, variant.options);
     cell.row = in_.head;
     cell.row["case"] = case_json(in_.input);
     cell.row["resolution"] = in_.resolution;
     cell.row["voxel_size"] = voxel_size_;
     cell.row["samples"] = in_.tier.samples;
-    cell.row["variant"] = variant_json(variant, cell.options);
+    cell.row["variant"] = variant_json(variant, cell.recipe.chosen.options);
     cell.uniform = variant.uniform;
-    cell.row["variant"]["promises"] = promise_words(cell.extractor->promises);
+    cell.row["variant"]["promises"] = promise_words(cell.recipe.chosen.extractor.promises);
     return cell;
   }
 
@@ -76,14 +76,10 @@ class Group {
   }
 
   void voxelize() {
-    const Options options(voxelizer_.name, voxelizer_.options, in_.voxelizer.options);
-    voxelization_ = variant_json(in_.voxelizer, options);
+    voxelization_ = variant_json(in_.voxelizer, recipe_.chosen.options);
     const auto once = [&](bool with_progress, std::optional<StageSeconds>* stages) {
       RunContext child = child_context(context_, with_progress);
-      const double seconds = timed([&] {
-        level_set_ = voxelizer_.voxelize(
-            {.mesh = in_.input.mesh, .voxel_size = voxel_size_, .context = child, .options = options});
-      });
+      const double seconds = timed([&] { level_set_ = hermesh::voxelize(in_.input.mesh, recipe_, child); });
       if (stages) *stages = child.stage_seconds;
       return seconds;
     };
@@ -105,14 +101,13 @@ class Group {
     voxelization_["digest"] = digest(level_set_);
     voxelization_["active_voxels"] = level_set_.active_voxels();
     voxelization_["memory_bytes"] = level_set_.memory_bytes();
-    const LostSurface lost =
-        find_lost_surface(in_.input.mesh, level_set_, leaves_out_inner_polygons(voxelizer_), context_);
+    const LostSurface lost = find_lost_surface(in_.input.mesh, level_set_,
+                                               leaves_out_inner_polygons(recipe_.chosen.voxelizer), context_);
     voxelization_["lost_surface"] = {{"share", lost.share()}, {"thickness", lost.thickness}};
   }
 
   PolygonMesh extract(const Cell& cell, RunContext& child) const {
-    return cell.extractor->extract(
-        {.level_set = level_set_, .source = &in_.input.mesh, .options = cell.options, .context = child});
+    return hermesh::extract(level_set_, &in_.input.mesh, cell.recipe, child).mesh;
   }
 
   void extract_and_judge(Cell& cell, std::size_t number) {
@@ -153,17 +148,16 @@ class Group {
       options.features = &source_;
       options.dihedral_degrees = *in_.experiment.features;
     }
-    validation::MeshReport report;
+    const Promises& promises = cell.recipe.chosen.extractor.promises;
     MeshFile mesh;
+    Judgement judgement;
     cell.row["judge_seconds"] = timed([&] {
       mesh = read_mesh_file(cell.mesh_file, child);
-      report = validation::judge(mesh, options, child);
+      judgement = judge(mesh, promises, options, child);
     });
+    const auto& [report, check] = judgement;
     if (!cell.uniform.empty()) compare_with_uniform(mesh, cell, child);
     cell.row["report"] = validation::to_json(report);
-
-    const Promises& promises = cell.extractor->promises;
-    const PromiseCheck check = check_promises(promises, report);
     cell.row["broken"] = check.broken;
     cell.row["unchecked"] = check.unchecked;
     cell.row["promise_letters"] = promise_letters(promises, check);
@@ -252,9 +246,9 @@ class Group {
 
   const GroupInput& in_;
   RunContext& context_;
-  double voxel_size_;
   std::string name_;
-  const Voxelizer& voxelizer_;
+  VoxelizeRecipe recipe_;
+  double voxel_size_;
   LevelSet level_set_;
   MeshFile source_;
   Json voxelization_;

@@ -10,6 +10,7 @@
 #include "experiments/harness/digest.h"
 #include "experiments/harness/level_set_facts.h"
 #include "experiments/harness/provenance.h"
+#include "experiments/pipeline.h"
 #include "reference/level_set_judge.h"
 #include "validation/report_json.h"
 
@@ -110,8 +111,7 @@ class Truths {
 };
 
 struct Cell {
-  const Voxelizer* voxelizer = nullptr;
-  Options options;
+  VoxelizeRecipe recipe;
   Json row;
   std::uint64_t fingerprint = 0;
   std::optional<Timing> timing;  ///< absent when the voxelizer failed
@@ -144,12 +144,15 @@ class Group {
  private:
   Cell make_cell(const VariantEntry& variant) const {
     Cell cell;
-    cell.voxelizer = &find_variant(in_.tables.voxelizers, variant.name);
-    cell.options = Options(variant.name, cell.voxelizer->options, variant.options);
+    cell.recipe = {.chosen = choose(in_.tables.voxelizers, variant.name, variant.options),
+                   .voxel_size = in_.voxel_size,
+                   .exterior_band = in_.experiment.exterior_band,
+                   .interior_band = in_.experiment.interior_band};
+    const Options& options = cell.recipe.chosen.options;
     cell.row = in_.head;
-    cell.row["variant"] = variant_json(variant, cell.options);
-    const Options usual(variant.name, cell.voxelizer->options, {});
-    cell.row["variant"]["default_options"] = cell.options.canonical() == usual.canonical();
+    cell.row["variant"] = variant_json(variant, options);
+    const Options usual = choose(in_.tables.voxelizers, variant.name).options;
+    cell.row["variant"]["default_options"] = options.canonical() == usual.canonical();
     return cell;
   }
 
@@ -164,14 +167,7 @@ class Group {
     RunContext child = child_context(context_, with_progress);
     Once result;
     const double cpu = process_cpu_seconds();
-    result.seconds = timed([&] {
-      result.level_set = cell.voxelizer->voxelize({.mesh = in_.input.mesh,
-                                                   .voxel_size = in_.voxel_size,
-                                                   .exterior_band = in_.experiment.exterior_band,
-                                                   .interior_band = in_.experiment.interior_band,
-                                                   .context = child,
-                                                   .options = cell.options});
-    });
+    result.seconds = timed([&] { result.level_set = voxelize(in_.input.mesh, cell.recipe, child); });
     result.cpu_seconds = process_cpu_seconds() - cpu;
     result.stages = child.stage_seconds;
     result.notes = child.notes;

@@ -13,7 +13,7 @@
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/variants.h"
-#include "experiments/harness/rows.h"
+#include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
 #include "validation/mesh_report.h"
 #include "validation/geometry/triangle_tree.h"

@@ -10,7 +10,7 @@
 
 #include "algorithms/io/written_precision.h"
 #include "algorithms/variants.h"
-#include "experiments/harness/rows.h"
+#include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
 #include "validation/mesh_report.h"
 
