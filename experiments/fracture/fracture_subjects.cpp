@@ -4,6 +4,7 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 
@@ -28,12 +29,9 @@ PolygonMesh load_subject(const FractureSubject& subject, const MeasurementInput&
 
 SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input) {
   RunContext child = child_context(input.context, false);
-  const Voxelizer& voxelizer = find_variant(input.tables.voxelizers, "hermesh");
   SampledSubject result;
-  result.object.level_set = voxelizer.voxelize({.mesh = mesh,
-                                                .voxel_size = bounds(mesh).size().maxCoeff() / longest,
-                                                .context = child,
-                                                .options = Options(voxelizer.name, voxelizer.options, {})});
+  result.object.level_set =
+      voxelize(mesh, {.chosen = choose(input.tables.voxelizers, "hermesh"), .resolution = longest}, child);
   result.hermite_seconds =
       timed([&] { result.object.hermite = sample_polygons(result.object.level_set, 0.0, mesh, child); });
   return result;

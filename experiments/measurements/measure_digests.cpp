@@ -16,11 +16,12 @@
 #include "experiments/harness/digest.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
-using Given = std::map<std::string, std::string>;
+using Given = GivenOptions;
 
 /// How often the work of a cell is done: once for the digest, and then in each of these ways for the same
 /// digest.
@@ -164,13 +165,12 @@ class Digests {
 
   LevelSet voxelized(const PolygonMesh& mesh, const std::string& name, const Given& options, double band,
                      RunContext& context) {
-    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, name);
-    return voxelizer.voxelize({.mesh = mesh,
-                               .voxel_size = voxel_size(),
-                               .exterior_band = band,
-                               .interior_band = band,
-                               .context = context,
-                               .options = Options(name, voxelizer.options, options)});
+    return voxelize(mesh,
+                    {.chosen = choose(input_.tables.voxelizers, name, options),
+                     .voxel_size = voxel_size(),
+                     .exterior_band = band,
+                     .interior_band = band},
+                    context);
   }
 
   void level_sets() {
@@ -208,10 +208,8 @@ class Digests {
         all.push_back({{"representation", "thesis"}, {"threshold", "1"}});
       for (const Given& given : all)
         row("mesh: " + extractor.name + text(given), [&](RunContext& child) {
-          return digest(extractor.extract({.level_set = level_set(),
-                                           .source = &mesh(),
-                                           .options = Options(extractor.name, extractor.options, given),
-                                           .context = child}));
+          const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, extractor.name, given)};
+          return digest(extract(level_set(), &mesh(), recipe, child).mesh);
         });
     }
   }
@@ -276,7 +274,7 @@ class Digests {
   /// The digest, or the sentence of what went wrong; in all ways the same.
   void row(const std::string& what, const std::function<std::string(RunContext&)>& make) {
     const std::string label = name_ + ", " + what;
-    if (("digests/digests/" + label).find(input_.filter) == std::string::npos) return;
+    if (!input_.wants("digests", label)) return;
     std::string first;
     std::vector<std::string> broken;
     for (const Way& way : ways_) {

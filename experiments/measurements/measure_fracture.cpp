@@ -1,5 +1,6 @@
 // The books of fractures by all methods, and their times: figures 9.15 and 9.16 of the thesis.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -47,14 +48,13 @@ class FractureBooks {
     const double scale = input_.parameters.number("scale");
     for (const FractureSubject& subject : fracture_subjects()) {
       if (!input_.parameters.is("cases", "all") && !input_.parameters.is("cases", subject.source)) continue;
+      const std::vector<Cell> cells = cells_of(subject);
+      if (cells.empty()) continue;
       const PolygonMesh mesh = load_subject(subject, input_);
       const FractureObject object = sampled(mesh, scale * subject.longest);
       tag_oracle_.emplace(triangles_in_voxels(mesh, object.level_set.voxel_size()));
       tag_origin_ = mesh.origin;
-      for (const double count : numbers(input_.parameters.text("pieces")))
-        for (const char* method : {"labelled", "thesis", "openvdb"})
-          for (const double tolerance : tolerances_of(method))
-            add_row(subject, object, static_cast<std::size_t>(count), method, tolerance);
+      for (const Cell& cell : cells) add_row(subject, object, cell);
     }
     if (input_.parameters.is("order", "yes")) measure_order();
     std::ranges::move(tag_rows_, std::back_inserter(rows_));
@@ -65,6 +65,26 @@ class FractureBooks {
   /// The other methods mean something else by it, so they run at their finest.
   std::vector<double> tolerances_of(const std::string& method) const {
     return method == "labelled" ? numbers(input_.parameters.text("tolerances")) : std::vector{0.0};
+  }
+
+  struct Cell {
+    std::string label;
+    std::size_t count;
+    std::string method;
+    double tolerance;
+  };
+  /// Those that the filter leaves.
+  std::vector<Cell> cells_of(const FractureSubject& subject) const {
+    std::vector<Cell> cells;
+    for (const double count : numbers(input_.parameters.text("pieces")))
+      for (const char* method : {"labelled", "thesis", "openvdb"})
+        for (const double tolerance : tolerances_of(method)) {
+          std::string label = subject.label + ", " + std::to_string(std::size_t(count)) + ", " + method;
+          if (tolerance > 0) label += " " + readable(tolerance);
+          if (input_.wants("ledger", label) || input_.wants("tags", label))
+            cells.push_back({label, std::size_t(count), method, tolerance});
+        }
+    return cells;
   }
 
   FractureObject sampled(const PolygonMesh& mesh, double longest) {
@@ -80,20 +100,16 @@ class FractureBooks {
     return parse_cutters(input_.parameters.text("cutters") + ":" + std::to_string(count));
   }
 
-  void add_row(const FractureSubject& subject, const FractureObject& object, std::size_t count,
-               const std::string& method, double tolerance) {
-    std::string label = subject.label + ", " + std::to_string(count) + ", " + method;
-    if (tolerance > 0) label += " " + readable(tolerance);
-    if (("fracture/ledger/" + label).find(input_.filter) == std::string::npos) return;
-    input_.context.progress(label, 0.0);
-    MeasuredRow row{"ledger", label, Json::object()};
-    const auto failure = attempt([&] { fill(row, subject, object, count, method, tolerance); });
+  void add_row(const FractureSubject& subject, const FractureObject& object, const Cell& cell) {
+    input_.context.progress(cell.label, 0.0);
+    MeasuredRow row{"ledger", cell.label, Json::object()};
+    const auto failure = attempt([&] { fill(row, subject, object, cell); });
     if (failure) row.broken.push_back(*failure);
     rows_.push_back(std::move(row));
   }
 
-  void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object, std::size_t count,
-            const std::string& method, double tolerance) {
+  void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object, const Cell& cell) {
+    const auto& [label, count, method, tolerance] = cell;
     RunContext child = child_context(input_.context, false);
     CutterChoices choices;
     choices.seed = input_.seed;
@@ -176,9 +192,12 @@ class FractureBooks {
   /// How fast what the cuts take from the uncut volume falls with the size of voxels.
   void measure_order() {
     const FractureSubject& subject = fracture_subjects()[1];
+    constexpr std::array kResolutions = {50, 100, 200};
+    const auto label = [&](int resolution) { return subject.label + ", 20, at " + std::to_string(resolution); };
+    if (std::ranges::none_of(kResolutions, [&](int each) { return input_.wants("order", label(each)); })) return;
     const PolygonMesh mesh = load_subject(subject, input_);
     std::optional<double> before;
-    for (const double resolution : {50.0, 100.0, 200.0}) {
+    for (const int resolution : kResolutions) {
       RunContext child = child_context(input_.context, false);
       const FractureObject object = sampled(mesh, resolution);
       CutterChoices choices;
@@ -192,9 +211,7 @@ class FractureBooks {
       run_fracture(
           object, cutters, {}, [&](PieceOutput&& piece) { volume += piece.mass.volume; }, child);
       const double difference = std::abs(volume / uncut_volume_ - 1.0);
-      MeasuredRow row{"order",
-                      subject.label + ", 20, at " + std::to_string(int(resolution)),
-                      {{"difference", difference}}};
+      MeasuredRow row{"order", label(resolution), {{"difference", difference}}};
       if (before && difference > 0) row.values["order"] = std::log2(*before / difference);
       before = difference;
       rows_.push_back(std::move(row));

@@ -97,10 +97,6 @@ class FractureGuarantee {
   }
 
  private:
-  bool wanted(const std::string& table, const std::string& label) const {
-    return ("fracture_guarantee/" + table + "/" + label).find(input_.filter) != std::string::npos;
-  }
-
   struct Broken {
     std::string label, cutters;
   };
@@ -109,7 +105,7 @@ class FractureGuarantee {
     for (const std::string& cutters : words_of(input_.parameters.text("cutters")))
       for (const std::string& pieces : words_of(input_.parameters.text("pieces"))) {
         const std::string word = cutters + ":" + pieces;
-        if (wanted("models", name + ", " + word)) result.push_back({name + ", " + word, word});
+        if (input_.wants("models", name + ", " + word)) result.push_back({name + ", " + word, word});
       }
     return result;
   }
@@ -151,7 +147,7 @@ class FractureGuarantee {
   void measure_trial(int number) {
     const FractureTrial trial = fracture_trial(input_.seed + std::uint64_t(number));
     const std::string label = trial.kind + " " + std::to_string(input_.seed + std::uint64_t(number));
-    if (!wanted("trials", label)) return;
+    if (!input_.wants("trials", label)) return;
     input_.context.progress(label, 0.0);
     MeasuredRow row{"trials", label, Json::object()};
     Sum sum;

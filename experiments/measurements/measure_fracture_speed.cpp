@@ -52,7 +52,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   const auto pieces = static_cast<std::size_t>(input.parameters.number("pieces"));
   for (const FractureSubject& subject : fracture_subjects()) {
     const std::string label = subject.label + ", " + std::to_string(pieces);
-    if (("fracture_speed/speed/" + label).find(input.filter) == std::string::npos) continue;
+    if (!input.wants("speed", label)) continue;
     input.context.progress(label, 0.0);
     if (const auto failure = attempt([&] { rows.push_back(race_of(subject, pieces, input)); }))
       rows.push_back({"speed", label, Json::object(), {*failure}});

@@ -2,7 +2,6 @@
 // and patterns of signs.
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -18,16 +17,15 @@
 #include <tuple>
 #include <utility>
 
-#include "algorithms/io/mesh_file.h"
 #include "experiments/harness/cell.h"
 #include "experiments/measurements/guarantee_columns.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/sha256.h"
 #include "experiments/harness/solid_columns.h"
 #include "experiments/cases/test_volumes.h"
-#include "validation/mesh_report.h"
 #include "validation/solid_comparison.h"
 
 namespace hermesh {
@@ -35,9 +33,8 @@ namespace {
 
 constexpr const char *kGuaranteed = "manifold-dual-contouring", *kOctree = "certified-octree";
 
-/// What the bound may be exceeded by, in voxels: the slack of the extractor's own proof, and the gap of the
-/// judge's.
-constexpr double kSlack = 0.01, kGap = 0.001;
+/// The gap between the two ends of a certified distance, in voxels.
+constexpr double kGap = 0.001;
 
 /// Enough for a hundredth of a solid; there are thousands of meshes.
 constexpr std::int64_t kSolidSamples = 20'000;
@@ -52,7 +49,7 @@ constexpr int kLargestCertified = 32;
 
 struct Contender {
   const char* name;
-  std::map<std::string, std::string> options;
+  GivenOptions options;
 };
 const std::vector<Contender>& others() {
   static const std::vector<Contender> table = {{"adaptive-dual-contouring", {{"threshold", "0.1"}}},
@@ -98,23 +95,6 @@ std::vector<double> numbers(const std::string& text) {
 /// Digits of a SHA-256 that are kept: of all meshes of all runs no two agree in them by chance.
 constexpr std::size_t kDigits = 16;
 
-/// The mesh as its file holds it: rounding on the way is part of the promise.
-MeshFile as_written(const PolygonMesh& mesh, RunContext& context) {
-  if (mesh.empty()) return {};
-  static std::atomic<int> files = 0;
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("hermesh-guarantee-" + std::to_string(getpid()) + "-" + std::to_string(files++) + ".ply");
-  struct Removal {
-    std::filesystem::path path;
-    ~Removal() {
-      std::error_code ignored;
-      std::filesystem::remove(path, ignored);
-    }
-  } removal{path};
-  write_mesh(path, mesh, context);
-  return read_mesh_file(path, context);
-}
-
 void set_counts(Json& values, const validation::MeshReport& report) {
   values["boundary"] = report.boundary_edges;
   values["non_manifold_edges"] = report.non_manifold_edges;
@@ -124,18 +104,6 @@ void set_counts(Json& values, const validation::MeshReport& report) {
   values["self_intersections"] = report.self_intersections ? report.self_intersections->pairs : 0;
   values["components"] = report.components;
   values["euler"] = report.euler_characteristic;
-}
-
-std::vector<std::string> violations_of(const Json& values, double tolerance) {
-  std::vector<std::string> result;
-  for (const char* defect : {"boundary", "non_manifold_edges", "non_manifold_vertices", "inconsistent",
-                             "degenerate", "self_intersections"})
-    if (values[defect] > 0) result.push_back(std::string(defect) + " " + values[defect].dump());
-  if (values.value("same_topology", "yes") != "yes") result.push_back("other topology than the uniform mesh");
-  for (const char* way : {"from_upper", "to_upper"})
-    if (values.contains(way) && values[way] > tolerance + kSlack)
-      result.push_back(std::string(way) + " " + values[way].dump() + " beyond the tolerance");
-  return result;
 }
 
 /// Of meshes that nobody judged no number is stated, unless some could not be made.
@@ -233,18 +201,13 @@ class SubjectMeasurement {
   void measure_model(const std::string& name, double resolution) {
     RunContext child = child_context(input_.context, false);
     const LoadedCase loaded = input_.tables.load(name, child);
-    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, "hermesh");
+    const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution};
     const std::string label = name + (loaded.origin.starts_with("stand-in") ? ", stand-in" : "");
-    const double size = bounds(loaded.mesh).size().maxCoeff() / resolution;
-    const VoxelizationInput what = {.mesh = loaded.mesh,
-                                    .voxel_size = size,
-                                    .context = child,
-                                    .options = Options(voxelizer.name, voxelizer.options, {})};
     std::optional<LevelSet> level_set;
-    if (const auto failure = attempt([&] { level_set = voxelizer.voxelize(what); }))
+    if (const auto failure = attempt([&] { level_set = voxelize(loaded.mesh, recipe, child); }))
       rows.push_back({"models", label, {{"resolution", int(resolution)}}, {*failure}});
     else
-      measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, size,
+      measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, voxel_size_of(recipe, loaded.mesh),
                    input_.parameters.is("certify", "yes") && resolution <= kFinestCertified});
   }
 
@@ -308,6 +271,7 @@ class SubjectMeasurement {
     rows.push_back(overview.row(judged_));
     source_.reset();
     reference_ = {};  // of hundreds of subjects it would be gigabytes
+    reference_report_.reset();
   }
 
 
@@ -323,10 +287,8 @@ class SubjectMeasurement {
     row.values["extractor"] = contender.name;
     if (tolerance) row.values["tolerance"] = *tolerance;
     std::vector<std::string> violations;
-    if (const auto failure = attempt([&] { fill(row.values, subject, contender, tolerance); }))
+    if (const auto failure = attempt([&] { violations = fill(row.values, subject, contender, tolerance); }))
       violations = {*failure};
-    else if (judged_)
-      violations = violations_of(row.values, tolerance.value_or(0.0));
     add_to_sum(subject.kind, row, tolerance, !violations.empty());
     // The others promise less; their defects are figures.
     if (tolerance) row.broken = std::move(violations);
@@ -334,46 +296,55 @@ class SubjectMeasurement {
     return rows.back();
   }
 
-  void fill(Json& values, const Subject& subject, const Contender& contender,
-            std::optional<double> tolerance) {
+  /// What it breaks of the promises.
+  std::vector<std::string> fill(Json& values, const Subject& subject, const Contender& contender,
+                                std::optional<double> tolerance) {
     RunContext child = child_context(input_.context, false);
-    const Extractor& extractor = find_variant(input_.tables.extractors, contender.name);
-    const Options options(extractor.name, extractor.options, contender.options);
-    PolygonMesh mesh;
-    values["seconds"] = timed([&] {
-      mesh = extractor.extract(
-          {.level_set = subject.level_set, .source = subject.source, .options = options, .context = child});
-    });
-    values["triangles"] = mesh.triangle_count();
-    values["digest"] = sha256_of_mesh(mesh).substr(0, kDigits);
+    Outcome outcome = run(job_of(subject, contender, tolerance), child);
+    values["seconds"] = outcome.extract_seconds;
+    values["triangles"] = outcome.made.mesh.triangle_count();
+    values["digest"] = sha256_of_mesh(outcome.made.mesh).substr(0, kDigits);
     if (tolerance)
       for (const auto& [name, value] : child.figures)
         if (std::ranges::count(kFigures, name) > 0) values[name] = value;
-    if (judged_) judge(values, as_written(mesh, child), subject, tolerance, child);
+    if (judged_) describe(values, outcome, subject, tolerance, child);
+    return outcome.judgement.promises.broken;
   }
 
-  void judge(Json& values, MeshFile written, const Subject& subject, std::optional<double> tolerance,
-             RunContext& context) {
+  Job job_of(const Subject& subject, const Contender& contender, std::optional<double> tolerance) const {
+    Job job{.source = {.polygons = subject.source, .volume = &subject.level_set},
+            .extract = {.chosen = choose(input_.tables.extractors, contender.name, contender.options)},
+            .format = ".ply"};
+    // What the others would break of our promises is counted, though they promise less.
+    job.extract.chosen.extractor.promises = find_variant(input_.tables.extractors, kGuaranteed).promises;
+    if (!judged_) return job;
     // The distances over samples, which come along with the certificate, are not wanted.
-    validation::JudgeOptions options = {
-        .self_intersections = true, .libraries = false, .samples = 1, .solid_samples = 0};
-    if (tolerance.value_or(0.0) > 0 && subject.certify && !written.points.empty() &&
-        !reference_.points.empty()) {
-      options.reference = &reference_;
-      options.reference_quads = validation::QuadRule::as_given;
-      options.certify = true;
-      options.certify_gap = kGap * subject.voxel_size;
+    job.judge = {.self_intersections = true, .libraries = false, .samples = 1, .solid_samples = 0};
+    if (!tolerance) return job;
+    job.circumstances.bound = Circumstances::Bound{*tolerance, subject.voxel_size};
+    if (*tolerance == 0) return job;
+    if (reference_report_) job.circumstances.bound->uniform = &*reference_report_;
+    if (subject.certify && !reference_.points.empty()) {
+      job.judge->reference = &reference_;
+      job.judge->reference_quads = validation::QuadRule::as_given;
+      job.judge->certify = true;
+      job.judge->certify_gap = kGap * subject.voxel_size;
     }
-    const validation::MeshReport report = validation::judge(written, options, context);
+    return job;
+  }
+
+  void describe(Json& values, Outcome& outcome, const Subject& subject, std::optional<double> tolerance,
+                RunContext& context) {
+    const validation::MeshReport& report = outcome.judgement.report;
     set_counts(values, report);
-    if (source_) compare_with_source(values, written, subject, tolerance.value_or(0.0), context);
+    if (source_) compare_with_source(values, outcome.written, subject, tolerance.value_or(0.0), context);
     if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
       values["to_upper"] = to->upper / subject.voxel_size;
       values["lower"] = std::max(from->lower, to->lower) / subject.voxel_size;
     }
     if (tolerance && *tolerance == 0) {
-      reference_ = std::move(written);
+      reference_ = std::move(outcome.written);
       reference_report_ = report;
     } else if (tolerance && reference_report_) {
       const bool same = report.components == reference_report_->components &&
@@ -472,7 +443,7 @@ class Guarantee {
 
   void list_models() {
     for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) {
-      if (!wanted("models", name)) continue;
+      if (!input_.wants("models", name)) continue;
       std::vector<double> resolutions = numbers(input_.parameters.text("resolutions"));
       if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
       for (const double resolution : resolutions)
@@ -487,7 +458,7 @@ class Guarantee {
     for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) {
       const std::string label = (i % 2 == 0 ? "uniform " : "whole ") + three_digits(i);
       const int n = int(sizes[std::size_t(i / 2) % sizes.size()]);
-      if (wanted("noise", label))
+      if (input_.wants("noise", label))
         work_.push_back(
             {"noise " + label, [=](SubjectMeasurement& subject) { subject.measure_noise(i, n, label); }});
     }
@@ -496,15 +467,10 @@ class Guarantee {
   void list_patterns() {
     for (int i = 0; i < int(input_.parameters.number("pattern_fields")); ++i) {
       const std::string label = (i == 0 ? "cells " : "random ") + three_digits(i);
-      if (wanted("patterns", label))
+      if (input_.wants("patterns", label))
         work_.push_back(
             {"patterns " + label, [=](SubjectMeasurement& subject) { subject.measure_patterns(i, label); }});
     }
-  }
-
-  /// The rows that the filter throws away need not be made: subjects are left out here and not after hours.
-  bool wanted(const std::string& kind, const std::string& label) const {
-    return ("guarantee/" + kind + "/" + label).find(input_.filter) != std::string::npos;
   }
 
   static std::string three_digits(int number) {

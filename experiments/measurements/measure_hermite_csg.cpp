@@ -9,8 +9,8 @@
 #include "algorithms/hermite/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/harness/run_cells.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
@@ -88,12 +88,27 @@ std::size_t differences(const FloatHermite& a, const FloatHermite& b) {
   return count_of + (b.crossings.size() - in_both);
 }
 
+/// Pairs of random solids, made when the first representation asks for them.
+struct Pairs {
+  const MeasurementInput& input;
+  std::vector<std::array<FloatHermite, 2>> made = {};
+
+  const std::vector<std::array<FloatHermite, 2>>& all() {
+    std::mt19937_64 random(input.seed);
+    while (made.size() < std::size_t(input.parameters.number("pairs")))
+      made.push_back({sampled(random_solid(random), input.context), sampled(random_solid(random), input.context)});
+    return made;
+  }
+};
+
 /// One representation's operations on the data of the two solids.
 template <class Data, class Store, class Read>
-void count_violations(const std::string& label, bool must_hold, const std::vector<std::array<FloatHermite, 2>>& pairs,
-                      Store&& store, Read&& read, std::vector<MeasuredRow>& rows, RunContext& context) {
+void count_violations(const std::string& label, bool must_hold, Pairs& pairs, Store&& store, Read&& read,
+                      std::vector<MeasuredRow>& rows) {
+  if (!pairs.input.wants("laws", label)) return;
+  RunContext& context = pairs.input.context;
   std::size_t involution = 0, de_morgan = 0, commutes = 0, idempotent = 0, self_difference = 0, crossings = 0;
-  for (const auto& [first, second] : pairs) {
+  for (const auto& [first, second] : pairs.all()) {
     context.check();
     const Data a = store(first), b = store(second);
     const auto both = [&](Boolean boolean, const Data& x, const Data& y) { return combine(boolean, x, y, context); };
@@ -109,7 +124,7 @@ void count_violations(const std::string& label, bool must_hold, const std::vecto
     self_difference += read(both(Boolean::subtract, a, a)).crossings.size();
   }
   MeasuredRow row{"laws", label};
-  row.values = {{"pairs", pairs.size()},         {"crossings", crossings},   {"involution", involution},
+  row.values = {{"pairs", pairs.made.size()},         {"crossings", crossings},   {"involution", involution},
                 {"de_morgan", de_morgan},        {"commutes", commutes},     {"idempotent", idempotent},
                 {"self_difference", self_difference}};
   if (must_hold && involution + de_morgan + commutes + idempotent + self_difference > 0)
@@ -118,31 +133,27 @@ void count_violations(const std::string& label, bool must_hold, const std::vecto
 }
 
 template <class Voxel>
-void count_dense_violations(const std::string& label, bool must_hold,
-                            const std::vector<std::array<FloatHermite, 2>>& pairs, std::vector<MeasuredRow>& rows,
-                            RunContext& context) {
+void count_dense_violations(const std::string& label, bool must_hold, Pairs& pairs, std::vector<MeasuredRow>& rows) {
+  RunContext& context = pairs.input.context;
   count_violations<DenseHermite<Voxel>>(
       label, must_hold, pairs, [&](const FloatHermite& data) { return to_dense<Voxel>(data, context); },
-      [&](const DenseHermite<Voxel>& data) { return to_sparse(data, context); }, rows, context);
+      [&](const DenseHermite<Voxel>& data) { return to_sparse(data, context); }, rows);
 }
 
 std::vector<MeasuredRow> measure_laws(const MeasurementInput& input) {
   RunContext& context = input.context;
-  std::mt19937_64 random(input.seed);
-  std::vector<std::array<FloatHermite, 2>> pairs;
-  for (int i = 0; i < int(input.parameters.number("pairs")); ++i)
-    pairs.push_back({sampled(random_solid(random), context), sampled(random_solid(random), context)});
+  Pairs pairs{input};
   std::vector<MeasuredRow> rows;
   count_violations<FloatHermite>(
       "sparse, float", true, pairs, [](const FloatHermite& data) { return data; },
-      [](const FloatHermite& data) { return data; }, rows, context);
+      [](const FloatHermite& data) { return data; }, rows);
   count_violations<PackedHermite>(
       "sparse, packed", true, pairs,
       [&](const FloatHermite& data) { return pack(data, NormalCodeId::octahedral, context); },
-      [&](const PackedHermite& data) { return unpack(data, context); }, rows, context);
-  count_dense_violations<FloatVoxel>("voxels, float", true, pairs, rows, context);
-  count_dense_violations<FixedVoxel>("voxels, fixed", true, pairs, rows, context);
-  count_dense_violations<ThesisVoxel>("voxels, thesis (eq. 7.1)", false, pairs, rows, context);
+      [&](const PackedHermite& data) { return unpack(data, context); }, rows);
+  count_dense_violations<FloatVoxel>("voxels, float", true, pairs, rows);
+  count_dense_violations<FixedVoxel>("voxels, fixed", true, pairs, rows);
+  count_dense_violations<ThesisVoxel>("voxels, thesis (eq. 7.1)", false, pairs, rows);
   return rows;
 }
 
@@ -163,12 +174,8 @@ PolygonMesh beside(const PolygonMesh& mesh, const PolygonMesh& to) {
 }
 
 PackedHermite packed_of(const PolygonMesh& mesh, double voxel_size, const MeasurementInput& input) {
-  const Voxelizer& voxelizer = find_variant(input.tables.voxelizers, "hermesh");
-  const LevelSet level_set =
-      voxelizer.voxelize({.mesh = mesh,
-                          .voxel_size = voxel_size,
-                          .context = input.context,
-                          .options = Options(voxelizer.name, voxelizer.options, {})});
+  const LevelSet level_set = voxelize(
+      mesh, {.chosen = choose(input.tables.voxelizers, "hermesh"), .voxel_size = voxel_size}, input.context);
   return pack(sample_polygons(level_set, 0.0, mesh, input.context), NormalCodeId::octahedral, input.context);
 }
 
@@ -177,7 +184,8 @@ MeasuredRow judged(const std::string& label, const PackedHermite& data, double v
   RunContext& context = input.context;
   const FloatHermite hermite = unpack(data, context);
   const PolygonMesh mesh = dual_contouring(view_of(hermite, context), {}, context);
-  const validation::MeshReport report = validation::judge(to_mesh_file(mesh), {}, context);
+  const Promises promises = find_variant(input.tables.extractors, "dual-contouring").promises;
+  const auto& [report, check] = judge(to_mesh_file(mesh), promises, kPromisesAlone, context);
   MeasuredRow row{"scans", label};
   row.values = {{"crossings", data.crossings.size()},
                 {"triangles", mesh.triangle_count()},
@@ -188,12 +196,14 @@ MeasuredRow judged(const std::string& label, const PackedHermite& data, double v
                 {"self_intersections", report.self_intersections ? report.self_intersections->pairs : -1},
                 {"components", report.components},
                 {"volume", report.volume / std::pow(voxel_size, 3)}};
-  if (report.boundary_edges + report.inconsistent_edges > 0)
-    row.broken.push_back(label + ": dual contouring promises a closed and oriented mesh");
+  for (const std::string& broken : check.broken) row.broken.push_back(label + ": " + broken);
   return row;
 }
 
+/// All of them if one is wanted, for volumes are set against one another.
 std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
+  constexpr const char* kLabels[] = {"A", "B", "A ∪ B", "A ∩ B", "A \\ B", "B \\ A"};
+  if (!input.wants_any("scans", kLabels)) return {};
   RunContext& context = input.context;
   const PolygonMesh first = input.tables.load(input.parameters.text("first"), context).mesh;
   const PolygonMesh second = beside(input.tables.load(input.parameters.text("second"), context).mesh, first);
@@ -202,11 +212,11 @@ std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
   const auto row = [&](const std::string& label, const PackedHermite& data) {
     return judged(label, data, voxel_size, input);
   };
-  std::vector<MeasuredRow> rows = {row("A", a), row("B", b),
-                                   row("A ∪ B", combine(Boolean::unite, a, b, context)),
-                                   row("A ∩ B", combine(Boolean::intersect, a, b, context)),
-                                   row("A \\ B", combine(Boolean::subtract, a, b, context)),
-                                   row("B \\ A", combine(Boolean::subtract, b, a, context))};
+  std::vector<MeasuredRow> rows = {row(kLabels[0], a), row(kLabels[1], b),
+                                   row(kLabels[2], combine(Boolean::unite, a, b, context)),
+                                   row(kLabels[3], combine(Boolean::intersect, a, b, context)),
+                                   row(kLabels[4], combine(Boolean::subtract, a, b, context)),
+                                   row(kLabels[5], combine(Boolean::subtract, b, a, context))};
   // Each volume but for what lies between the surfaces in the cells along the seam.
   const auto volume = [&](int i) { return rows[std::size_t(i)].values["volume"].get<double>(); };
   rows[2].values["ledger"] = volume(2) + volume(3) - volume(0) - volume(1);

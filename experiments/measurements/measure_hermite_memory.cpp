@@ -10,6 +10,7 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/harness/run_cells.h"
 
 namespace hermesh {
@@ -28,15 +29,22 @@ auto resident(Make&& make, Json& mebibytes) {
   return made;
 }
 
-LevelSet level_set_of(const LoadedCase& input, int resolution, const Tables& tables, RunContext& context) {
-  const Voxelizer& voxelizer = find_variant(tables.voxelizers, "hermesh");
-  return voxelizer.voxelize({.mesh = input.mesh,
-                             .voxel_size = bounds(input.mesh).size().maxCoeff() / resolution,
-                             .context = context,
-                             .options = Options(voxelizer.name, voxelizer.options, {})});
-}
+/// The model, read when the first row asks for it.
+class Model {
+ public:
+  explicit Model(const MeasurementInput& input) : input_(input) {}
+  LevelSet level_set(double resolution) {
+    if (!loaded_) loaded_ = input_.tables.load(input_.parameters.text("case"), input_.context);
+    return voxelize(loaded_->mesh,
+                    {.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution}, input_.context);
+  }
 
-std::vector<MeasuredRow> uniform_rows(const LoadedCase& model, const MeasurementInput& input) {
+ private:
+  const MeasurementInput& input_;
+  std::optional<LoadedCase> loaded_;
+};
+
+std::vector<MeasuredRow> uniform_rows(Model& model, const MeasurementInput& input) {
   // What the thesis printed for three floats a voxel.
   struct Printed {
     int width;
@@ -46,12 +54,13 @@ std::vector<MeasuredRow> uniform_rows(const LoadedCase& model, const Measurement
   for (const Printed& printed : {Printed{64, 3}, {128, 24}, {256, 192}, {512, 1536}, {1024, 12288}}) {
     input.context.check();
     MeasuredRow row{"uniform", std::to_string(printed.width) + "³"};
+    if (!input.wants(row.table, row.label)) continue;
     row.values["printed"] = printed.mebibytes;
     const double bytes = 12.0 * printed.width * printed.width * printed.width;
     const std::optional<std::uint64_t> available = available_memory();
     if (printed.width <= input.parameters.number("largest_uniform") && (!available || bytes < 0.8 * double(*available)))
       resident([&] { return std::vector<float>(std::size_t(bytes) / sizeof(float), 1.0f); }, row.values["uniform"]);
-    const LevelSet level_set = level_set_of(model, printed.width, input.tables, input.context);
+    const LevelSet level_set = model.level_set(printed.width);
     row.values["level_set"] = double(level_set.memory_bytes()) / kMiB;
     const PackedHermite sparse =
         sample_level_set_packed(level_set, 0.0, NormalCodeId::octahedral, input.context);
@@ -85,26 +94,36 @@ MeasuredRow row_of(const Size& size, std::size_t band, std::size_t crossings) {
   return row;
 }
 
+constexpr const char* kRepresentations[] = {"level set",
+                                            "voxels, directed distances",
+                                            "voxels, float Hermite",
+                                            "voxels, quantised Hermite, thesis",
+                                            "voxels, quantised Hermite, fixed",
+                                            "sparse, float",
+                                            "sparse, packed"};
+
 template <class Voxel>
-Size dense_size(const std::string& label, const Json& printed, const FloatHermite& hermite, RunContext& context) {
+void add_dense_size(const std::string& label, const Json& printed, const FloatHermite& hermite,
+                    const MeasurementInput& input, std::vector<Size>& sizes) {
+  if (!input.wants("representations", label)) return;
   Size size{label, printed, double(sizeof(Voxel)), 0, {}, 0};
-  const DenseHermite<Voxel> dense = resident([&] { return to_dense<Voxel>(hermite, context); }, size.resident);
+  const DenseHermite<Voxel> dense = resident([&] { return to_dense<Voxel>(hermite, input.context); }, size.resident);
   size.bytes = dense.memory_bytes();
   size.leaves = dense.leaves();
-  return size;
+  sizes.push_back(size);
 }
 
-std::vector<MeasuredRow> representation_rows(const LoadedCase& model, const MeasurementInput& input) {
+std::vector<MeasuredRow> representation_rows(Model& model, const MeasurementInput& input) {
+  if (!input.wants_any("representations", kRepresentations)) return {};
   RunContext& context = input.context;
   const int resolution = int(input.parameters.number("resolution"));
-  Size level_set_size{"level set", 4, 4, 0, {}, 0};
-  const LevelSet level_set =
-      resident([&] { return level_set_of(model, resolution, input.tables, context); }, level_set_size.resident);
+  Size level_set_size{kRepresentations[0], 4, 4, 0, {}, 0};
+  const LevelSet level_set = resident([&] { return model.level_set(resolution); }, level_set_size.resident);
   level_set_size.resident = nullptr;  // the voxelizer's own peak is in it
   level_set_size.bytes = level_set.memory_bytes();
   level_set_size.leaves = level_set.grid().grid->tree().leafCount();
 
-  Size sparse_float{"sparse, float", nullptr, 0, 0, {}, 0}, sparse{"sparse, packed", nullptr, 0, 0, {}, 0};
+  Size sparse_float{kRepresentations[5], nullptr, 0, 0, {}, 0}, sparse{kRepresentations[6], nullptr, 0, 0, {}, 0};
   const FloatHermite hermite = resident([&] { return sample_level_set(level_set, 0.0, context); }, sparse_float.resident);
   sparse_float.bytes = hermite.memory_bytes();
   const PackedHermite packed =
@@ -112,21 +131,19 @@ std::vector<MeasuredRow> representation_rows(const LoadedCase& model, const Meas
   sparse.bytes = packed.memory_bytes();
   sparse_float.leaves = sparse.leaves = hermite.leaves.size();
 
-  const std::vector<Size> sizes = {
-      level_set_size,
-      dense_size<DirectedVoxel>("voxels, directed distances", 12, hermite, context),
-      dense_size<FloatVoxel>("voxels, float Hermite", 48, hermite, context),
-      dense_size<ThesisVoxel>("voxels, quantised Hermite, thesis", 10, hermite, context),
-      dense_size<FixedVoxel>("voxels, quantised Hermite, fixed", 10, hermite, context),
-      sparse_float,
-      sparse};
+  std::vector<Size> sizes = {level_set_size};
+  add_dense_size<DirectedVoxel>(kRepresentations[1], 12, hermite, input, sizes);
+  add_dense_size<FloatVoxel>(kRepresentations[2], 48, hermite, input, sizes);
+  add_dense_size<ThesisVoxel>(kRepresentations[3], 10, hermite, input, sizes);
+  add_dense_size<FixedVoxel>(kRepresentations[4], 10, hermite, input, sizes);
+  sizes.insert(sizes.end(), {sparse_float, sparse});
   std::vector<MeasuredRow> rows;
   for (const Size& size : sizes) rows.push_back(row_of(size, level_set.active_voxels(), hermite.crossings.size()));
   return rows;
 }
 
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
-  const LoadedCase model = input.tables.load(input.parameters.text("case"), input.context);
+  Model model(input);
   std::vector<MeasuredRow> rows = uniform_rows(model, input);
   for (MeasuredRow& row : representation_rows(model, input)) rows.push_back(std::move(row));
   return rows;

@@ -14,6 +14,7 @@
 #include "algorithms/hermite/samplers.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/harness/run_cells.h"
 
 namespace hermesh {
@@ -81,6 +82,8 @@ void note_times(MeasuredRow& row, const std::vector<double>& seconds, double byt
   row.values["floor_of_shortest"] = shortest / std::ranges::min(triad) * Triad::kBytes / bytes;
 }
 
+std::string triad_label(const std::string& table) { return "triad, beside " + table; }
+
 /// Contenders of one race, with what their rows say besides. The memory's own speed runs along, for it changes with what
 /// else the machine does.
 class Race {
@@ -100,7 +103,7 @@ class Race {
     race(contenders_);
     const std::vector<double>& triad = contenders_[0].seconds;
     const double bytes_a_second = Triad::kBytes / median(triad);
-    std::vector<MeasuredRow> rows = {{"memory", "triad, beside " + table_, {{"gigabytes", bytes_a_second / 1e9}}}};
+    std::vector<MeasuredRow> rows = {{"memory", triad_label(table_), {{"gigabytes", bytes_a_second / 1e9}}}};
     for (std::size_t i = 0; i < labels_.size(); ++i) {
       const Entry& entry = labels_[i];
       const double seconds = median(contenders_[i].seconds);
@@ -162,16 +165,31 @@ std::vector<MeasuredRow> by_threads(const std::string& label, const std::functio
   return rows;
 }
 
+// Labels, table by table: a race is run whole if one of its rows is wanted.
+constexpr const char* kMemory[] = {"level set, read", "sparse, written", "dense 10-byte voxels, written"};
+constexpr const char* kSampling[] = {"triad",
+                                     "openvdb volumeToMesh",
+                                     "level set → sparse, packed",
+                                     "level set → sparse, float",
+                                     "dense 10-byte voxels, write floor",
+                                     "sparse → dense 10-byte voxels"};
+constexpr const char* kThreads[] = {kSampling[0], kSampling[2]};
+constexpr const char* kUnion[] = {"triad", "sparse: unpack, unite, pack", "sparse: unite packed",
+                                  "10-byte voxels: unpack to float voxels, unite, pack",
+                                  "10-byte voxels: unite packed, operands kept"};
+
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+  const bool memory = input.wants_any("memory", kMemory), threads = input.wants_any("threads", kThreads);
+  const bool races_sampling = input.wants_any("sampling", kSampling) || input.wants("memory", triad_label("sampling"));
+  const bool races_unions = input.wants_any("union", kUnion) || input.wants("memory", triad_label("union"));
+  if (!memory && !threads && !races_sampling && !races_unions) return {};
   RunContext& context = input.context;
   const int repetitions = int(input.parameters.number("repetitions"));
   const LoadedCase model = input.tables.load(input.parameters.text("case"), context);
-  const Voxelizer& voxelizer = find_variant(input.tables.voxelizers, "hermesh");
-  const double voxel_size = bounds(model.mesh).size().maxCoeff() / input.parameters.number("resolution");
-  const LevelSet level_set = voxelizer.voxelize({.mesh = model.mesh,
-                                                 .voxel_size = voxel_size,
-                                                 .context = context,
-                                                 .options = Options(voxelizer.name, voxelizer.options, {})});
+  const LevelSet level_set = voxelize(model.mesh,
+                                      {.chosen = choose(input.tables.voxelizers, "hermesh"),
+                                       .resolution = input.parameters.number("resolution")},
+                                      context);
   Triad triad;
   constexpr NormalCodeId kCode = NormalCodeId::octahedral;
   const PackedHermite a = sample_level_set_packed(level_set, 0.0, kCode, context), b = shifted(a);
@@ -182,42 +200,41 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   const double more_as_floats = crossings * (sizeof(EdgeCrossing) - sizeof(PackedCrossing));
   const double dense_bytes = double(dense_a.memory_bytes());
 
-  std::vector<MeasuredRow> rows = {{"memory", "level set, read", {{"mebibytes", read / (1 << 20)}}}};
-  rows.push_back({"memory", "sparse, written", {{"mebibytes", written / (1 << 20)}}});
-  rows.push_back({"memory", "dense 10-byte voxels, written", {{"mebibytes", dense_bytes / (1 << 20)}}});
+  std::vector<MeasuredRow> rows = {{"memory", kMemory[0], {{"mebibytes", read / (1 << 20)}}}};
+  rows.push_back({"memory", kMemory[1], {{"mebibytes", written / (1 << 20)}}});
+  rows.push_back({"memory", kMemory[2], {{"mebibytes", dense_bytes / (1 << 20)}}});
 
   Race sampling("sampling", repetitions, triad);
-  const std::string packed = "level set → sparse, packed";
   const std::function<double()> sample_packed = [&] {
     return timed([&] { sample_level_set_packed(level_set, 0.0, kCode, context); });
   };
-  const int peer = sampling.add("openvdb volumeToMesh", [&] { return openvdb_mesh(level_set); }, crossings, 0, -1);
-  sampling.add(packed, sample_packed, crossings, read + written, peer);
+  const int peer = sampling.add(kSampling[1], [&] { return openvdb_mesh(level_set); }, crossings, 0, -1);
+  sampling.add(kSampling[2], sample_packed, crossings, read + written, peer);
   sampling.add(
-      "level set → sparse, float", [&] { return timed([&] { sample_level_set(level_set, 0.0, context); }); }, crossings,
+      kSampling[3], [&] { return timed([&] { sample_level_set(level_set, 0.0, context); }); }, crossings,
       read + written + more_as_floats, peer);
   const int floor = sampling.add(
-      "dense 10-byte voxels, write floor",
+      kSampling[4],
       [&] { return write_floor(dense_a.leaves(), FixedDense::bytes_per_leaf()); }, crossings, dense_bytes, peer);
   sampling.add(
-      "sparse → dense 10-byte voxels", [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings,
+      kSampling[5], [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings,
       dense_bytes, floor);
-  append(rows, sampling.run());
-  append(rows, by_threads(packed, sample_packed, read + written, repetitions, triad));
+  if (races_sampling) append(rows, sampling.run());
+  if (threads) append(rows, by_threads(kThreads[1], sample_packed, read + written, repetitions, triad));
 
   Race unions("union", repetitions, triad);
   const int unpacked = unions.add(
-      "sparse: unpack, unite, pack",
+      kUnion[1],
       [&] {
         return timed([&] {
           pack(combine(Boolean::unite, unpack(a, context), unpack(b, context), context), kCode, context);
         });
       },
       2 * crossings, 0, -1);
-  unions.add("sparse: unite packed", [&] { return timed([&] { combine(Boolean::unite, a, b, context); }); },
+  unions.add(kUnion[2], [&] { return timed([&] { combine(Boolean::unite, a, b, context); }); },
              2 * crossings, 3 * written, unpacked);
   const int dense_unpacked = unions.add(
-      "10-byte voxels: unpack to float voxels, unite, pack",
+      kUnion[3],
       [&] {
         return timed([&] {
           FloatDense x = to_dense<FloatVoxel>(to_sparse(dense_a, context), context);
@@ -228,10 +245,10 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
       },
       2 * crossings, 0, -1);
   unions.add(
-      "10-byte voxels: unite packed, operands kept",
+      kUnion[4],
       [&] { return timed([&] { combine(Boolean::unite, dense_a, dense_b, context); }); }, 2 * crossings, 3 * dense_bytes,
       dense_unpacked);
-  append(rows, unions.run());
+  if (races_unions) append(rows, unions.run());
   return rows;
 }
 

@@ -39,6 +39,8 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   for (const double degrees : {0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0, 5.0, 10.0, 30.0, 45.0}) {
     input.context.check();
+    MeasuredRow row{"box", readable(degrees) + "°"};
+    if (!input.wants(row.table, row.label)) continue;
     // Its centre lies off the samples, so that no face passes through them.
     AnalyticSurface box = turned_box(Vector3d(half, 0.6 * half, 0.8 * half), degrees);
     IndexToWorld lattice;
@@ -46,7 +48,6 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
     const int reach = int(std::ceil(1.5 * half)) + 2;
     const FloatHermite hermite =
         sample_function(box, lattice, {-reach, -reach, -reach}, {reach, reach, reach}, 1e-9, input.context);
-    MeasuredRow row{"box", readable(degrees) + "°"};
     const std::size_t lost = lost_by<ThesisVoxel>(hermite, input.context);
     row.values["degrees"] = degrees;
     row.values["crossings"] = hermite.crossings.size();

@@ -247,10 +247,12 @@ double pass(void (*loop)(const From*, To*, std::size_t), const std::vector<From>
 
 /// All codes and operations in turns.
 std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
+  std::vector<NormalCodeId> ids(kNormalCodes.begin(), kNormalCodes.end());
+  std::erase_if(ids, [&](NormalCodeId id) { return !input.wants("speed", std::string(name(id))); });
+  if (ids.empty()) return {};
   const auto normals = random_normals(std::size_t(input.parameters.number("normals")), input.seed);
   std::vector<Normal> decoded(normals.size());
-  std::vector<std::vector<std::uint16_t>> codes(kNormalCodes.size(),
-                                                std::vector<std::uint16_t>(normals.size()));
+  std::vector<std::vector<std::uint16_t>> codes(ids.size(), std::vector<std::uint16_t>(normals.size()));
   std::vector<std::uint16_t> negated(normals.size());
   std::vector<Contender> contenders;
   const auto add = [&](std::function<double()> run) {
@@ -259,8 +261,8 @@ std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
                           .repetitions = int(input.parameters.number("repetitions")),
                           .seconds = {}});
   };
-  for (std::size_t i = 0; i < kNormalCodes.size(); ++i) {
-    const Loops loops = with_normal_code(kNormalCodes[i], [](auto code) { return loops_of(code); });
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const Loops loops = with_normal_code(ids[i], [](auto code) { return loops_of(code); });
     loops.pack(normals.data(), codes[i].data(), normals.size());
     add([&, i, loops] { return pass(loops.pack, normals, codes[i]); });
     add([&, i, loops] { return pass(loops.unpack, codes[i], decoded); });
@@ -270,7 +272,7 @@ std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   constexpr std::array kOperations = {"pack", "unpack", "negate"};
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    if (i % 3 == 0) rows.push_back({"speed", std::string(name(kNormalCodes[i / 3])), {}, {}});
+    if (i % 3 == 0) rows.push_back({"speed", std::string(name(ids[i / 3])), {}, {}});
     const std::vector<double>& nanoseconds = contenders[i].seconds;
     const std::string operation = kOperations[i % 3];
     rows.back().values[operation] = median(nanoseconds);
@@ -282,6 +284,8 @@ std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   for (std::size_t i = 0; i < kNormalCodes.size(); ++i) {
+    const std::string label(name(kNormalCodes[i]));
+    if (!input.wants("errors", label) && !input.wants("histogram", label)) continue;
     input.context.progress("errors", double(i) / double(kNormalCodes.size()));
     std::ranges::move(
         with_normal_code(kNormalCodes[i],

@@ -1,4 +1,5 @@
 // Table 9.2 of the thesis: what the threshold of adaptive dual contouring does to a large level set.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -7,8 +8,8 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/harness/run_cells.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
@@ -34,19 +35,21 @@ LoadedCase load_model(const MeasurementInput& input) {
 }
 
 LevelSet level_set_of(const LoadedCase& model, const MeasurementInput& input) {
-  const Voxelizer& voxelizer = find_variant(input.tables.voxelizers, "hermesh");
-  const double voxel = bounds(model.mesh).size().maxCoeff() / input.parameters.number("resolution");
-  return voxelizer.voxelize({.mesh = model.mesh,
-                             .voxel_size = voxel,
-                             .context = input.context,
-                             .options = Options(voxelizer.name, voxelizer.options, {})});
+  return voxelize(model.mesh,
+                  {.chosen = choose(input.tables.voxelizers, "hermesh"),
+                   .resolution = input.parameters.number("resolution")},
+                  input.context);
+}
+
+std::string input_label(const LoadedCase& model) {
+  return std::filesystem::path(model.name).filename().string() + ", " + model.origin;
 }
 
 MeasuredRow input_row(const LoadedCase& model, const LevelSet& level_set) {
   const auto dimensions = level_set.dimensions();
   std::string text;
   for (const int width : dimensions) text += (text.empty() ? "" : " × ") + std::to_string(width);
-  MeasuredRow row{"input", std::filesystem::path(model.name).filename().string() + ", " + model.origin};
+  MeasuredRow row{"input", input_label(model)};
   row.values["triangles"] = model.mesh.triangle_count();
   row.values["dimensions"] = text;
   row.values["active"] = level_set.active_voxels();
@@ -66,12 +69,13 @@ class Extraction {
   Extraction(const LevelSet& level_set, const std::string& representation, const MeasurementInput& input)
       : level_set_(level_set),
         representation_(representation),
-        input_(input),
-        extractor_(find_variant(input.tables.extractors, "adaptive-dual-contouring")) {}
+        input_(input) {}
 
-  std::vector<MeasuredRow> rows() {
+  /// Those that are wanted, and always the first, which the others are set against.
+  std::vector<MeasuredRow> rows(const std::function<bool(const std::string& label)>& wanted) {
     std::vector<MeasuredRow> rows;
-    for (const Printed& printed : kPrinted) rows.push_back(row(printed));
+    for (const Printed& printed : kPrinted)
+      if (printed.threshold == 0 || wanted(readable(printed.threshold))) rows.push_back(row(printed));
     return rows;
   }
   const validation::MeshReport& uniform() const { return *uniform_; }
@@ -79,9 +83,11 @@ class Extraction {
  private:
   MeasuredRow row(const Printed& printed) {
     const double threshold = printed.threshold / input_.parameters.number("units_per_square_voxel");
-    const Options options(
-        extractor_.name, extractor_.options,
-        {{"threshold", std::to_string(threshold)}, {"representation", representation_}, {"hermite", "level-set"}});
+    const ExtractRecipe recipe{
+        .chosen = choose(input_.tables.extractors, "adaptive-dual-contouring",
+                         {{"threshold", std::to_string(threshold)},
+                          {"representation", representation_},
+                          {"hermite", "level-set"}})};
     std::vector<double> seconds;
     RunContext child;
     std::optional<std::int64_t> peak;
@@ -91,8 +97,7 @@ class Extraction {
       mesh = {};
       child = child_context(input_.context, false);
       const PeakMemory memory;
-      seconds.push_back(
-          timed([&] { mesh = extractor_.extract({.level_set = level_set_, .options = options, .context = child}); }));
+      seconds.push_back(timed([&] { mesh = extract(level_set_, nullptr, recipe, child).mesh; }));
       if (run == 0) peak = memory.bytes();
     }
     return describe(printed, threshold, mesh, child, median(seconds), peak);
@@ -122,13 +127,12 @@ class Extraction {
   /// Other counts than those of the judges would need more memory than the mesh itself.
   void judge_uniform(const PolygonMesh& mesh) {
     RunContext child = child_context(input_.context, true);
-    uniform_ = validation::judge(to_mesh_file(mesh), {.self_intersections = false, .libraries = false}, child);
+    uniform_ = judge(to_mesh_file(mesh), {}, kCounts, child).report;
   }
 
   const LevelSet& level_set_;
   const std::string representation_;
   const MeasurementInput& input_;
-  const Extractor& extractor_;
   double finest_ = 0.0;
   std::optional<validation::MeshReport> uniform_;
 };
@@ -146,16 +150,17 @@ MeasuredRow topology_row(const std::string& label, const validation::MeshReport&
 }
 
 /// What the thesis did to its model, to another one.
-MeasuredRow beside_row(const std::string& name, const MeasurementInput& input) {
+void add_beside_row(const std::string& name, const MeasurementInput& input, std::vector<MeasuredRow>& rows) {
   const LoadedCase model = input.tables.load(name, input.context);
+  MeasuredRow row{"beside", name + ", " + model.origin};
+  if (!input.wants(row.table, row.label)) return;
   const LevelSet level_set = level_set_of(model, input);
   Extraction extraction(level_set, "thesis", input);
-  MeasuredRow row{"beside", name + ", " + model.origin};
   row.values["triangles"] = model.mesh.triangle_count();
-  for (const MeasuredRow& at : extraction.rows())
+  for (const MeasuredRow& at : extraction.rows([](const std::string&) { return true; }))
     if (at.label != readable(0))
       for (const std::string what : {"triangle_share", "reduction"}) row.values[what + "_" + at.label] = at.values[what];
-  return row;
+  rows.push_back(std::move(row));
 }
 
 std::vector<MeasuredColumn> beside_columns() {
@@ -172,13 +177,24 @@ std::vector<MeasuredColumn> beside_columns() {
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows, topology;
   if (input.parameters.is("beside", "dragons"))
-    for (const char* name : {"dragon", "dragon-res2"}) rows.push_back(beside_row(name, input));
+    for (const char* name : {"dragon", "dragon-res2"}) add_beside_row(name, input, rows);
   const LoadedCase model = load_model(input);
-  const LevelSet level_set = level_set_of(model, input);
-  rows.push_back(input_row(model, level_set));
-  for (const char* representation : {"thesis", "sparse-float"}) {
+  const auto wants = [&](const std::string& representation) {
+    return input.wants("topology", representation) || std::ranges::any_of(kPrinted, [&](const Printed& printed) {
+             return input.wants(representation, readable(printed.threshold));
+           });
+  };
+  std::vector<std::string> representations = {"thesis", "sparse-float"};
+  std::erase_if(representations, [&](const std::string& each) { return !wants(each); });
+  LevelSet level_set;
+  if (input.wants("input", input_label(model)) || !representations.empty()) {
+    level_set = level_set_of(model, input);
+    rows.push_back(input_row(model, level_set));
+  }
+  for (const std::string& representation : representations) {
     Extraction extraction(level_set, representation, input);
-    for (MeasuredRow& row : extraction.rows()) rows.push_back(std::move(row));
+    const auto wanted = [&](const std::string& label) { return input.wants(representation, label); };
+    for (MeasuredRow& row : extraction.rows(wanted)) rows.push_back(std::move(row));
     topology.push_back(topology_row(representation, extraction.uniform()));
   }
   MeasuredRow printed{"topology", "printed"};

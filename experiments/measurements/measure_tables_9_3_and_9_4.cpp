@@ -11,6 +11,7 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/cases/recipes.h"
 #include "experiments/pictures/render.h"
 #include "experiments/harness/run_cells.h"
@@ -69,22 +70,31 @@ class Measurer {
         pixels_(static_cast<int>(input.parameters.number("pixels"))) {}
 
   std::vector<MeasuredRow> run() {
-    make_level_set();
-    make_mask();
+    const bool adaptive = wants("adaptive-dual-contouring");
+    const bool guaranteed = input_.parameters.is("guaranteed", "yes") && wants("manifold-dual-contouring");
+    if (adaptive || guaranteed || input_.wants("input", splash_label())) make_level_set();
+    if (adaptive || guaranteed || input_.wants("input", kMaskLabel)) make_mask();
     const double threshold = 250.0 / input_.parameters.number("units_per_square_voxel");
-    measure("adaptive-dual-contouring", {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
-    if (input_.parameters.is("guaranteed", "yes"))
+    if (adaptive)
+      measure("adaptive-dual-contouring", {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
+    if (guaranteed)
       measure("manifold-dual-contouring",
               {{"tolerance", input_.parameters.text("tolerance")}, {"hermite", "level-set"}});
-    if (pixels_ > 0) draw();
+    if (!meshes_.empty()) draw();
     return std::move(rows_);
   }
 
  private:
+  static constexpr const char* kMaskLabel = "frustum mask; printed: 84 × 72 × 63, 159 ms";
+  std::string splash_label() const { return "splash, procedural, seed " + std::to_string(input_.seed); }
+  bool wants(const std::string& table) const {
+    return std::ranges::any_of(kTreatments, [&](const Treatment& each) { return input_.wants(table, each.label); });
+  }
+
   /// The parts one by one, and their union: within a part next to nothing overlaps, and what lies inside others need not be
   /// looked for among the polygons.
   void make_level_set() {
-    const Voxelizer& voxelizer = find_variant(input_.tables.voxelizers, "hermesh");
+    const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, "hermesh"), .voxel_size = 1.0};
     std::size_t triangles = 0;
     double seconds = 0.0;
     for (const double part : {1.0, 2.0, 3.0, 4.0}) {
@@ -95,14 +105,11 @@ class Measurer {
       box_.add(box.lower);
       box_.add(box.upper);
       seconds += timed([&] {
-        LevelSet made = voxelizer.voxelize({.mesh = mesh,
-                                            .voxel_size = 1.0,
-                                            .context = input_.context,
-                                            .options = Options(voxelizer.name, voxelizer.options, {})});
+        const LevelSet made = voxelize(mesh, recipe, input_.context);
         level_set_ = part == 1.0 ? made : united(level_set_, made);
       });
     }
-    MeasuredRow row{"input", "splash, procedural, seed " + std::to_string(input_.seed)};
+    MeasuredRow row{"input", splash_label()};
     row.values["triangles"] = triangles;
     row.values["dimensions"] = dimensions_of(level_set_);
     row.values["active"] = level_set_.active_voxels();
@@ -115,7 +122,7 @@ class Measurer {
     for (int i = 0; i < repetitions(); ++i)
       seconds.push_back(
           timed([&] { mask_ = frustum_mask(camera(resolution_), kMaskResolution, input_.context); }));
-    MeasuredRow row{"input", "frustum mask; printed: 84 × 72 × 63, 159 ms"};
+    MeasuredRow row{"input", kMaskLabel};
     row.values["dimensions"] = dimensions_of(mask_);
     row.values["active"] = mask_.active_voxels();
     row.values["seconds"] = median(seconds);
@@ -124,9 +131,11 @@ class Measurer {
 
   int repetitions() const { return static_cast<int>(input_.parameters.number("repetitions")); }
 
-  void measure(const std::string& name, const std::map<std::string, std::string>& options) {
+  /// What is wanted, and always the first, which the others are set against.
+  void measure(const std::string& name, const GivenOptions& options) {
     double all = 0.0;
     for (const Treatment& treatment : kTreatments) {
+      if (treatment.outside != Outside::everywhere && !input_.wants(name, treatment.label)) continue;
       MeasuredRow row = measure(name, options, treatment);
       if (treatment.outside == Outside::everywhere) all = row.values["points"].get<double>();
       row.values["share"] = 100.0 * row.values["points"].get<double>() / all;
@@ -134,11 +143,9 @@ class Measurer {
     }
   }
 
-  MeasuredRow measure(const std::string& name, const std::map<std::string, std::string>& given,
-                      const Treatment& treatment) {
-    const Extractor& extractor = find_variant(input_.tables.extractors, name);
-    const Options options(extractor.name, extractor.options, given);
+  MeasuredRow measure(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
     const AdaptivityField field{.mask = mask_, .outside = treatment.outside, .scale = {}};
+    const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, name, given), .field = &field};
     std::vector<double> seconds;
     std::optional<std::int64_t> peak;
     PolygonMesh mesh;
@@ -147,10 +154,7 @@ class Measurer {
       mesh = {};
       RunContext child = child_context(input_.context, false);
       const PeakMemory memory;
-      seconds.push_back(timed([&] {
-        mesh = extractor.extract(
-            {.level_set = level_set_, .options = options, .context = child, .field = &field});
-      }));
+      seconds.push_back(timed([&] { mesh = extract(level_set_, nullptr, recipe, child).mesh; }));
       if (i == 0) peak = memory.bytes();
     }
     MeasuredRow row{name, treatment.label};

@@ -3,14 +3,12 @@
 #include <array>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/mesh_file.h"
-#include "algorithms/extraction/volume_ends.h"
 #include "experiments/harness/cell.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
 #include "experiments/pictures/render.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/cases/volume_cases.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
@@ -69,33 +67,35 @@ class Measurer {
   }
 
  private:
+  static constexpr const char* kVolumeLabel = "the volume";
+
   void measure(const Entry& entry) {
+    if (!input_.wants(entry.table, kVolumeLabel) && !input_.wants_any(entry.table, kExtractors)) return;
     const LoadedVolume loaded = load_volume(entry.volume, input_.context);
     const bool stand_in = loaded.origin.starts_with("stand-in");
     const LevelSet volume = thinned(loaded.volume, int(input_.parameters.number("every")));
-    rows_.push_back({entry.table, "the volume", {{"origin", loaded.origin}, {"sha256", loaded.sha256.substr(0, 12)}}});
+    rows_.push_back({entry.table, kVolumeLabel, {{"origin", loaded.origin}, {"sha256", loaded.sha256.substr(0, 12)}}});
     rows_.back().values["samples"] = volume.active_voxels();
     for (const double isovalue : stand_in ? entry.of_stand_in : entry.isovalues) {
       Sheet sheet;
       for (const char* name : kExtractors)
         for (const Ends ends : {Ends::closed, Ends::open})
-          add_row(entry, volume, find_variant(input_.tables.extractors, name), isovalue, ends, sheet);
+          if (input_.wants(entry.table, name))
+            add_row(entry, volume,
+                    {.chosen = choose(input_.tables.extractors, name), .isovalue = isovalue, .ends = ends}, sheet);
       draw(entry, isovalue, sheet);
     }
   }
 
-  void add_row(const Entry& entry, const LevelSet& volume, const Extractor& extractor, double isovalue, Ends ends,
-               Sheet& sheet) {
-    MeasuredRow row{entry.table, extractor.name};
-    row.values["isovalue"] = isovalue;
-    row.values["ends"] = ends == Ends::open ? "open" : "closed";
+  void add_row(const Entry& entry, const LevelSet& volume, const ExtractRecipe& recipe, Sheet& sheet) {
+    MeasuredRow row{entry.table, recipe.chosen.extractor.name};
+    row.values["isovalue"] = recipe.isovalue;
+    row.values["ends"] = recipe.ends == Ends::open ? "open" : "closed";
     EndedMesh ended;
     const auto once = [&] {
       input_.context.check();
       RunContext child = child_context(input_.context, false);
-      const Options options(extractor.name, extractor.options, {});
-      ended = extract_with_ends(
-          extractor, {.level_set = volume, .isovalue = isovalue, .options = options, .context = child}, ends);
+      ended = extract(volume, nullptr, recipe, child);
     };
     std::vector<double> seconds;
     const auto failure = attempt([&] {
@@ -107,16 +107,17 @@ class Measurer {
     } else {
       row.values["seconds"] = median(seconds);
       row.values["reached"] = ended.ends.any() ? ended.ends.text() : "none";
-      judge(row, extractor, ended, ends);
-      if (ends == Ends::closed) add_picture(sheet, extractor, ended.mesh);
+      describe(row, recipe, ended);
+      if (recipe.ends == Ends::closed) add_picture(sheet, row.label, ended.mesh);
     }
     rows_.push_back(std::move(row));
   }
 
-  void judge(MeasuredRow& row, const Extractor& extractor, const EndedMesh& ended, Ends ends) {
+  void describe(MeasuredRow& row, const ExtractRecipe& recipe, const EndedMesh& ended) const {
     RunContext child = child_context(input_.context, false);
-    const validation::MeshReport report = validation::judge(
-        to_mesh_file(ended.mesh), {.self_intersections = crossings_, .libraries = false}, child);
+    const auto& [report, check] =
+        judge(to_mesh_file(ended.mesh), recipe.chosen.extractor.promises, crossings_ ? kPromisesAlone : kCounts, child,
+              {.cut_open = recipe.ends == Ends::open && ended.ends.any()});
     row.values["triangles"] = ended.mesh.triangle_count();
     row.values["open"] = report.boundary_edges;
     row.values["nm_edges"] = report.non_manifold_edges;
@@ -124,26 +125,16 @@ class Measurer {
     row.values["flipped"] = report.inconsistent_edges;
     row.values["components"] = report.components;
     if (report.self_intersections) row.values["crossing"] = report.self_intersections->pairs;
-    const bool is_cut = ends == Ends::open && ended.ends.any();
-    const auto expect = [&](bool promised, std::int64_t count, const char* what) {
-      if (promised && count > 0) row.broken.push_back(std::to_string(count) + what);
-    };
-    expect(extractor.promises.closed && !is_cut, report.boundary_edges, " boundary edges");
-    expect(extractor.promises.oriented, report.inconsistent_edges, " flipped edges");
-    expect(extractor.promises.manifold, report.non_manifold_edges, " non-manifold edges");
-    if (const auto& pairs = report.self_intersections)
-      expect(extractor.promises.no_self_intersection, pairs->pairs, " self-intersecting pairs");
-    // Where the surface only touches the plane of the cut, its boundary touches itself.
-    expect(extractor.promises.manifold && !is_cut, report.non_manifold_vertices, " non-manifold vertices");
+    row.broken = check.broken;
   }
 
-  void add_picture(Sheet& sheet, const Extractor& extractor, const PolygonMesh& mesh) const {
+  void add_picture(Sheet& sheet, const std::string& extractor, const PolygonMesh& mesh) const {
     if (pixels_ == 0 || mesh.empty()) return;
     const Bounds box = bounds(mesh);
     sheet.frame.add(box.lower);
     sheet.frame.add(box.upper);
     sheet.pictures.push_back(
-        {extractor.name, {readable(double(mesh.triangle_count())) + " triangles"}, [mesh] { return mesh; }});
+        {extractor, {readable(double(mesh.triangle_count())) + " triangles"}, [mesh] { return mesh; }});
   }
 
   void draw(const Entry& entry, double isovalue, Sheet& sheet) const {

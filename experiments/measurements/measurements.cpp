@@ -86,13 +86,14 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
     if (keep) keep(row);
     rows.push_back(std::move(row));
   };
+  MeasurementInput input{parameters, experiment.seed, tables, out, context, filter, {}, measurement.name};
   const auto start = std::chrono::steady_clock::now();
   const auto take = [&](const std::vector<MeasuredRow>& measured) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     full_head["measurement"]["seconds"] = elapsed.count();
     for (const MeasuredRow& each : measured) {
       const MeasuredTable& table = table_of(each, measurement);
-      if ((measurement.name + "/" + each.table + "/" + each.label).find(filter) == std::string::npos) continue;
+      if (!input.wants(each.table, each.label)) continue;
       Json row = row_json(full_head, each.table, each.label);
       row["table"] = to_json(table);
       row["values"] = each.values.is_null() ? Json::object() : each.values;
@@ -100,11 +101,9 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
       add(std::move(row));
     }
   };
+  input.emit = take;
   std::vector<MeasuredRow> measured;
-  const auto failure = attempt([&] {
-    measured = measurement.measure({parameters, experiment.seed, tables, out, context, filter, take});
-  });
-  if (failure) {
+  if (const auto failure = attempt([&] { measured = measurement.measure(input); })) {
     Json row = row_json(full_head, measurement.name, measurement.name);
     row["failed"] = *failure;
     add(std::move(row));

@@ -11,6 +11,7 @@
 // formats, and the plots that its file asks for.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -36,11 +37,20 @@ struct MeasurementInput {
   const Tables& tables;       ///< to load cases with, and to find variants in
   std::filesystem::path out;  ///< folder of the run
   RunContext& context;
-  /// Rows whose "measurement/table/label" does not contain it are thrown away; to make them would be in vain.
+  /// Rows whose "measurement/table/label" does not contain it are thrown away.
   std::string filter = {};
   /// Takes rows that are ready, before those that measure() returns, so that what takes hours can be cut short and
   /// loses nothing; from one thread at a time.
   std::function<void(std::vector<struct MeasuredRow>)> emit = {};
+  std::string name = {};  ///< of the measurement
+
+  /// Whether the filter leaves a row of that label. A measurement asks before it does what the row needs.
+  bool wants(const std::string& table, const std::string& label) const {
+    return (name + "/" + table + "/" + label).find(filter) != std::string::npos;
+  }
+  bool wants_any(const std::string& table, std::span<const char* const> labels) const {
+    return std::ranges::any_of(labels, [&](const char* label) { return wants(table, label); });
+  }
 };
 
 /// A line of one of its tables.
