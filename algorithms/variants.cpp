@@ -49,6 +49,7 @@ std::span<const Extractor> our_extractors() {
 }
 
 std::span<const Voxelizer> our_voxelizers() {
+  // The order is that of lists and tables: ours first, then the thesis's as printed, which is kept for comparison.
   static const std::vector<Voxelizer> table = {
       {.name = "hermesh",
        .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",

@@ -60,7 +60,7 @@ VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeReci
 /// @throws what the voxelizer throws.
 LevelSet voxelize(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunContext& context);
 
-/// @param source the polygons that the volume was made from; null where they are not at hand
+/// `source`: the polygons that the volume was made from; null where they are not at hand.
 /// @throws what the extractor throws.
 EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe, RunContext& context);
 
@@ -81,7 +81,7 @@ struct Circumstances {
   bool cut_open = false;
   /// The volume counts as inside beyond its samples, so that the surface encloses what is outside.
   bool encloses_the_outside = false;
-  /// Of a mesh that is to be within a tolerance of its uniform mesh, the report's reference.
+  /// The bound of a mesh that is to be within a tolerance of its uniform mesh, the report's reference.
   struct Bound {
     double tolerance;                                   ///< voxels
     double voxel_size;                                  ///< world units

@@ -29,7 +29,7 @@ struct Column {
 std::span<const Column> all_columns();
 std::vector<std::string> column_names();
 
-/// Those that a row of a measurement brings along (measurements.h), none for other rows.
+/// The columns that a row of a measurement brings along (measurements.h), none for other rows.
 std::vector<Column> own_columns(const Json& row);
 
 /// What a JSON pointer leads to; null where that is nothing, or JSON's null.
@@ -41,7 +41,7 @@ std::string text_at(const Json& row, const std::string& pointer);
 
 /// The column's value in its unit; JSON's null where the row has none.
 Json value_of(const Column& column, const Json& row);
-/// The same for a reader, "–" where the row has none.
+/// The text of that for a reader, "–" where the row has none.
 std::string cell_text(const Column& column, const Json& row);
 
 /// 1234567 → "1,234,567"; numbers that are not whole with three significant digits.

@@ -92,7 +92,7 @@ struct Experiment {
   std::uint64_t seed = 1;   ///< of a measurement's random numbers
   std::map<std::string, Tier> tiers;
 
-  /// Those whose rows are compared.
+  /// The entries whose rows are compared.
   const std::vector<VariantEntry>& contenders() const {
     return kind == ExperimentKind::kVoxelization ? voxelizers : variants;
   }

@@ -14,7 +14,7 @@ namespace hermesh {
 /// a row, nothing.
 void add_time_ratios(std::vector<Json>& rows);
 
-/// The same for voxelizers, the other way round: sets `openvdb_over_time` (above 1 is faster) and
+/// Compares voxelizers, the other way round: sets `openvdb_over_time` (above 1 is faster) and
 /// `peak_over_openvdb` in every timed row, relative to the row of variant "openvdb" with its default options.
 void add_voxelizer_ratios(std::vector<Json>& rows);
 

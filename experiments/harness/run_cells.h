@@ -22,13 +22,13 @@ struct Tables {
   std::vector<Voxelizer> voxelizers;
   std::vector<std::string> cases;
   std::function<LoadedCase(const std::string& name, RunContext& context)> load;
-  /// The same with some parameters of the case's recipe changed.
+  /// Loads a case with some parameters of its recipe changed.
   std::function<LoadedCase(const std::string& name, const RecipeParameters& changes, RunContext& context)>
       load_changed;
   std::vector<Measurement> measurements = {};
 };
 
-/// Those of the program.
+/// The tables of the program.
 Tables all_tables();
 
 /// run_experiment() of harness.h with the names to choose from given.
@@ -49,7 +49,7 @@ struct GroupInput {
 };
 
 /// The rows, one for each variant, failed ones included; writes the meshes under out/meshes and the picture
-/// out/<case>-<resolution>.png. @throws Cancelled; Error if a mesh or the picture cannot be written.
+/// out/CASE-RESOLUTION.png. @throws Cancelled; Error if a mesh or the picture cannot be written.
 std::vector<Json> run_group(const GroupInput& group, RunContext& context);
 
 }  // namespace hermesh

@@ -9,13 +9,13 @@
 
 namespace hermesh {
 
-/// Of the file's bytes, in 64 hexadecimal digits. @throws Error if it cannot be read.
+/// The hash of the file's bytes, in 64 hexadecimal digits. @throws Error if it cannot be read.
 std::string sha256_of_file(const std::filesystem::path& path);
 
-/// Of the characters.
+/// The hash of the characters.
 std::string sha256_of_text(std::string_view text);
 
-/// Of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points, the
+/// The hash of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points, the
 /// triangles, the quads, all little-endian.
 std::string sha256_of_mesh(const PolygonMesh& mesh);
 

@@ -23,7 +23,7 @@ std::vector<Column> shown_columns(const std::vector<Json>& rows) {
   return shown;
 }
 
-/// Those of the CSV: the columns that the rows bring along, and the common ones unless no row has them.
+/// The columns of the CSV: those that the rows bring along, and the common ones unless no row has them.
 std::vector<Column> csv_columns(const std::vector<Json>& rows) {
   std::vector<Column> columns;
   bool common = rows.empty();

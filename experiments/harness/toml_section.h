@@ -28,7 +28,7 @@ inline std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Those most like `name` first (by the number of letters to change, insert or leave out).
+/// The names, those most like `name` first (by the number of letters to change, insert or leave out).
 inline std::vector<std::string> likest_first(std::vector<std::string> names, const std::string& name) {
   const auto distance = [&](const std::string& other) {
     std::vector<std::size_t> row(other.size() + 1);

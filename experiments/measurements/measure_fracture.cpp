@@ -73,7 +73,7 @@ class FractureBooks {
     std::string method;
     double tolerance;
   };
-  /// Those that the filter leaves.
+  /// The cells that the filter leaves.
   std::vector<Cell> cells_of(const FractureSubject& subject) const {
     std::vector<Cell> cells;
     for (const double count : numbers(input_.parameters.text("pieces")))

@@ -72,7 +72,7 @@ std::vector<std::string> models() {
   return names;
 }
 
-/// Those that are made at 400 voxels, too: three scans, one of them open and in pieces, and three parts.
+/// The cases that are made at 400 voxels, too: three scans, one of them open and in pieces, and three parts.
 bool is_made_finer(const std::string& name) {
   static const std::vector<std::string> names = {"bunny-closed", "nefertiti",  "dragon",
                                                  "fandisk",      "rocker-arm", "casting"};
@@ -106,7 +106,7 @@ void set_counts(Json& values, const validation::MeshReport& report) {
   values["euler"] = report.euler_characteristic;
 }
 
-/// Of meshes that nobody judged no number is stated, unless some could not be made.
+/// States no number for meshes that nobody judged, unless some could not be made.
 void set_violations(Json& values, std::int64_t violations, bool judged) {
   if (judged || violations > 0) values["violations"] = violations;
 }
@@ -137,7 +137,7 @@ struct Sum {
   }
 };
 
-/// By kind of subject, extractor and tolerance (−1 for extractors that have none).
+/// Sums by kind of subject, extractor and tolerance (−1 for extractors that have none).
 using Sums = std::map<std::tuple<std::string, std::string, double>, Sum>;
 
 /// What becomes of one subject at all tolerances, and of the others.
@@ -163,7 +163,7 @@ struct Overview {
     for (const std::string& violation : violations)
       broken.push_back("tolerance " + readable(tolerance) + ": " + violation);
   }
-  /// Of another extractor: edges and vertices that are not manifold, or open, and pairs of triangles that
+  /// Adds what counts of another extractor: edges and vertices that are not manifold, or open, and pairs of triangles that
   /// intersect.
   void add_other(const std::string& name, const Json& mesh) {
     const auto count = [&](const char* defect) { return mesh.value(defect, std::int64_t(0)); };

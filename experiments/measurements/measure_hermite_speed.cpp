@@ -63,7 +63,7 @@ double openvdb_mesh(const LevelSet& level_set) {
   return timed([&] { openvdb::tools::volumeToMesh(*level_set.grid().grid, points, triangles, quads, 0.0, 0.0); });
 }
 
-/// The same surface a tenth of its length further along x, by whole leaves and so on the same lattice.
+/// The surface moved a tenth of its length further along x, by whole leaves and so on the same lattice.
 PackedHermite shifted(PackedHermite hermite) {
   std::int32_t low = 0, high = 0;
   for (const SignLeaf& leaf : hermite.leaves) low = std::min(low, leaf.lower[0]), high = std::max(high, leaf.lower[0]);

@@ -23,7 +23,7 @@ using Vector = std::array<double, 3>;
 constexpr std::size_t kCodes = 65'536;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-/// By the chord, since the cosine of a small angle has lost its digits.
+/// The angle by its chord, since the cosine of a small angle has lost its digits.
 double degrees_between(const Normal& p, const Normal& q) {
   const double x = double(p[0]) - q[0], y = double(p[1]) - q[1], z = double(p[2]) - q[2];
   return 2.0 * std::asin(std::min(1.0, 0.5 * std::sqrt(x * x + y * y + z * z))) * kDegrees;

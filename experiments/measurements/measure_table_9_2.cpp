@@ -71,7 +71,7 @@ class Extraction {
         representation_(representation),
         input_(input) {}
 
-  /// Those that are wanted, and always the first, which the others are set against.
+  /// The rows that are wanted, and always the first, which the others are set against.
   std::vector<MeasuredRow> rows(const std::function<bool(const std::string& label)>& wanted) {
     std::vector<MeasuredRow> rows;
     for (const Printed& printed : kPrinted)

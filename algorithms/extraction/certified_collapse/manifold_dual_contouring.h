@@ -20,7 +20,7 @@ struct ManifoldDualContouringOptions {
 /// Uniform mesh (uniform_mesh.h), then merges of its points, of which those stay that are proved to keep the
 /// topology, the freedom from self-intersection and the bound (certified_decimation.h). The same bytes for
 /// every number of threads.
-/// @param field scales the tolerance by the place of the uniform mesh's points, may be null. Where it asks
+/// `field` scales the tolerance by the place of the uniform mesh's points, and may be null. Where it asks
 /// for no mesh outside of its mask, triangles whose middle lies outside are left out, and the mesh is open
 /// there, but for those that stand for points within; points outside are not merged.
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,

@@ -134,7 +134,7 @@ double mean_distance_from_edges(const TurnedCube& cube, const PolygonMesh& mesh)
   return sum / places;
 }
 
-/// Of a closed mesh: twice the number of components without holes.
+/// V − E + F of a closed mesh: twice the number of components without holes.
 std::int64_t euler_characteristic(const PolygonMesh& mesh) {
   const auto triangles = static_cast<std::int64_t>(mesh.triangle_count());
   return static_cast<std::int64_t>(mesh.points.size()) - triangles / 2;
@@ -247,7 +247,7 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
   }
 }
 
-/// By the octree or by collapses.
+/// The mesh of certified_octree() or of manifold_dual_contouring().
 PolygonMesh certified(bool octree, const FloatHermite& hermite, double tolerance, const AdaptivityField* field) {
   RunContext context;
   if (octree)
@@ -311,7 +311,7 @@ TEST(ManifoldDualContouring, MaskOfTheSurfacesOwnCellsLeavesOutNothing) {
           << octree << ' ' << tolerance;
 }
 
-/// Of a sphere in voxels of 1 × 1 × 2: half a voxel is one unit of the world along z, and less elsewhere.
+/// A sphere in voxels of 1 × 1 × 2: half a voxel is one unit of the world along z, and less elsewhere.
 TEST(ManifoldDualContouring, ToleranceInTheWorldHoldsAlongTheLongestSideOfAVoxel) {
   initialize_openvdb();
   const auto grid = openvdb::FloatGrid::create(3.0f);

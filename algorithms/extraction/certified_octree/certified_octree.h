@@ -20,8 +20,7 @@ struct CertifiedOctreeOptions {
 
 /// Uniform mesh within its cells (uniform_mesh.h), then cubes of cells merged of which those stay that are proved to keep
 /// the topology, the freedom from self-intersection and the bound (region_mesh.h). The same bytes for every number of
-/// threads.
-/// @param field as manifold_dual_contouring() takes it
+/// threads. The field means what it means to manifold_dual_contouring().
 PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& options, const AdaptivityField* field,
                              RunContext& context);
 
