@@ -15,6 +15,7 @@ namespace avx512 {
 extern const Kernels kKernels;
 }
 
+// The level is asked once a conversion, not once a leaf.
 const Kernels& chosen() {
   // All levels give the same bytes, so the choice shows in time only.
   return of_level(chosen_simd_level(), sse2::kKernels, avx2::kKernels, avx512::kKernels);
