@@ -58,13 +58,13 @@ class LeafSigns {
     if (leaf_above_ == static_cast<std::int64_t>(leaf))
       signs.inside = above_;
     else
-      finite_ &= reader_.leaf(leaves_.values(leaf), leaves_.rule(), signs.inside);
+      finite_ &= reader_.leaf(leaves_.values(leaf), leaves_.rule(), signs.inside.data());
     signs.beyond[0] = first_rows(leaves_.neighbour(leaf, 1, 0, 0), 8);
     signs.beyond[1] = first_rows(leaves_.neighbour(leaf, 0, 1, 0), 64);
     const std::int32_t above = leaves_.neighbour(leaf, 0, 0, 1);
     if (above >= 0) {
       leaf_above_ = above;  // comes next, mostly
-      finite_ &= reader_.leaf(leaves_.values(above), leaves_.rule(), above_);
+      finite_ &= reader_.leaf(leaves_.values(above), leaves_.rule(), above_.data());
       signs.beyond[2] = first_layer(above_, 2);
     } else {
       signs.beyond[2] = uniform(above);
@@ -83,7 +83,7 @@ class LeafSigns {
   }
 
   const LeafPlaces& leaves_;
-  const SignReader& reader_ = chosen_sign_reader();
+  const SignReader& reader_ = chosen_kernels<SignReader>();
   std::int64_t leaf_above_ = -1;
   BlockMask above_;
   bool finite_ = true, complete_ = true;
@@ -233,7 +233,7 @@ class Sampler {
   const LeafPlaces& leaves_;
   edge_kernels::Sample<Crossing>* sample_;
   RunContext& context_;
-  const edge_kernels::Kernels& kernels_ = edge_kernels::chosen();
+  const edge_kernels::Kernels& kernels_ = chosen_kernels<edge_kernels::Kernels>();
   LargeArray<SignLeaf> signs_;  ///< signs by leaf; without a place where no edge is crossed
   LargeArray<Found> found_;     ///< crossings by leaf
   tbb::enumerable_thread_specific<CrossingStore<Crossing>> stores_;
@@ -262,13 +262,14 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
 }  // namespace
 
 FloatHermite sample_level_set(const LevelSet& level_set, double isovalue, RunContext& context) {
-  return sample<EdgeCrossing>(level_set, isovalue, edge_kernels::chosen().sample, context);
+  return sample<EdgeCrossing>(level_set, isovalue, chosen_kernels<edge_kernels::Kernels>().sample, context);
 }
 
 PackedHermite sample_level_set_packed(const LevelSet& level_set, double isovalue, NormalCodeId code,
                                       RunContext& context) {
-  PackedHermite result = sample<PackedCrossing>(level_set, isovalue,
-                                                edge_kernels::chosen().sample_packed[static_cast<int>(code)], context);
+  const auto& kernels = chosen_kernels<edge_kernels::Kernels>();
+  PackedHermite result =
+      sample<PackedCrossing>(level_set, isovalue, kernels.sample_packed[static_cast<int>(code)], context);
   result.normal_code = code;
   return result;
 }

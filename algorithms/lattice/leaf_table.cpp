@@ -295,7 +295,7 @@ void LeafTable::read_signs(RunContext& context) {
   inside_.resize(size());
   // Each leaf's signs are written by one thread; the flag is only ever raised, so that no order matters.
   std::atomic<bool> not_finite{false};
-  const SignReader& reader = chosen_sign_reader();
+  const SignReader& reader = chosen_kernels<SignReader>();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
     context.check();
     bool finite = true;
@@ -311,7 +311,7 @@ void LeafTable::read_signs(RunContext& context) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       if (i + kLeavesAhead < range.end()) ask_for(i + kLeavesAhead);
       if (i + kSamplesAhead < range.end()) find(i + kSamplesAhead);
-      finite &= reader.leaf(values(i), rule_, inside_[i]);
+      finite &= reader.leaf(values(i), rule_, inside_[i].data());
     }
     if (!finite) not_finite = true;
   });

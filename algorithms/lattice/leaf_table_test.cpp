@@ -207,7 +207,7 @@ TEST(SignReader, RowsAreThoseOfTheRuleAtAnyLevelOfVectorCode) {
   for (float& value : values) value = float(int(random() % 5) - 2);  // the isovalue among them
   for (const SimdLevel level : available_simd_levels()) {
     setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
-    const SignReader& reader = chosen_sign_reader();
+    const SignReader& reader = chosen_kernels<SignReader>();
     for (const InsideRule rule : {InsideRule{1.0f, 1.0f}, InsideRule{-1.0f, -1.0f}})
       for (const std::size_t stride : {8, 64}) {
         const std::uint64_t rows = reader.rows(values.data(), stride, rule);

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "algorithms/lattice/block_mask.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 
@@ -21,14 +21,14 @@ struct InsideRule {
   bool operator()(float value) const { return signed_value(value) < 0.0f; }
 };
 
-/// Readers of signs, compiled for one level of vector code; all levels give the same bits.
+/// Readers of signs, compiled for each level of vector code (simd_level.h); all levels give the same bits.
 struct SignReader {
-  /// Signs of a leaf's 512 samples; returns false if one of them is not finite.
-  bool (*leaf)(const float* values, const InsideRule& rule, BlockMask& inside);
+  SimdLevel level;
+  /// Signs of a leaf's 512 samples as a BlockMask has them; returns false if one of them is not finite.
+  bool (*leaf)(const float* values, const InsideRule& rule, std::uint64_t* inside);
   /// Signs of eight rows of eight samples that start `stride` samples apart: a row is a byte.
   std::uint64_t (*rows)(const float* values, std::size_t stride, const InsideRule& rule);
+  static const SignReader sse2, avx2, avx512;
 };
-/// The readers of the level that chosen_simd_level() gives. @throws Error as that does.
-const SignReader& chosen_sign_reader();
 
 }  // namespace hermesh

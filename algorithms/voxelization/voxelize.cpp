@@ -198,7 +198,7 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
                     .sheets = leave_out_interior_faces(soup, bins, signs, work, band, context),
                     .caps = {}};
   if (!signs.caps.empty()) add_caps(signs, work.voxel_size, work.reach, bins.blocks(), band, context);
-  const kernels::Kernels& kernels = kernels::chosen();
+  const kernels::Kernels& kernels = chosen_kernels<kernels::Kernels>();
   parallel_blocks(band.leaves.size(), context, [&](std::size_t i) {
     if (band.leaves[i]) sign_leaf(*band.leaves[i], signs.inside[i], widths, kernels);
   });

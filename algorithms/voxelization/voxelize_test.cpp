@@ -12,7 +12,7 @@
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/voxelization/distance/kernels/kernels.h"
+#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/search/triangle_tree.h"
 #include "algorithms/voxelization/inside/winding_number.h"
 
@@ -591,9 +591,9 @@ TEST(Voxelize, SameBytesAtAnyThreadCount) {
 TEST(Voxelize, SameBytesAtAnyLevelOfVectorCode) {
   const PolygonMesh mesh = mixed();
   const std::vector<float> reference = bytes_of(mesh, SignRule::automatic);
-  for (const std::string& level : kernels::levels()) {
-    setenv("HERMESH_SIMD", level.c_str(), 1);
-    EXPECT_TRUE(bytes_of(mesh, SignRule::automatic) == reference) << level;
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    EXPECT_TRUE(bytes_of(mesh, SignRule::automatic) == reference) << name(level);
   }
   setenv("HERMESH_SIMD", "mmx", 1);
   EXPECT_THROW(bytes_of(mesh, SignRule::automatic), Error);

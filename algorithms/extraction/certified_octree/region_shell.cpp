@@ -448,7 +448,7 @@ shell_kernels::Found RegionShell::Search::scan() {
       shell_.in_blocks_[0].data(), shell_.in_blocks_[1].data(),
       shell_.in_blocks_[2].data(), reinterpret_cast<const std::uint32_t(*)[4]>(shell_.quads_.data()),
       shell_.upright_.data(),      buffers_.certain.data()};
-  return shell_.look_(
+  return shell_.kernels_.look(
       {&surface, buffers_.windows.data(), static_cast<int>(buffers_.windows.size()), planes_.data(),
        static_cast<int>(buffers_.prisms.size()), cubes_.data(), polygon_.corners},
       buffers_.candidates.data());

@@ -82,7 +82,7 @@ class RegionShell {
   LargeArray<std::uint8_t> upright_;  ///< 1 for quads that face up along their block's direction
   std::array<LargeArray<float>, 3>
       in_blocks_;  ///< coordinates of the cells' points, relative to the corners of their blocks
-  shell_kernels::Look* const look_ = shell_kernels::chosen();
+  const shell_kernels::Kernels& kernels_ = chosen_kernels<shell_kernels::Kernels>();
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Buffers>> buffers_;
 };
 

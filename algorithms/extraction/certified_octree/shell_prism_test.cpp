@@ -118,7 +118,7 @@ class KernelBlock {
     const Window window{&block_, {0, 0, 0}, {~std::uint64_t{0}, 0, 8}, {~std::uint64_t{0}, 0, 8}, facing};
     const Box own{{0, -9, -9}, {4, 9, 9}};
     candidates_.resize(3 * 512);
-    const Found found = chosen()(
+    const Found found = chosen_kernels<Kernels>().look(
         {&surface, &window, 1, prisms.data(), static_cast<int>(prisms.size()), &own, 1}, candidates_.data());
     candidates_.resize(static_cast<std::size_t>(found.candidates));
     return found;

@@ -246,7 +246,7 @@ class LevelSetContourer {
   const IndexToWorld& placement_;
   const DualContouringOptions& options_;
   RunContext& context_;
-  const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
+  const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
   LargeArray<LeafCells> cells_;      ///< active cells of each leaf, and their numbers
   LargeArray<Neighbours> upper_;     ///< upper neighbours of each leaf, kept because every pass needs them
   std::vector<std::uint32_t> live_;  ///< leaves with points or quads

@@ -427,7 +427,7 @@ class Contourer {
   const DualContouringOptions options_;
   const double reach_;  ///< how far points may be from their cells, voxels
   const FilePoints& file_;
-  const leaf_kernels::Kernels& kernels_ = leaf_kernels::chosen();
+  const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
   std::vector<std::vector<PointTarget>> targets_;  ///< one list per block, ascending by cell
   UniformPoints points_;
   UniformCounts counts_;

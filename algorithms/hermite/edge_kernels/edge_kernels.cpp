@@ -1,24 +1,35 @@
+// Every operation is elementwise and rounded once, so all levels give the same bytes.
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
-#include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/hermite/with_normal_code.h"
+
+// These have the edges of many leaves in one loop, enough for vectors of sixteen.
+#define HERMESH_WIDEST_VECTORS
+#include "algorithms/lattice/simd/bits.h"
+#include "algorithms/lattice/simd/vectors.h"
 
 namespace hermesh::edge_kernels {
+namespace HERMESH_SIMD_LEVEL {
+namespace {
 
-// Each level is compiled in a source file of its own, with its own flags; this one has those of the whole program.
-namespace sse2 {
-extern const Kernels kKernels;
-}
-namespace avx2 {
-extern const Kernels kKernels;
-}
-namespace avx512 {
-extern const Kernels kKernels;
-}
+using namespace simd;
+// clang-format off: the order matters
+#include "algorithms/hermite/edge_kernels/leaf_ends.inc"
+#include "algorithms/hermite/edge_kernels/leaf_crossings.inc"
+// clang-format on
 
-// The level is asked once a conversion, not once a leaf.
-const Kernels& chosen() {
-  // All levels give the same bytes, so the choice shows in time only.
-  return of_level(chosen_simd_level(), sse2::kKernels, avx2::kKernels, avx512::kKernels);
-}
+constexpr Kernels kKernels = {kLevel,
+                              crossed,
+                              sample,
+                              {sample_packed<ThesisNormalCode>, sample_packed<BaptistaNormalCode>,
+                               sample_packed<RoundedNormalCode>, sample_packed<OctahedralNormalCode>,
+                               sample_packed<NearestNormalCode>}};
+static_assert(int(NormalCodeId::thesis) == 0 && int(NormalCodeId::baptista) == 1 && int(NormalCodeId::rounded) == 2 &&
+              int(NormalCodeId::octahedral) == 3 && int(NormalCodeId::nearest) == 4);
+
+}  // namespace
+}  // namespace HERMESH_SIMD_LEVEL
+
+constinit const Kernels Kernels::HERMESH_SIMD_LEVEL = HERMESH_SIMD_LEVEL::kKernels;
 
 }  // namespace hermesh::edge_kernels

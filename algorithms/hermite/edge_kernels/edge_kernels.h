@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "algorithms/hermite/crossing.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh::edge_kernels {
 
@@ -52,14 +53,13 @@ template <class Crossing>
 using Sample = void(const EdgeInput* leaves, int count, Crossing* out);
 constexpr int kOutRoom = 128;
 
-/// The kernels of one level of vector code.
+/// The kernels of one level of vector code, see simd_level.h.
 struct Kernels {
+  SimdLevel level;
   Crossed* crossed;
   Sample<EdgeCrossing>* sample;
   Sample<PackedCrossing>* sample_packed[kNormalCodes.size()];  ///< one for each NormalCodeId
+  static const Kernels sse2, avx2, avx512;
 };
-
-/// The kernels for the level of vector code that is chosen, see simd_level.h.
-const Kernels& chosen();
 
 }  // namespace hermesh::edge_kernels

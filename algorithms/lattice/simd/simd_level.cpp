@@ -65,7 +65,10 @@ SimdLevel chosen_simd_level() {
   // Read at every call and kept nowhere, so that tests can go through all levels in one
   // process. Empty counts as not set.
   const char* text = std::getenv("HERMESH_SIMD");
-  return text && *text ? parse_simd_level(text) : available_simd_levels().back();
+  if (text && *text) return parse_simd_level(text);
+  return is_available(SimdLevel::avx512) ? SimdLevel::avx512
+         : is_available(SimdLevel::avx2) ? SimdLevel::avx2
+                                         : SimdLevel::sse2;
 }
 
 }  // namespace hermesh

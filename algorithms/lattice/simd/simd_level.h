@@ -25,10 +25,19 @@ SimdLevel parse_simd_level(std::string_view name);
 /// parse_simd_level() does.
 SimdLevel chosen_simd_level();
 
-/// The one of three things (kernels, tables of functions) that was compiled for the level.
-template <class T>
-const T& of_level(SimdLevel level, const T& sse2, const T& avx2, const T& avx512) {
-  return level == SimdLevel::avx512 ? avx512 : level == SimdLevel::avx2 ? avx2 : sse2;
+/// A family of kernels is a struct of pointers to functions with its level, `SimdLevel level`, and `static const
+/// Kernels sse2, avx2, avx512;`. Its source is compiled once for each of these (hermesh_simd_sources() in
+/// algorithms/CMakeLists.txt), with the level's name as HERMESH_SIMD_LEVEL, and defines the one with that name. All
+/// else in it lies in a namespace of that name, within a namespace without one, and calls no function that another
+/// source may have, too, such as those of the standard library: the linker would keep one copy for all, maybe one that
+/// the machine cannot run.
+template <class Kernels>
+const Kernels& kernels_of(SimdLevel level) {
+  return level == SimdLevel::avx512 ? Kernels::avx512 : level == SimdLevel::avx2 ? Kernels::avx2 : Kernels::sse2;
+}
+template <class Kernels>
+const Kernels& chosen_kernels() {
+  return kernels_of<Kernels>(chosen_simd_level());
 }
 
 }  // namespace hermesh

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cstdlib>
 #include <random>
 #include <vector>
 
 #include "algorithms/extraction/dual_contouring/qef.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -70,6 +72,21 @@ TEST(QefSum, ALanesResultDoesNotDependOnTheOthers) {
   std::vector<Vector3d> places(cases.size());
   minimisers(sums, 0.1, places.data());
   for (std::size_t i = 0; i < cases.size(); ++i) EXPECT_EQ(places[i], minimiser(cases[i].sum, 0.1));
+}
+
+TEST(QefSum, MinimisersAreTheSameAtAnyLevelOfVectorCode) {
+  std::mt19937 random(3);
+  std::vector<Planes> cases;
+  std::vector<const QefSum*> sums;
+  for (int i = 0; i < 300; ++i) cases.push_back(random_planes(random, 0.5f));
+  for (const Planes& planes : cases) sums.push_back(&planes.sum);
+  std::vector<std::vector<Vector3d>> places;
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    minimisers(sums, 0.1, places.emplace_back(cases.size()).data());
+    EXPECT_EQ(places.front(), places.back()) << name(level);
+  }
+  unsetenv("HERMESH_SIMD");
 }
 
 TEST(QefSum, ThreePlanesMeetInTheirCorner) {

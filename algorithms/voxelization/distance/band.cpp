@@ -47,7 +47,7 @@ class LeafWork {
   /// `without`: triangles to leave out, ascending; may be null.
   LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids,
            const std::vector<std::uint32_t>* without = nullptr)
-      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(kernels::chosen()) {}
+      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(chosen_kernels<Kernels>()) {}
 
   /// Computes a block's values, active voxels and crossed edges; false when no voxel is within reach.
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,

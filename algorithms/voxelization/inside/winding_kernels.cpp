@@ -1,18 +1,16 @@
 #include "algorithms/voxelization/inside/winding_kernels.h"
 
-#include <cmath>
+#include "algorithms/lattice/simd/vectors.h"
 
-// Compiled with -fno-math-errno and -fno-trapping-math: square roots that set errno and comparisons that may
-// trap could not be taken several at a time. All operations are of one lane and contraction is off, so wider
+// Plain loops, compiled with -fno-math-errno and -fno-trapping-math: square roots that set errno and comparisons that
+// may trap could not be taken several at a time. All operations are of one lane and contraction is off, so wider
 // registers give the same bits.
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
-#define HERMESH_LANES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define HERMESH_LANES
-#endif
-
 namespace hermesh::winding {
+namespace HERMESH_SIMD_LEVEL {
 namespace {
+
+inline float square_root(float x) { return __builtin_sqrtf(x); }
+inline double square_root(double x) { return __builtin_sqrt(x); }
 
 /// atan(q)/q as a polynomial in q², for q in 0…1; the least relative error of its degree, 6.5e-7.
 template <class Real>
@@ -43,8 +41,7 @@ template <class Real>
 /// Adds a triangle's solid angle at each point: van Oosterom & Strackee, The Solid Angle of a Plane Triangle, IEEE
 /// Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop holds scalars alone, which the compiler can turn into lanes.
 template <class Real>
-[[gnu::always_inline]] inline void add_solid_angle(const PlacedTriangle<Real>& triangle,
-                                                   const Targets& targets) {
+void add_solid_angle(const PlacedTriangle<Real>& triangle, const Targets& targets) {
   const auto [a, b, c] = triangle.corner;
   const Real nx = triangle.normal[0], ny = triangle.normal[1], nz = triangle.normal[2];
   const Real offset = triangle.offset;
@@ -59,9 +56,9 @@ template <class Real>
     const Real ax = a0 - x, ay = a1 - y, az = a2 - z;
     const Real bx = b0 - x, by = b1 - y, bz = b2 - z;
     const Real cx = c0 - x, cy = c1 - y, cz = c2 - z;
-    const Real la = std::sqrt(ax * ax + ay * ay + az * az);
-    const Real lb = std::sqrt(bx * bx + by * by + bz * bz);
-    const Real lc = std::sqrt(cx * cx + cy * cy + cz * cz);
+    const Real la = square_root(ax * ax + ay * ay + az * az);
+    const Real lb = square_root(bx * bx + by * by + bz * bz);
+    const Real lc = square_root(cx * cx + cy * cy + cz * cz);
     const Real ab = ax * bx + ay * by + az * bz;
     const Real bc = bx * cx + by * cy + bz * cz;
     const Real ca = cx * ax + cy * ay + cz * az;
@@ -71,19 +68,9 @@ template <class Real>
   }
 }
 
-}  // namespace
-
-HERMESH_LANES void add_triangle(const PlacedTriangle<float>& triangle, const Targets& targets) {
-  add_solid_angle(triangle, targets);
-}
-
-HERMESH_LANES void add_triangle(const PlacedTriangle<double>& triangle, const Targets& targets) {
-  add_solid_angle(triangle, targets);
-}
-
 // With R from the point to the centre, R/|R|³ and its derivatives contracted with the moments:
 // ∫n·R/|R|³ − 3 RᵀBR/|R|⁵ + 15/2 C(R,R,R)/|R|⁷.
-HERMESH_LANES void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets) {
+void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets) {
   float b[6], c[10];
   // A symmetric tensor's components off the diagonal count as often as their indices can be ordered: 2 of a pair; 3
   // of a triple with two equal, 6 of one with none.
@@ -104,8 +91,15 @@ HERMESH_LANES void add_multipole(const Multipole& multipole, const float centre[
     const float square = x * (b[0] * x + b[1] * y + b[2] * z) + y * (b[3] * y + b[4] * z) + b[5] * z * z;
     const float cube = x * (x * (c[0] * x + c[1] * y + c[2] * z) + y * (c[3] * y + c[4] * z) + c[5] * z * z) +
                        y * (y * (c[6] * y + c[7] * z) + c[8] * z * z) + c[9] * z * z * z;
-    sum[i] += (linear + s * (square + s * cube)) * s * std::sqrt(s);
+    sum[i] += (linear + s * (square + s * cube)) * s * square_root(s);
   }
 }
+
+}  // namespace
+}  // namespace HERMESH_SIMD_LEVEL
+
+constinit const Kernels Kernels::HERMESH_SIMD_LEVEL = {simd::kLevel, HERMESH_SIMD_LEVEL::add_multipole,
+                                                       HERMESH_SIMD_LEVEL::add_solid_angle<float>,
+                                                       HERMESH_SIMD_LEVEL::add_solid_angle<double>};
 
 }  // namespace hermesh::winding

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "algorithms/lattice/simd/simd_level.h"
+
 namespace hermesh::winding {
 
 /// Points relative to an origin near them, in voxels, and for each the solid angle that it was found to be surrounded
@@ -33,16 +35,17 @@ struct PlacedTriangle {
   Real offset;        ///< normal · corner
 };
 
-/// Adds the solid angle of the triangles in a box, seen from points outside its sphere.
-/// @param multipole the field of the triangles
-/// @param centre of the box relative to the targets' origin
-/// @param targets the points, and their sums
-void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets);
-
-/// Adds the solid angle of a triangle to within 3e-6; nothing for a point in its plane but outside it.
-void add_triangle(const PlacedTriangle<float>& triangle, const Targets& targets);
-/// Adds the solid angle of a triangle in double precision, for triangles that are large beside the distances between
-/// the points.
-void add_triangle(const PlacedTriangle<double>& triangle, const Targets& targets);
+/// See simd_level.h.
+struct Kernels {
+  SimdLevel level;
+  /// Adds what the triangles in a box make up, seen from points outside its sphere. `centre` is the box's relative to
+  /// the targets' origin.
+  void (*add_multipole)(const Multipole& multipole, const float centre[3], const Targets& targets);
+  /// Adds the solid angle of a triangle to within 3e-6; nothing for a point in its plane but outside it.
+  void (*add_triangle)(const PlacedTriangle<float>& triangle, const Targets& targets);
+  /// As add_triangle(), in double precision, for triangles that are large beside the distances between the points.
+  void (*add_large_triangle)(const PlacedTriangle<double>& triangle, const Targets& targets);
+  static const Kernels sse2, avx2, avx512;
+};
 
 }  // namespace hermesh::winding

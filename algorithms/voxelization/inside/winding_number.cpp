@@ -225,8 +225,7 @@ class Batch {
       const double away = (centre - centre.cwiseMax(lowest).cwiseMin(highest)).norm();
       if (away >= far_ * multipole.radius) {
         const Eigen::Vector3f c = centre.cast<float>();
-        if (away < kVeryFar * multipole.radius) add_multipole(multipole, c.data(), targets);
-      // A box that is large beside the range would not become far if the range were halved, so it is opened.
+        if (away < kVeryFar * multipole.radius) kernels_.add_multipole(multipole, c.data(), targets);
       } else if (ref.level > 0 && (last || multipole.radius > extent)) {
         push_children(tree_.child_pack(ref), ref.level - 1, boxes);
       } else if (last) {
@@ -264,9 +263,9 @@ class Batch {
       // Corners far outside the batch would lose in single precision what tells the samples apart.
       const double reach = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
       if (reach <= kWide * kWide * extent_ * extent_)
-        add_triangle(placed<float>(a, b, c), targets);
+        kernels_.add_triangle(placed<float>(a, b, c), targets);
       else
-        add_triangle(placed<double>(a, b, c), targets);
+        kernels_.add_large_triangle(placed<double>(a, b, c), targets);
     }
   }
 
@@ -285,6 +284,7 @@ class Batch {
     return result;
   }
 
+  const winding::Kernels& kernels_ = chosen_kernels<winding::Kernels>();
   const TriangleTree& tree_;
   std::span<const Multipole> multipoles_;
   std::span<const std::int8_t> turns_;

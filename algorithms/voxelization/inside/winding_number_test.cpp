@@ -4,8 +4,11 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <random>
+
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -226,6 +229,21 @@ TEST(WindingNumber, IsTheSameForEveryNumberOfThreads) {
     WindingNumber(tree).at(points, values.back());
     EXPECT_EQ(values[0], values.back());
   }
+}
+
+TEST(WindingNumber, IsTheSameAtAnyLevelOfVectorCode) {
+  Soup soup = random_soup(3000, 1, 7);
+  soup.add(icosphere(40, 0));  // its triangles are large beside a block
+  const std::vector<Eigen::Vector3d> points = block_at({3, -2, 5});
+  std::vector<std::vector<float>> values;
+  const TriangleTree tree(soup.points, soup.triangles, 1.0);
+  for (const SimdLevel level : available_simd_levels()) {
+    setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
+    values.emplace_back(points.size());
+    WindingNumber(tree).at(points, values.back());
+    EXPECT_EQ(values[0], values.back()) << name(level);
+  }
+  unsetenv("HERMESH_SIMD");
 }
 
 }  // namespace

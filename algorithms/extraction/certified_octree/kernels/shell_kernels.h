@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include "algorithms/lattice/simd/simd_level.h"
+
 namespace hermesh::shell_kernels {
 
 /// How many prisms are looked at together (see Surface::certain), and the floats in the longest vectors.
@@ -99,7 +101,11 @@ struct Found {
 /// Finds candidates. `out` has room for a candidate for each edge of the windows' blocks.
 using Look = Found(const Scan& scan, Candidate* out);
 
-/// The code for the level of vector code that is chosen, see simd_level.h.
-Look* chosen();
+/// See simd_level.h.
+struct Kernels {
+  SimdLevel level;
+  Look* look;
+  static const Kernels sse2, avx2, avx512;
+};
 
 }  // namespace hermesh::shell_kernels

@@ -1,24 +1,34 @@
+// The loops over edges, cells and quads are plain C++ over arrays, which the compiler vectorises as wide as it is told;
+// every operation is elementwise and rounded once, so all levels give the same bytes.
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 
-#include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/lattice/simd/bits.h"
+#include "algorithms/lattice/simd/vectors.h"
 
 namespace hermesh::leaf_kernels {
+namespace HERMESH_SIMD_LEVEL {
+namespace {
 
-// One body (leaf_kernels.inc), compiled once for each level in a source file with options of its own. This file has
-// none, so that the choice itself runs on any machine.
-namespace sse2 {
-extern const Kernels kKernels;
-}
-namespace avx2 {
-extern const Kernels kKernels;
-}
-namespace avx512 {
-extern const Kernels kKernels;
-}
+using namespace simd;
+// clang-format off: the order matters
+#include "algorithms/extraction/dual_contouring/kernels/bit_numbers.inc"
+#include "algorithms/extraction/dual_contouring/kernels/signs.inc"
+#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
+#include "algorithms/extraction/dual_contouring/kernels/stencil.inc"
+#include "algorithms/extraction/dual_contouring/kernels/count.inc"
+#include "algorithms/extraction/dual_contouring/kernels/cells.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
+#include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
+#include "algorithms/extraction/dual_contouring/kernels/connect.inc"
+// clang-format on
 
-// Asked anew for each extraction: tests change the level between two.
-const Kernels& chosen() {
-  return of_level(chosen_simd_level(), sse2::kKernels, avx2::kKernels, avx512::kKernels);
-}
+constexpr Kernels kKernels = {kLevel,      count,      place_average, place_optimal,
+                              place_later, place_flat, place_mean,    connect};
+
+}  // namespace
+}  // namespace HERMESH_SIMD_LEVEL
+
+constinit const Kernels Kernels::HERMESH_SIMD_LEVEL = HERMESH_SIMD_LEVEL::kKernels;
 
 }  // namespace hermesh::leaf_kernels

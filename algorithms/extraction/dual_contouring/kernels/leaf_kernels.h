@@ -152,7 +152,9 @@ using PlaceMean = void(const PlainCells& cells, float* const* place);
 /// One quad for each crossing edge that starts in the leaf, four point numbers each, by axis, in that by sample.
 using Connect = void(const ConnectInput& input, std::uint32_t* quads);
 
+/// See simd_level.h.
 struct Kernels {
+  SimdLevel level;
   Count* count;
   PlaceAverage* place_average;
   PlaceOptimal* place_optimal;
@@ -160,9 +162,7 @@ struct Kernels {
   PlaceFlat* place_flat;
   PlaceMean* place_mean;
   Connect* connect;
+  static const Kernels sse2, avx2, avx512;
 };
-
-/// The kernels of the level that chosen_simd_level() gives. @throws Error as that does.
-const Kernels& chosen();
 
 }  // namespace hermesh::leaf_kernels

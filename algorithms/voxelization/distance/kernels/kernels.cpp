@@ -1,81 +1,477 @@
 #include "algorithms/voxelization/distance/kernels/kernels.h"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-
-#include "algorithms/lattice/simd/simd_level.h"
+#define HERMESH_WIDEST_VECTORS
+#include "algorithms/lattice/simd/vectors.h"
 #include "algorithms/voxelization/distance/kernels/constants.h"
 
 namespace hermesh::kernels {
-
-// The three tables of functions are the same source compiled with other flags; each namespace keeps its copy apart
-// from the others, or the linker could pick one that the machine cannot execute.
-namespace sse2 {
-extern const Kernels kKernels;
-}
-namespace avx2 {
-extern const Kernels kKernels;
-}
-namespace avx512 {
-extern const Kernels kKernels;
-}
-
+namespace HERMESH_SIMD_LEVEL {
 namespace {
 
-/// Writes a vector to three rows of the batch, rounded to single precision as the kernels' set_up() rounds.
-void put(Batch& batch, int row, int lane, const Eigen::Vector3d& v) {
-  for (int axis = 0; axis < 3; ++axis) batch.f[row + axis][lane] = float(v[axis]);
+using namespace simd;
+#include "algorithms/voxelization/distance/kernels/crossing.inc"
+
+/// Positions of the 16 lanes of a 2×2×4 block relative to its centre, and of the 32 blocks' centres.
+struct Positions {
+  alignas(64) float lane[3][16];
+  alignas(64) float centre[3][32];
+};
+
+constexpr Positions make_positions() {
+  Positions p{};
+  for (int i = 0; i < 16; ++i) {
+    p.lane[0][i] = float(i >> 3) - 0.5f;
+    p.lane[1][i] = float(i >> 2 & 1) - 0.5f;
+    p.lane[2][i] = float(i & 3) - 1.5f;
+  }
+  for (int i = 0; i < 32; ++i) {
+    p.centre[0][i] = float(2 * (i >> 3)) + 0.5f;
+    p.centre[1][i] = float(2 * (i >> 1 & 3)) + 0.5f;
+    p.centre[2][i] = float(4 * (i & 1)) + 1.5f;
+  }
+  return p;
 }
 
-}  // namespace
+constexpr Positions kPositions = make_positions();
 
-void set_up_segment(const Corners& corners, int triangle, Batch& batch) {
-  // Plain code, once for all levels: segments are rare.
-  Eigen::Vector3d corner[3];
-  for (int i = 0; i < 3; ++i)
-    for (int axis = 0; axis < 3; ++axis) corner[i][axis] = corners.corner[3 * i + axis][triangle];
-  int longest = 0;
-  // Side i runs from corner i on; of equally long ones the first is taken, at every level of vector code.
-  const auto side = [&](int i) -> Eigen::Vector3d { return corner[(i + 1) % 3] - corner[i]; };
-  for (int i = 1; i < 3; ++i)
-    if (side(i).squaredNorm() > side(longest).squaredNorm()) longest = i;
-  const Eigen::Vector3d& start = corner[longest];
-  // A triangle that is a point is a segment of length 0 along x.
-  const double length = side(longest).norm();
-  const Eigen::Vector3d along =
-      length > 0 ? Eigen::Vector3d(side(longest) / length) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
-  const Eigen::Vector3d normal = along.unitOrthogonal(), across = along.cross(normal);
-  put(batch, Batch::kHeight, triangle, normal);
-  batch.f[Batch::kHeight + 3][triangle] = float(-normal.dot(start));
+/// Half the diagonal of a block's voxels, √(0.5² + 0.5² + 1.5²), rounded up.
+constexpr float kBlockRadius = 1.6584f;
+
+/// The seven linear functions of a triangle at 16 places.
+struct Functions {
+  Floats16 height, across[3], along[3];
+};
+
+/// Squared distance to a triangle from the functions at 16 places (kernels.h has the rule): to its plane where a place is
+/// above the triangle, and to its nearest edge elsewhere.
+inline Floats16 squared_distance(const Functions& at, const Floats16* low, const Floats16* high) {
+  Floats16 nearest;
   for (int i = 0; i < 3; ++i) {
-    const int edge = Batch::kEdge + Batch::kPerEdge * i;
-    // The three edges are one line, seen from both sides: `across` of two has the other sign than that of the third,
-    // so that the largest is never below 0 and the edge's distance always counts.
-    const double turn = i == 2 ? -1.0 : 1.0;
-    put(batch, edge, triangle, turn * across);
-    batch.f[edge + 3][triangle] = float(-turn * across.dot(start));
-    put(batch, edge + Batch::kAlong, triangle, along);
-    batch.f[edge + Batch::kLow][triangle] = float(along.dot(start));
-    batch.f[edge + Batch::kHigh][triangle] = float(along.dot(start) + length);
+    const Floats16 beyond = at.along[i] - smaller(larger(at.along[i], low[i]), high[i]);
+    const Floats16 squared = at.across[i] * at.across[i] + beyond * beyond;
+    nearest = i == 0 ? squared : smaller(nearest, squared);
+  }
+  // Beyond any edge the nearest edge counts; within all three, the height alone.
+  const Floats16 outside = larger(larger(at.across[0], at.across[1]), at.across[2]);
+  return at.height * at.height + kept_unless_negative(outside, nearest);
+}
+
+/// One triangle of a batch, its coefficients in all lanes.
+struct Broadcast {
+  Floats16 height[4], across[3][4], along[3][3], low[3], high[3];
+
+  Broadcast(const Batch& batch, int j) {
+    for (int k = 0; k < 4; ++k) height[k] = sixteen(batch.f[Batch::kHeight + k][j]);
+    for (int i = 0; i < 3; ++i) {
+      const float(*edge)[kBatch] = batch.f + Batch::kEdge + Batch::kPerEdge * i;
+      for (int k = 0; k < 4; ++k) across[i][k] = sixteen(edge[k][j]);
+      for (int k = 0; k < 3; ++k) along[i][k] = sixteen(edge[Batch::kAlong + k][j]);
+      low[i] = sixteen(edge[Batch::kLow][j]);
+      high[i] = sixteen(edge[Batch::kHigh][j]);
+    }
+  }
+};
+
+inline Floats16 dot(const Floats16* g, Floats16 x, Floats16 y, Floats16 z) { return g[0] * x + g[1] * y + g[2] * z; }
+
+/// The functions without their constant parts, which a lane adds to what they are at its block's centre.
+inline Functions linear_parts(const Broadcast& t, const float (*place)[16]) {
+  const Floats16 x = sixteen(place[0]), y = sixteen(place[1]), z = sixteen(place[2]);
+  Functions f;
+  f.height = dot(t.height, x, y, z);
+  for (int i = 0; i < 3; ++i) {
+    f.across[i] = dot(t.across[i], x, y, z);
+    f.along[i] = dot(t.along[i], x, y, z);
+  }
+  return f;
+}
+
+/// The functions at the centres of one half of the 32 blocks.
+inline Functions at_centres(const Broadcast& t, int half) {
+  const Floats16 x = sixteen(kPositions.centre[0] + 16 * half), y = sixteen(kPositions.centre[1] + 16 * half),
+               z = sixteen(kPositions.centre[2] + 16 * half);
+  Functions f;
+  f.height = dot(t.height, x, y, z) + t.height[3];
+  for (int i = 0; i < 3; ++i) {
+    f.across[i] = dot(t.across[i], x, y, z) + t.across[i][3];
+    f.along[i] = dot(t.along[i], x, y, z);
+  }
+  return f;
+}
+
+/// The functions at the blocks' centres, where every lane of a block starts from.
+struct CentreValues {
+  alignas(64) float height[32], across[3][32], along[3][32];
+};
+
+/// Lowers the distances of a block's voxels by one triangle. Three functions of a place are linear, so that each is one
+/// addition a voxel: what it is at the block's centre and what the lane adds.
+template <bool ids>
+inline void update_block(const CentreValues& centre, const Functions& lane, const Broadcast& t, int block,
+                         Ints id, Distances& distances) {
+  Functions at;
+  at.height = lane.height + sixteen(centre.height[block]);
+  for (int i = 0; i < 3; ++i) {
+    at.across[i] = lane.across[i] + sixteen(centre.across[i][block]);
+    at.along[i] = lane.along[i] + sixteen(centre.along[i][block]);
+  }
+  const Floats16 squared = squared_distance(at, t.low, t.high);
+  float* best = distances.squared + 16 * block;
+  const Floats16 before = sixteen(best);
+  if constexpr (ids) {
+    for (int i = 0; i < Floats16::kRegisters; ++i) {
+      std::int32_t* at_id = distances.id + 16 * block + kLanes * i;
+      store(at_id, squared.r[i] < before.r[i] ? id : load(at_id));
+    }
+  }
+  store(best, smaller(squared, before));
+}
+
+/// Lowers the distances by the triangles of a batch, one after the other. For each, the blocks whose centre is within
+/// reach and half a block's diagonal are looked into; the others have no voxel within reach.
+template <bool ids>
+void update_with(const Batch& batch, int count, float reach, Distances& distances) {
+  const Floats16 limit = sixteen((reach + kBlockRadius) * (reach + kBlockRadius));
+  for (int j = 0; j < count; ++j) {
+    const Broadcast t(batch, j);
+    CentreValues centre;
+    unsigned blocks = 0;
+    for (int half = 0; half < 2; ++half) {
+      const Functions f = at_centres(t, half);
+      blocks |= less(squared_distance(f, t.low, t.high), limit) << (16 * half);
+      store(centre.height + 16 * half, f.height);
+      for (int i = 0; i < 3; ++i) {
+        store(centre.across[i] + 16 * half, f.across[i]);
+        store(centre.along[i] + 16 * half, f.along[i]);
+      }
+    }
+    // No block is near: most triangles of a batch reach into few of the leaf's 32 blocks, or none.
+    if (!blocks) continue;
+    const Functions lane = linear_parts(t, kPositions.lane);
+    const Ints id = all(batch.id[j]);
+    for (; blocks; blocks &= blocks - 1)
+      update_block<ids>(centre, lane, t, __builtin_ctz(blocks), id, distances);
   }
 }
 
-std::vector<std::string> levels() {
-  std::vector<std::string> names;
-  for (const SimdLevel level : available_simd_levels()) names.emplace_back(name(level));
-  return names;
+/// Without numbers of triangles to keep there is a comparison and a store less for each voxel.
+void update(const Batch& batch, int count, float reach, bool ids, Distances& distances) {
+  if (ids)
+    update_with<true>(batch, count, reach, distances);
+  else
+    update_with<false>(batch, count, reach, distances);
 }
 
-namespace {
+// ---- Fetching.
 
-// The functions that parse and choose a level let only those through that the machine can run.
-const Kernels& kernels_of(SimdLevel level) {
-  return of_level(level, sse2::kKernels, avx2::kKernels, avx512::kKernels);
+/// Which triangles' boxes come within reach of the leaf's samples, and which within a voxel of them, by boxes in single
+/// precision that are widened by what it may err.
+Near near(const MeshCorners& corners, const LeafFrame& frame, float reach) {
+  // Single precision errs by a few parts in ten million of what it adds and takes away.
+  float margin = 16.0f + reach;
+  for (int axis = 0; axis < 3; ++axis)
+    margin += float(frame.origin[axis] < 0 ? -frame.origin[axis] : frame.origin[axis]);
+  margin *= 1e-6f;
+  const Floats16 scale = sixteen(float(frame.scale)), zero = sixteen(0.0f);
+  Floats16 gap2 = zero, farthest = zero;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Floats16 origin = sixteen(float(frame.origin[axis]));
+    const Floats16 a = sixteen(corners.corner[axis]), b = sixteen(corners.corner[3 + axis]),
+                 c = sixteen(corners.corner[6 + axis]);
+    const Floats16 low = smaller(smaller(a, b), c) * scale - origin,
+                 high = larger(larger(a, b), c) * scale - origin;
+    // How far the box is from the leaf's samples, which are 0 to 7, along this axis.
+    const Floats16 gap = larger(larger(low - sixteen(7.0f), zero - high), zero);
+    gap2 = gap2 + gap * gap;
+    farthest = larger(farthest, gap);
+  }
+  // The edges that a leaf owns end a voxel beyond it.
+  return {less(gap2, sixteen((reach + margin) * (reach + margin))), less(farthest, sixteen(1.0f + margin))};
 }
+
+/// In double precision, for a mesh's coordinates may be large beside a voxel; relative to the leaf they are small, and may
+/// be rounded to single precision later.
+void to_leaf(const MeshCorners& from, const LeafFrame& frame, Corners& to) {
+  const Doubles8 scale = eight(frame.scale);
+  for (int i = 0; i < 9; ++i) {
+    const Doubles8 origin = eight(frame.origin[i % 3]);
+    for (int first = 0; first < kBatch; first += 8)
+      store(to.corner[i] + first, eight(from.corner[i] + first) * scale - origin);
+  }
+}
+
+// ---- Setting up.
+
+struct Vector {
+  Doubles8 x, y, z;
+};
+
+inline Vector operator-(const Vector& a, const Vector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vector operator*(const Vector& a, Doubles8 s) { return {a.x * s, a.y * s, a.z * s}; }
+inline Doubles8 dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vector cross_product(const Vector& a, const Vector& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+inline void put(float (*at)[kBatch], int first, const Vector& v) {
+  store_rounded(at[0] + first, v.x);
+  store_rounded(at[1] + first, v.y);
+  store_rounded(at[2] + first, v.z);
+}
+
+/// Coefficients in double precision, rounded once. The division by a length of 0 gives values that are not finite; such a
+/// triangle is reported as thin, and its lane is set up anew as a segment (set_up_segment()).
+unsigned set_up(const Corners& corners, Batch& batch) {
+  unsigned thin = 0;
+  for (int first = 0; first < kBatch; first += 8) {
+    Vector corner[3];
+    for (int i = 0; i < 3; ++i)
+      corner[i] = {eight(corners.corner[3 * i] + first), eight(corners.corner[3 * i + 1] + first),
+                   eight(corners.corner[3 * i + 2] + first)};
+    const Vector side[3] = {corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]};
+    const Vector area = cross_product(side[0], corner[2] - corner[0]);
+    const Doubles8 squared = dot(area, area);
+    Doubles8 length2[3];
+    for (int i = 0; i < 3; ++i) length2[i] = dot(side[i], side[i]);
+    const Doubles8 longest2 = larger(larger(length2[0], length2[1]), length2[2]);
+    // Twice the area over the longest side is the height.
+    thin |= (~less(longest2 * eight(kThin * kThin), squared) & 0xffu) << first;
+    const Vector normal = area * (eight(1.0) / square_root(squared));
+    put(batch.f + Batch::kHeight, first, normal);
+    store_rounded(batch.f[Batch::kHeight + 3] + first, eight(0.0) - dot(normal, corner[0]));
+    for (int i = 0; i < 3; ++i) {
+      float(*edge)[kBatch] = batch.f + Batch::kEdge + Batch::kPerEdge * i;
+      const Doubles8 length = square_root(length2[i]);
+      const Vector along = side[i] * (eight(1.0) / length);
+      const Vector across = cross_product(along, normal);
+      const Doubles8 low = dot(along, corner[i]);
+      put(edge, first, across);
+      store_rounded(edge[3] + first, eight(0.0) - dot(across, corner[i]));
+      put(edge + Batch::kAlong, first, along);
+      store_rounded(edge[Batch::kLow] + first, low);
+      store_rounded(edge[Batch::kHigh] + first, low + length);
+    }
+  }
+  return thin;
+}
+
+// ---- Many small triangles.
+
+/// Squared distance from a place to each of 16 boxes, rounded down enough to be a lower bound.
+inline Floats16 squared_distance(const Boxes& boxes, const Floats16* place) {
+  Floats16 sum = sixteen(0.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Floats16 below = sixteen(boxes.side[axis][0]) - place[axis];
+    const Floats16 above = place[axis] - sixteen(boxes.side[axis][1]);
+    const Floats16 gap = larger(larger(below, above), sixteen(0.0f));
+    sum = sum + gap * gap;
+  }
+  return sum * sixteen(0.99999f);
+}
+
+/// Squared distances of one place to the 16 triangles of a batch.
+inline Floats16 squared_distance(const Batch& batch, const Floats16* place) {
+  const auto value = [&](int k) {
+    return sixteen(batch.f[k]) * place[0] + sixteen(batch.f[k + 1]) * place[1] + sixteen(batch.f[k + 2]) * place[2];
+  };
+  Functions at;
+  Floats16 low[3], high[3];
+  at.height = value(Batch::kHeight) + sixteen(batch.f[Batch::kHeight + 3]);
+  for (int i = 0; i < 3; ++i) {
+    const int edge = Batch::kEdge + Batch::kPerEdge * i;
+    at.across[i] = value(edge) + sixteen(batch.f[edge + 3]);
+    at.along[i] = value(edge + Batch::kAlong);
+    low[i] = sixteen(batch.f[edge + Batch::kLow]);
+    high[i] = sixteen(batch.f[edge + Batch::kHigh]);
+  }
+  return squared_distance(at, low, high);
+}
+
+/// A batch is set up when something looks into it for the first time: of many small triangles most are never asked.
+inline const Batch& prepared(const LazyBatches& lazy, int b) {
+  if (!lazy.batches[b]) lazy.batches[b] = lazy.prepare(lazy.context, b);
+  return *lazy.batches[b];
+}
+
+/// Lowers `best`, a squared distance, to that of the batch's nearest triangle, and returns its lane, or −1 if none is
+/// nearer.
+inline int lower(const Batch& batch, const Floats16* place, float& best) {
+  const Floats16 found = squared_distance(batch, place);
+  unsigned nearer = less(found, sixteen(best));
+  int lane = -1;
+  if (!nearer) return lane;
+  alignas(64) float squared[16];
+  store(squared, found);
+  for (; nearer; nearer &= nearer - 1) {
+    const int i = __builtin_ctz(nearer);
+    if (squared[i] < best) {
+      best = squared[i];
+      lane = i;
+    }
+  }
+  return lane;
+}
+
+inline void set_place(Floats16* place, float x, float y, float z) {
+  place[0] = sixteen(x);
+  place[1] = sixteen(y);
+  place[2] = sixteen(z);
+}
+
+/// Finds the batch with the triangle nearest to a place, and lowers `best` to its squared distance; −1 if none is
+/// nearer than `best` was. `guess` is looked into first.
+int nearest_batch(const LazyBatches& lazy, const Floats16* place, int guess, float& best) {
+  int nearest = guess >= 0 && lower(prepared(lazy, guess), place, best) >= 0 ? guess : -1;
+  for (int first = 0; first < lazy.count; first += kBatch) {
+    const Floats16 bound = squared_distance(lazy.boxes[first / kBatch], place);
+    unsigned near = less(bound, sixteen(best));
+    if (!near) continue;
+    alignas(64) float bounds[16];
+    store(bounds, bound);
+    // `best` falls from batch to batch, so that each bound is asked once more before its batch is looked into.
+    for (; near; near &= near - 1) {
+      const int i = __builtin_ctz(near);
+      if (bounds[i] < best && lower(prepared(lazy, first + i), place, best) >= 0) nearest = first + i;
+    }
+  }
+  return nearest;
+}
+
+/// The 16 voxels of a block and their nearest triangles so far.
+struct BlockSearch {
+  Floats16 place[3];
+  alignas(64) float best[16];
+  alignas(64) int id[16];
+
+  BlockSearch(const Distances& distances, int block, float reach) {
+    for (int a = 0; a < 3; ++a) place[a] = sixteen(kPositions.centre[a][block]) + sixteen(kPositions.lane[a]);
+    store(best, smaller(sixteen(distances.squared + 16 * block), sixteen(reach * reach)));
+    for (int i = 0; i < 16; ++i) id[i] = -1;
+  }
+
+  /// Looks into the batch from every voxel that its box is near enough to.
+  [[gnu::always_inline]] void look_into(const LazyBatches& lazy, int b) {
+    const Boxes& boxes = lazy.boxes[b / kBatch];
+    Floats16 sum = sixteen(0.0f);
+    for (int a = 0; a < 3; ++a) {
+      const Floats16 gap = larger(
+          larger(sixteen(boxes.side[a][0][b % kBatch]) - place[a], place[a] - sixteen(boxes.side[a][1][b % kBatch])),
+          sixteen(0.0f));
+      sum = sum + gap * gap;
+    }
+    unsigned near = less(sum * sixteen(0.99999f), sixteen(best));
+    if (!near) return;
+    const Batch& batch = prepared(lazy, b);
+    // From here on one voxel after the other, each against the 16 triangles of the batch at once.
+    alignas(64) float x[16], y[16], z[16];
+    store(x, place[0]);
+    store(y, place[1]);
+    store(z, place[2]);
+    for (; near; near &= near - 1) {
+      const int i = __builtin_ctz(near);
+      Floats16 voxel[3];
+      set_place(voxel, x[i], y[i], z[i]);
+      if (const int lane = lower(batch, voxel, best[i]); lane >= 0) id[i] = batch.id[lane];
+    }
+  }
+
+  /// Writes back what a triangle of these batches is nearer to; the other voxels keep what they had.
+  void save(Distances& distances, int block, bool ids) const {
+    for (int i = 0; i < 16; ++i) {
+      if (id[i] < 0) continue;
+      distances.squared[16 * block + i] = best[i];
+      if (ids) distances.id[16 * block + i] = id[i];
+    }
+  }
+};
+
+/// Looks into the batches whose boxes are from `from` to below `to` away from a place, except one.
+inline void look_around(const LazyBatches& lazy, const Floats16* place, float from, float to, int except,
+                        BlockSearch& search) {
+  const Floats16 low = sixteen(from * from), high = sixteen(to * to);
+  for (int first = 0; first < lazy.count; first += kBatch) {
+    const Floats16 squared = squared_distance(lazy.boxes[first / kBatch], place);
+    for (unsigned in = less(squared, high) & ~less(squared, low); in; in &= in - 1) {
+      const int b = first + __builtin_ctz(in);
+      if (b != except) search.look_into(lazy, b);
+    }
+  }
+}
+
+/// Goes through the blocks of 16 voxels, so that a batch serves all voxels of a block while it is in the cache.
+void update_from_many(const LazyBatches& lazy, float reach, bool ids, Distances& distances) {
+  // The block before lies beside this one, so its nearest batch is a good first guess.
+  int guess = -1;
+  for (int block = 0; block < 32; ++block) {
+    Floats16 centre[3];
+    set_place(centre, kPositions.centre[0][block], kPositions.centre[1][block], kPositions.centre[2][block]);
+    const float far = reach + kBlockRadius;
+    float best = far * far;
+    const int nearest = nearest_batch(lazy, centre, guess, best);
+    if (nearest < 0) continue;  // no triangle within the reach of any voxel of this block
+    guess = nearest;
+    BlockSearch search(distances, block, reach);
+    search.look_into(lazy, nearest);
+    // A triangle that is nearest to some voxel is at most a diagonal farther from the centre than the nearest
+    // one. Those likely to be the nearest first, so that the others have little to look into.
+    const float first_radius = __builtin_sqrtf(best) + 0.5f,
+                radius = __builtin_sqrtf(best) + 2.0f * kBlockRadius + 1e-4f;
+    look_around(lazy, centre, 0.0f, first_radius, nearest, search);
+    look_around(lazy, centre, first_radius, radius, nearest, search);
+    search.save(distances, block, ids);
+  }
+}
+
+// ---- The finished leaf.
+
+/// Square roots, world units, and the order of OpenVDB's leaves; voxels out of reach get the reach itself. Returns whether
+/// any voxel is within reach.
+bool finish(const Distances& distances, float reach, float scale, float* values, std::uint64_t* active) {
+  const Floats16 limit = sixteen(reach * reach);
+  for (int x = 0; x < 8; ++x) active[x] = 0;
+  std::uint64_t any = 0;
+  for (int block = 0; block < 32; ++block) {
+    const Floats16 squared = sixteen(distances.squared + 16 * block);
+    // The four rows of four voxels along z that a block consists of go to their places in the leaf.
+    const std::uint64_t bits = less(squared, limit);
+    alignas(64) float lanes[16];
+    store(lanes, square_root(smaller(squared, limit)) * sixteen(scale));
+    const int x = 2 * (block >> 3), y = 2 * (block >> 1 & 3), z = 4 * (block & 1);
+    for (int row = 0; row < 4; ++row) {
+      const int line = (y + (row & 1)) * 8 + z;
+      __builtin_memcpy(values + (x + (row >> 1)) * 64 + line, lanes + 4 * row, 16);
+      active[x + (row >> 1)] |= (bits >> (4 * row) & 15u) << line;
+    }
+    any |= bits;
+  }
+  return any != 0;
+}
+
+/// Gives each voxel its sign, cuts it off at the band of its side, and deactivates what lies beyond.
+void apply_signs(const std::uint64_t* inside, float exterior, float interior, float least, float* values,
+                 std::uint64_t* active) {
+  for (int x = 0; x < 8; ++x) {
+    std::uint64_t below = 0;
+    for (int part = 0; part < 64; part += 16) {
+      const unsigned negative = unsigned(inside[x] >> part) & 0xffffu;
+      float* at = values + 64 * x + part;
+      const Floats16 limit = choose(negative, sixteen(interior), sixteen(exterior));
+      const Floats16 distance = sixteen(at);
+      below |= std::uint64_t(less(distance, limit)) << part;
+      // Inside is negative even where the distance is 0, so that the sample keeps its side.
+      const Floats16 value = smaller(distance, limit);
+      store(at, choose(negative, sixteen(0.0f) - larger(value, sixteen(least)), value));
+    }
+    active[x] &= below;
+  }
+}
+
+constexpr Kernels kKernels = {kLevel,           near,  to_leaf, set_up,     update,
+                              update_from_many, cross, finish,  apply_signs};
 
 }  // namespace
+}  // namespace HERMESH_SIMD_LEVEL
 
-const Kernels& at_level(std::string_view name) { return kernels_of(parse_simd_level(name)); }
-const Kernels& chosen() { return kernels_of(chosen_simd_level()); }
+constinit const Kernels Kernels::HERMESH_SIMD_LEVEL = HERMESH_SIMD_LEVEL::kKernels;
 
 }  // namespace hermesh::kernels

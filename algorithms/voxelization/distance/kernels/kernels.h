@@ -5,9 +5,8 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
+
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh::kernels {
 
@@ -85,9 +84,10 @@ struct EdgeBits {
   std::uint64_t word[3][8];
 };
 
-/// The functions of one level of vector code. None keeps anything between calls, so that any thread may call them.
+/// See simd_level.h.
 struct Kernels {
-  /// Tells by the boxes of 16 triangles which of them matter to a leaf; `reach` is in voxels.
+  SimdLevel level;
+  /// Distances that boxes of 16 triangles bound.
   Near (*near)(const MeshCorners&, const LeafFrame&, float reach);
   /// Changes the corners of 16 triangles to voxels relative to the leaf, in double precision.
   void (*to_leaf)(const MeshCorners&, const LeafFrame&, Corners&);
@@ -110,21 +110,11 @@ struct Kernels {
   /// them on either side; leaves in `active` the bits of those below their limit.
   void (*apply_signs)(const std::uint64_t* inside, float exterior, float interior, float least, float* values,
                       std::uint64_t* active);
+  static const Kernels sse2, avx2, avx512;
 };
 
 /// Sets lane `triangle` of the batch up as a segment, the triangle's longest side; as a point where all corners
 /// coincide.
 void set_up_segment(const Corners&, int triangle, Batch&);
-
-/// Names of the levels that this machine can run, slowest first: sse2, avx2, avx512.
-std::vector<std::string> levels();
-
-/// The kernels of a level by its name.
-/// @throws Error for a name that is none, or that this machine cannot run.
-const Kernels& at_level(std::string_view name);
-
-/// The kernels of the level that the environment variable HERMESH_SIMD names, or else of the machine's fastest.
-/// @throws Error as at_level().
-const Kernels& chosen();
 
 }  // namespace hermesh::kernels

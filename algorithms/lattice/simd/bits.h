@@ -1,4 +1,13 @@
-// Lists of the set bits of a leaf's words.
+// Bits of words of 64, and lists of the set bits of a leaf's eight words; for kernels alone, as vectors.h is.
+#pragma once
+
+#include "algorithms/lattice/simd/vectors.h"
+
+namespace hermesh::simd {
+namespace {
+
+inline int popcount(std::uint64_t word) { return __builtin_popcountll(word); }
+inline int first_bit(std::uint64_t word) { return __builtin_ctzll(word); }
 
 constexpr std::uint64_t kFirstZ = 0x0101010101010101u, kLastZ = kFirstZ << 7;
 constexpr std::uint64_t kFirstY = 0xff, kLastY = kFirstY << 56;
@@ -52,3 +61,6 @@ inline std::uint64_t last_along_z(const std::uint64_t* words) {
 inline void pad_list(std::uint16_t* list, int count) {
   for (int i = 0; i < kLanes; ++i) list[count + i] = count > 0 ? list[count - 1] : std::uint16_t{0};
 }
+
+}  // namespace
+}  // namespace hermesh::simd
