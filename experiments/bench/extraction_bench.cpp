@@ -12,8 +12,8 @@
 #include "algorithms/variants.h"
 #include "experiments/bench/failures.h"
 #include "experiments/bench/sphere_level_set.h"
+#include "experiments/pipeline.h"
 #include "reference/variants.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
@@ -25,16 +25,14 @@ const LevelSet& sphere(int resolution) {
   return found->second;
 }
 
-/// What is wrong with a mesh of the sphere: it must be one closed component of the sphere's volume. The
+/// What is wrong with a mesh of the sphere: it must keep its promises (nobody looks for self-intersections here, which
+/// takes longer than the rest) and be one component of the sphere's volume. The
 /// tolerance is that of a polygonal sphere of this size: chords lie inside by a share of about one over the
 /// squared resolution.
-std::optional<std::string> fault(const PolygonMesh& mesh, int resolution) {
+std::optional<std::string> fault(const Extractor& extractor, const PolygonMesh& mesh, int resolution) {
   RunContext context;
-  validation::JudgeOptions options;
-  options.self_intersections = options.libraries = false;
-  const validation::MeshReport report = validation::judge(to_mesh_file(mesh), options, context);
-  if (!report.closed()) return std::to_string(report.boundary_edges) + " boundary edges";
-  if (!report.oriented()) return std::to_string(report.inconsistent_edges) + " inconsistent edges";
+  const auto& [report, check] = judge(to_mesh_file(mesh), extractor.promises, kCounts, context);
+  if (!check.broken.empty()) return promise_verdict(extractor.promises, check);
   if (report.components != 1) return std::to_string(report.components) + " components";
   const double radius = 0.5 * resolution, volume = 4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3);
   if (std::abs(report.volume / volume - 1.0) > 20.0 / (resolution * resolution))
@@ -44,14 +42,14 @@ std::optional<std::string> fault(const PolygonMesh& mesh, int resolution) {
 
 void extract_sphere(benchmark::State& state, const Extractor& extractor, int resolution) {
   const LevelSet& level_set = sphere(resolution);
-  const Options options(extractor.name, extractor.options, {});
-  const auto extract = [&] {
+  const ExtractRecipe recipe{.chosen = {extractor, Options(extractor.name, extractor.options, {})}};
+  const auto extract_once = [&] {
     RunContext context;
-    return extractor.extract({.level_set = level_set, .options = options, .context = context});
+    return extract(level_set, nullptr, recipe, context).mesh;
   };
   try {
-    if (const auto wrong = fault(extract(), resolution)) throw Error(extractor.name + ": " + *wrong);
-    for ([[maybe_unused]] auto iteration : state) benchmark::DoNotOptimize(extract());
+    if (const auto wrong = fault(extractor, extract_once(), resolution)) throw Error(extractor.name + ": " + *wrong);
+    for ([[maybe_unused]] auto iteration : state) benchmark::DoNotOptimize(extract_once());
   } catch (const std::exception& error) {
     ++failures;
     state.SkipWithError(error.what());

@@ -15,7 +15,6 @@
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
 #include "experiments/pipeline.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh::cli {
 namespace {
@@ -40,12 +39,12 @@ std::string result_name(const Arguments& arguments) {
 /// Voxel size in world units. A resolution counts along the longer operand, so that the
 /// order of the two does not matter.
 double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Arguments& arguments,
-                  const ChosenVoxelizer& chosen, Session& session) {
+                  const ChosenVoxelizer& chosen) {
   const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
-  return voxelization_input(second_is_longer ? second : first,
-                            second_is_longer ? arguments.second : arguments.first, arguments.voxelizing,
-                            chosen, session)
-      .voxel_size;
+  const VoxelizeRecipe recipe =
+      recipe_of(second_is_longer ? second : first, second_is_longer ? arguments.second : arguments.first,
+                arguments.voxelizing, chosen);
+  return *recipe.voxel_size;
 }
 
 SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const SharedLattice& lattice,
@@ -89,11 +88,12 @@ void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const
 PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, const Arguments& arguments,
                     Session& session) {
   const Stopwatch watch;
-  PolygonMesh mesh = chosen.extractor.extract({.level_set = solid.level_set,
-                                               .options = chosen.options,
-                                               .context = session.context,
-                                               .hermite = &solid.hermite,
-                                               .written_in_single = is_written_in_single(arguments.out)});
+  PolygonMesh mesh = extract(solid.level_set, nullptr,
+                             {.chosen = chosen,
+                              .hermite = &solid.hermite,
+                              .written_in_single = is_written_in_single(arguments.out)},
+                             session.context)
+                         .mesh;
   session.context.check();
   if (mesh.empty()) throw Error(result_name(arguments) + " has no surface, nothing was written");
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
@@ -102,9 +102,8 @@ PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, c
 
 /// Reads the file back; returns whether it is what the extractor promises.
 bool keeps_promises(const std::string& file, const Promises& promises, Session& session) {
-  const validation::MeshReport report =
-      validation::judge(read_mesh_file(file, session.context), {.libraries = false}, session.context);
-  const PromiseCheck check = check_promises(promises, report);
+  const auto& [report, check] =
+      judge(read_mesh_file(file, session.context), promises, kPromisesAlone, session.context);
   std::vector<std::string> lines = report.sentences();
   lines.insert(lines.begin(), promise_verdict(promises, check));
   for (const std::string& line : lines)
@@ -124,7 +123,7 @@ int run_combine(const Arguments& given, Session& session) {
   check_mesh_output(arguments.out);
   const PolygonMesh first = read_polygons(arguments.first, session);
   const PolygonMesh second = read_polygons(arguments.second, session);
-  arguments.voxelizing.voxel_size = voxel_size(first, second, arguments, voxelizer, session);
+  arguments.voxelizing.voxel_size = voxel_size(first, second, arguments, voxelizer);
   const SharedLattice lattice = shared_lattice(first, second, *arguments.voxelizing.voxel_size);
 
   const SampledSolid a = sampled(first, arguments.first, lattice, arguments, voxelizer, session);

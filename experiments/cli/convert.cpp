@@ -8,7 +8,6 @@
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
 #include "algorithms/extraction/volume_attributes.h"
-#include "algorithms/extraction/volume_ends.h"
 #include "experiments/cli/adaptivity.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
@@ -99,16 +98,13 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
   const Stopwatch watch;
   const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
   EndedMesh ended = about_file(input, [&] {
-    return extract_with_ends(
-        chosen.extractor,
-        {.level_set = level_set,
-         .isovalue = arguments.isovalue,
-         .source = source,
-         .options = chosen.options,
-         .context = session.context,
-         .field = field ? &*field : nullptr,
-         .written_in_single = is_written_in_single(paths.out)},
-        treatment);
+    return hermesh::extract(level_set, source,
+                            {.chosen = chosen,
+                             .isovalue = arguments.isovalue,
+                             .ends = treatment,
+                             .field = field ? &*field : nullptr,
+                             .written_in_single = is_written_in_single(paths.out)},
+                            session.context);
   });
   PolygonMesh mesh = std::move(ended.mesh);
   session.context.check();

@@ -7,18 +7,13 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/core/variant.h"
 #include "experiments/cli/session.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh::cli {
 
 struct ExtractorArguments {
   std::string extractor;             ///< set by add_extractor_options()
   std::vector<std::string> options;  ///< key=value
-};
-
-/// A variant that was looked up, with its options checked.
-struct ChosenExtractor {
-  Extractor extractor;
-  Options options;
 };
 
 void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);

@@ -10,6 +10,7 @@
 #include "experiments/cli/format.h"
 #include "experiments/cli/session.h"
 #include "experiments/harness/harness.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh::cli {
 namespace {
@@ -80,13 +81,7 @@ void print_line(const std::string& name, const std::string& text) {
 
 std::string promised(const Promises& promises) {
   std::string text;
-  const auto add = [&](bool promise, const char* word) {
-    if (promise) text += (text.empty() ? "" : ", ") + std::string(word);
-  };
-  add(promises.closed, "closed");
-  add(promises.manifold, "manifold");
-  add(promises.oriented, "oriented");
-  add(promises.no_self_intersection, "no self-intersection");
+  for (const std::string& word : promise_words(promises)) text += (text.empty() ? "" : ", ") + word;
   return text.empty() ? "nothing" : text;
 }
 

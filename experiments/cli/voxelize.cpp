@@ -92,7 +92,8 @@ void write_outputs(const Arguments& arguments, VolumeRequest request, const Chos
     mesh = std::move(framed.mesh);
     first = framed.first;
   }
-  const VoxelizationInput input = voxelization_input(mesh, paths.in, voxelizing, chosen, session);
+  const VoxelizationInput input =
+      voxelization_input(mesh, recipe_of(mesh, paths.in, voxelizing, chosen), session.context);
   const Stopwatch watch;
   const VolumeOutputs outputs = make_volume_outputs(mesh, voxelize_options(input), request, session.context);
   if (voxelizing.like) out_of_frame(outputs.grids, frame, first);

@@ -99,25 +99,23 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
   return mesh;
 }
 
-VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,
-                                     const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
-                                     Session& session) {
-  return {mesh,
-          voxel_size_for(mesh, arguments, file),
-          arguments.exterior_band,
-          arguments.interior_band,
-          session.context,
-          chosen.options};
+VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                         const ChosenVoxelizer& chosen) {
+  return {.chosen = chosen,
+          .voxel_size = voxel_size_for(mesh, arguments, file),
+          .exterior_band = arguments.exterior_band,
+          .interior_band = arguments.interior_band};
 }
 
 LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session) {
-  const VoxelizationInput input = voxelization_input(mesh, file, arguments, chosen, session);
+  const VoxelizeRecipe recipe = recipe_of(mesh, file, arguments, chosen);
+  const VoxelizationInput input = voxelization_input(mesh, recipe, session.context);
   about_file(file, [&] {
     check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
   });
   const Stopwatch watch;
-  LevelSet level_set = chosen.voxelizer.voxelize(input);
+  LevelSet level_set = hermesh::voxelize(mesh, recipe, session.context);
   session.context.check();
   print_voxelized(session, file, input, level_set.active_voxels(), chosen.voxelizer.name, watch.seconds());
   note_lost_surface(mesh, level_set, chosen, session);

@@ -9,6 +9,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/core/variant.h"
 #include "experiments/cli/session.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh::cli {
 
@@ -26,12 +27,6 @@ struct VoxelizeArguments {
   std::vector<std::string> options;  ///< key=value
 };
 
-/// A variant that was looked up, with its options checked.
-struct ChosenVoxelizer {
-  Voxelizer voxelizer;
-  Options options;
-};
-
 void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
 /// Adds the options of VoxelizeArguments, with `with_like` also `--like`, which takes the lattice of a volume.
 void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
@@ -47,9 +42,8 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
 
 /// What the chosen voxelizer gets, with the voxel size in world units that the arguments ask for.
 /// @throws Error where a resolution is asked of a mesh without extent.
-VoxelizationInput voxelization_input(const PolygonMesh& mesh, const std::string& file,
-                                     const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
-                                     Session& session);
+VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                         const ChosenVoxelizer& chosen);
 
 /// Voxelizes the mesh of `file` and prints a line of summary. @throws Error as
 /// voxelization_input() and the voxelizer do.

@@ -23,6 +23,7 @@
 #include "experiments/fracture/fracture_tags.h"
 #include "experiments/fracture/fracture_trials.h"
 #include "experiments/harness/harness.h"
+#include "experiments/pipeline.h"
 #include "validation/fracture_ledger.h"
 
 namespace hermesh {
@@ -269,12 +270,8 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
 /// The books of a fracture of polygons, made as the program makes it by default.
 validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
                                      std::uint64_t seed, RunContext& context) {
-  const std::vector<Voxelizer> voxelizers = all_voxelizers();
-  const Voxelizer& voxelizer = find_variant(voxelizers, "hermesh");
-  const LevelSet level_set = voxelizer.voxelize({.mesh = mesh,
-                                                 .voxel_size = bounds(mesh).size().maxCoeff() / longest,
-                                                 .context = context,
-                                                 .options = Options(voxelizer.name, voxelizer.options, {})});
+  const LevelSet level_set =
+      voxelize(mesh, {.chosen = choose(all_voxelizers(), "hermesh"), .resolution = longest}, context);
   const FloatHermite object = sample_polygons(level_set, 0.0, mesh, context);
   CutterChoices choices;
   choices.seed = seed;

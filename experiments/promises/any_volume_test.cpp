@@ -11,9 +11,8 @@
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/extraction/volume_ends.h"
 #include "algorithms/variants.h"
-#include "validation/mesh_report.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 
@@ -32,12 +31,11 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
     const auto& declared = GetParam().options;
     const bool proves = std::any_of(declared.begin(), declared.end(),
                                     [](const OptionSpec& option) { return option.name == "tolerance"; });
-    std::map<std::string, std::string> given;
+    GivenOptions given;
     if (proves) given["tolerance"] = "0";
     const Options options(GetParam().name, declared, given);
     const LevelSet volume = make_level_set(grid);
-    return extract_with_ends(
-               GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends)
+    return hermesh::extract(volume, nullptr, {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context)
         .mesh;
   }
   /// Expects of the extractor's mesh what it promises, and no boundary; returns how many triangles there are.
@@ -46,13 +44,10 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
     const PolygonMesh mesh = extract(grid, isovalue);
     const MeshFile file = to_mesh_file(mesh);
     if (file.triangle_count() == 0) return 0;
-    const auto report = validation::judge(file, {.self_intersections = false, .libraries = false}, context);
-    EXPECT_EQ(report.boundary_edges, 0);
-    EXPECT_EQ(report.inconsistent_edges, 0);
-    if (GetParam().promises.manifold) {
-      EXPECT_EQ(report.non_manifold_edges, 0);
-      EXPECT_EQ(report.non_manifold_vertices, 0);
-    }
+    const Promises& promises = GetParam().promises;
+    EXPECT_TRUE(promises.closed && promises.oriented);
+    const Judgement judgement = judge(file, promises, kCounts, context);
+    EXPECT_TRUE(judgement.promises.broken.empty()) << promise_verdict(promises, judgement.promises);
     for (std::size_t i = 0; i < mesh.points.size(); ++i) EXPECT_TRUE(mesh.points[i].allFinite());
     return file.triangle_count();
   }
@@ -190,8 +185,7 @@ TEST_P(AnyVolume, NoiseThatFillsTheBoxIsClosedAndOpened) {
   const FloatGrid::Ptr grid = scan(Coord(20, 21, 22), -1.0f, [&](const Coord&) { return value(random); });
   EXPECT_GT(expect_closed(grid, 0.1), 0u);
   const PolygonMesh open = extract(grid, 0.1, Ends::open);
-  const auto report =
-      validation::judge(to_mesh_file(open), {.self_intersections = false, .libraries = false}, context);
+  const auto report = validation::judge(to_mesh_file(open), kCounts, context);
   EXPECT_GT(report.boundary_edges, 100);
   EXPECT_EQ(report.inconsistent_edges, 0);
   for (std::size_t i = 0; i < open.points.size(); ++i) {

@@ -15,7 +15,6 @@
 #include "algorithms/variants.h"
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_tree.h"
 
 namespace hermesh {
@@ -193,24 +192,17 @@ class Pairs {
 
  private:
   SampledSolid sampled(const PolygonMesh& mesh) {
-    const Voxelizer voxelizer = find_variant(our_voxelizers(), "hermesh");
+    const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = lattice_.voxel_size};
     return sample_solid(
-        mesh, lattice_,
-        [&](const PolygonMesh& framed) {
-          return voxelizer.voxelize({.mesh = framed,
-                                     .voxel_size = lattice_.voxel_size,
-                                     .context = context_,
-                                     .options = Options("hermesh", voxelizer.options, {})});
-        },
-        context_);
+        mesh, lattice_, [&](const PolygonMesh& framed) { return voxelize(framed, recipe, context_); }, context_);
   }
   PolygonMesh contour(Boolean boolean, const SampledSolid& a, const SampledSolid& b) {
     const CombinedSolid result = combine(boolean, a, b, context_);
     if (result.hermite.leaves.empty()) return {};
-    const Extractor extractor = find_variant(our_extractors(), "manifold-dual-contouring");
-    const Options options(extractor.name, extractor.options, options_);
-    return extractor.extract(
-        {.level_set = result.level_set, .options = options, .context = context_, .hermite = &result.hermite});
+    return extract(result.level_set, nullptr,
+                   {.chosen = choose(our_extractors(), "manifold-dual-contouring", options_), .hermite = &result.hermite},
+                   context_)
+        .mesh;
   }
   double judged(Boolean boolean, const SampledSolid& a, const SampledSolid& b, Counts& counts) {
     const PolygonMesh mesh = contour(boolean, a, b);
@@ -219,20 +211,18 @@ class Pairs {
     }
     ++(mesh.empty() ? counts.empty : counts.written);
     if (mesh.empty()) return 0.0;
-    const auto report = validation::judge(to_mesh_file(mesh), {.libraries = false}, context_);
-    EXPECT_EQ(promise_verdict({true, true, true, true}, check_promises({true, true, true, true}, report)),
-              "promises closed, manifold, oriented, no self-intersection: kept");
-    EXPECT_EQ(report.degenerate_polygons + report.duplicate_polygons, 0);
-    return report.volume;
+    const Promises all{true, true, true, true};
+    const Judgement judgement = judge(to_mesh_file(mesh), all, kPromisesAlone, context_);
+    EXPECT_EQ(promise_verdict(all, judgement.promises), "promises closed, manifold, oriented, no self-intersection: kept");
+    return judgement.report.volume;
   }
   double volume(const PolygonMesh& mesh) {
-    return validation::judge(to_mesh_file(mesh), {.self_intersections = false, .libraries = false}, context_)
-        .volume;
+    return validation::judge(to_mesh_file(mesh), kCounts, context_).volume;
   }
 
   const Pair pair_;
   const SharedLattice lattice_;
-  const std::map<std::string, std::string> options_;
+  const GivenOptions options_;
   RunContext context_;
 };
 

@@ -1,118 +1,83 @@
 // Meshes far from the world's zero: what their files hold keeps the extractor's promises, or is refused in a
 // sentence.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
-#include <map>
 #include <string>
 
-#include "algorithms/io/written_precision.h"
 #include "algorithms/variants.h"
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 namespace {
 
 using test_solids::placed;
 
-/// Files in a folder of their own, which is removed at the end.
-class Files {
- public:
-  Files()
-      : folder_(std::filesystem::path(testing::TempDir()) / ("hermesh_far_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~Files() { std::filesystem::remove_all(folder_); }
+/// What `hermesh remesh` does, judged. @throws Error if the format could not hold the mesh
+Outcome written(const PolygonMesh& mesh, double voxel_size, const std::string& format, const GivenOptions& given) {
+  RunContext context;
+  return run({.source = {.polygons = &mesh},
+              .voxelize = {.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = voxel_size},
+              .extract = {.chosen = choose(our_extractors(), "manifold-dual-contouring", given)},
+              .format = format,
+              .judge = kPromisesAlone},
+             context);
+}
 
-  /// The mesh as `hermesh remesh` would write it, read back. @throws Error if it is refused
-  MeshFile written(const PolygonMesh& mesh, double voxel_size, const std::string& extension,
-                   const std::map<std::string, std::string>& given) {
-    RunContext context;
-    const Voxelizer voxelizer = find_variant(our_voxelizers(), "hermesh");
-    const Extractor extractor = find_variant(our_extractors(), "manifold-dual-contouring");
-    const LevelSet level_set = voxelizer.voxelize({.mesh = mesh,
-                                                   .voxel_size = voxel_size,
-                                                   .context = context,
-                                                   .options = Options("hermesh", voxelizer.options, {})});
-    const std::filesystem::path path = folder_ / ("mesh" + extension);
-    check_written_precision(path, level_set);
-    const Options options(extractor.name, extractor.options, given);
-    write_mesh(path,
-               extractor.extract({.level_set = level_set,
-                                  .source = &mesh,
-                                  .options = options,
-                                  .context = context,
-                                  .written_in_single = is_written_in_single(path)}),
-               context);
-    return read_mesh_file(path, context);
-  }
-
-  /// Writes solids at many offsets, each in one of the formats, and judges the files.
-  void expect_no_defect(std::uint64_t first, std::uint64_t count, double least_exponent,
-                        double most_exponent) {
-    const char* const kExtensions[] = {".ply", ".off", ".obj", ".stl"};
-    std::size_t in_files = 0;
-    for (std::uint64_t i = first; i < first + count; ++i) {
-      recipes::Random random{double(i)};
-      const double distance = std::pow(10.0, random.uniform(least_exponent, most_exponent));
-      Eigen::Vector3d offset = distance * test_solids::random_vector(random, 1.0);
-      if (i % 3 == 0) offset[int(i % 9 / 3)] = 0.0;
-      const PolygonMesh mesh = placed(test_solids::solid(i), test_solids::random_turn(random), offset);
-      const double voxel_size = 2.0 / random.uniform(12.0, 40.0);
-      const std::string extension = kExtensions[i / 2 % 4];
-      const std::map<std::string, std::string> options =
-          i % 2 ? std::map<std::string, std::string>{}
-                : std::map<std::string, std::string>{{"tolerance", "0"}};
-      SCOPED_TRACE("number " + std::to_string(i) + ", " + std::to_string(distance) + " away, " + extension);
-      try {
-        const MeshFile file = written(mesh, voxel_size, extension, options);
-        ++in_files;
-        RunContext context;
-        const auto report = validation::judge(file, {.libraries = false}, context);
-        EXPECT_EQ(promise_verdict({true, true, true, true}, check_promises({true, true, true, true}, report)),
-                  "promises closed, manifold, oriented, no self-intersection: kept");
-        EXPECT_EQ(report.degenerate_polygons + report.duplicate_polygons, 0);
-      } catch (const Error& error) {
-        EXPECT_NE(std::string(error.what()).find("rounds coordinates of"), std::string::npos) << error.what();
-      }
+/// Writes solids at many offsets, each in one of the formats, and judges the files.
+void expect_no_defect(std::uint64_t first, std::uint64_t count, double least_exponent,
+                      double most_exponent) {
+  const char* const kExtensions[] = {".ply", ".off", ".obj", ".stl"};
+  std::size_t in_files = 0;
+  for (std::uint64_t i = first; i < first + count; ++i) {
+    recipes::Random random{double(i)};
+    const double distance = std::pow(10.0, random.uniform(least_exponent, most_exponent));
+    Eigen::Vector3d offset = distance * test_solids::random_vector(random, 1.0);
+    if (i % 3 == 0) offset[int(i % 9 / 3)] = 0.0;
+    const PolygonMesh mesh = placed(test_solids::solid(i), test_solids::random_turn(random), offset);
+    const double voxel_size = 2.0 / random.uniform(12.0, 40.0);
+    const std::string extension = kExtensions[i / 2 % 4];
+    const GivenOptions options = i % 2 ? GivenOptions{} : GivenOptions{{"tolerance", "0"}};
+    SCOPED_TRACE("number " + std::to_string(i) + ", " + std::to_string(distance) + " away, " + extension);
+    try {
+      const Outcome outcome = written(mesh, voxel_size, extension, options);
+      ++in_files;
+      EXPECT_GT(outcome.judgement.report.triangles + outcome.judgement.report.quads, 0);
+      EXPECT_EQ(promise_verdict({true, true, true, true}, outcome.judgement.promises),
+                "promises closed, manifold, oriented, no self-intersection: kept");
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("rounds coordinates of"), std::string::npos) << error.what();
     }
-    // Double precision holds such meshes up to 10¹¹ and beyond, and STL those of the nearest.
-    EXPECT_GE(in_files, count * 3 / 4);
-    testing::Test::RecordProperty("written", std::to_string(in_files) + " of " + std::to_string(count));
   }
+  // Double precision holds such meshes up to 10¹¹ and beyond, and STL those of the nearest.
+  EXPECT_GE(in_files, count * 3 / 4);
+  testing::Test::RecordProperty("written", std::to_string(in_files) + " of " + std::to_string(count));
+}
 
- private:
-  std::filesystem::path folder_;
-};
-
-TEST(FarFromOrigin, FilesKeepThePromises) { Files().expect_no_defect(0, 16, 6.0, 11.0); }
+TEST(FarFromOrigin, FilesKeepThePromises) { expect_no_defect(0, 16, 6.0, 11.0); }
 
 TEST(FarFromOrigin, StlKeepsThemWhereItsPrecisionIsJustEnough) {
   // 10³ away a number of single precision is rounded by up to 3·10⁻⁵, and voxels are about 0.1.
-  for (std::uint64_t i = 6; i < 40; i += 8) Files().expect_no_defect(i, 2, 3.0, 3.5);
+  for (std::uint64_t i = 6; i < 40; i += 8) expect_no_defect(i, 2, 3.0, 3.5);
 }
 
 TEST(FarFromOrigin, WhatAFormatCannotHoldIsRefused) {
   const PolygonMesh mesh = placed(test_solids::solid(0), Eigen::Matrix3d::Identity(), {1e6, 0, 0});
-  Files files;
-  EXPECT_NO_THROW(files.written(mesh, 0.1, ".ply", {}));
+  EXPECT_NO_THROW(written(mesh, 0.1, ".ply", {}));
   try {
-    files.written(mesh, 0.1, ".stl", {});
+    written(mesh, 0.1, ".stl", {});
     FAIL() << "single precision rounds by up to 0.03 there";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("write .ply, .obj or .off"), std::string::npos) << error.what();
   }
   // Half of the distance of doubles at 10¹³ is 0.001, a hundredth of a voxel, and at 10¹⁴ ten times as much.
   const PolygonMesh farther = placed(test_solids::solid(0), Eigen::Matrix3d::Identity(), {1e14, 0, 0});
-  EXPECT_THROW(files.written(farther, 0.1, ".ply", {}), Error);
+  EXPECT_THROW(written(farther, 0.1, ".ply", {}), Error);
 }
 
 TEST(Slow, MeshesFarFromTheOriginKeepThePromisesInTheirFiles) {
-  Files().expect_no_defect(1000, 500, 6.0, 11.0);
+  expect_no_defect(1000, 500, 6.0, 11.0);
 }
 
 }  // namespace

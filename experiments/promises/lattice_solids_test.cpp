@@ -16,7 +16,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/variants.h"
 #include "experiments/harness/harness.h"
-#include "validation/mesh_report.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -204,15 +204,13 @@ const std::vector<Rule> kRules = {{"hermesh", "auto"},
 
 validation::MeshReport remeshed(const PolygonMesh& mesh, double voxel_size, const Rule& rule,
                                 RunContext& context) {
-  const Voxelizer voxelizer = find_variant(all_voxelizers(), rule.voxelizer);
-  const LevelSet level_set =
-      voxelizer.voxelize({mesh, voxel_size, 3.0, 3.0, context,
-                          Options(voxelizer.name, voxelizer.options, {{"signs", rule.signs}})});
-  const Extractor extractor = find_variant(all_extractors(), "dual-contouring");
-  const Options options(extractor.name, extractor.options, {{"placement", "optimal"}, {"hermite", "exact"}});
-  const PolygonMesh result = extractor.extract({level_set, 0.0, &mesh, options, context});
-  if (result.empty()) return {};
-  return validation::judge(to_mesh_file(result), {.self_intersections = false, .libraries = false}, context);
+  const Job job{.source = {.polygons = &mesh},
+                .voxelize = {.chosen = choose(all_voxelizers(), rule.voxelizer, {{"signs", rule.signs}}),
+                             .voxel_size = voxel_size},
+                .extract = {.chosen = choose(all_extractors(), "dual-contouring",
+                                             {{"placement", "optimal"}, {"hermite", "exact"}})},
+                .judge = kCounts};
+  return run(job, context).judgement.report;
 }
 
 void expect_amounts(const validation::MeshReport& report, const Amounts& right, double unit) {
@@ -294,9 +292,13 @@ TEST(LatticeSolids, DistancesPassOverWallsWithin) {
     if (rule.signs == "parity") continue;
     SCOPED_TRACE(rule.voxelizer + " " + rule.signs);
     RunContext context;
-    const Voxelizer voxelizer = find_variant(all_voxelizers(), rule.voxelizer);
-    const LevelSet level_set = voxelizer.voxelize(
-        {mesh, 0.05, 8.0, 8.0, context, Options(voxelizer.name, voxelizer.options, {{"signs", rule.signs}})});
+    const LevelSet level_set =
+        voxelize(mesh,
+                 {.chosen = choose(all_voxelizers(), rule.voxelizer, {{"signs", rule.signs}}),
+                  .voxel_size = 0.05,
+                  .exterior_band = 8.0,
+                  .interior_band = 8.0},
+                 context);
     const auto at = [&](int x, int y, int z) { return level_set.grid().grid->tree().getValue(openvdb::Coord(x, y, z)); };
     EXPECT_NEAR(at(12, 15, 15), -std::hypot(0.1, 0.25), 2e-3);  // (0.6, 0.75, 0.75)
     EXPECT_NEAR(at(10, 15, 15), -0.25, 2e-3);                   // on a wall: straight up out of the lower cube

@@ -14,8 +14,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/variants.h"
+#include "experiments/pipeline.h"
 #include "reference/variants.h"
-#include "validation/mesh_report.h"
 
 namespace hermesh {
 
@@ -69,7 +69,7 @@ openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach, con
 
 validation::MeshReport counts_of(const PolygonMesh& mesh) {
   RunContext context;
-  return validation::judge(to_mesh_file(mesh), {.self_intersections = false, .libraries = false}, context);
+  return validation::judge(to_mesh_file(mesh), kCounts, context);
 }
 
 /// Points on edges that have one polygon.
@@ -100,8 +100,7 @@ class VolumeEnds : public testing::TestWithParam<Extractor> {
  protected:
   EndedMesh extract(const LevelSet& volume, double isovalue, Ends ends) {
     const Options options(GetParam().name, GetParam().options, {});
-    return extract_with_ends(
-        GetParam(), {.level_set = volume, .isovalue = isovalue, .options = options, .context = context}, ends);
+    return hermesh::extract(volume, nullptr, {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context);
   }
   /// How far a cap may lie off its plane, in voxels. Where nothing may meet, points are not moved onto it afterwards; then
   /// the uniform mesh is near it by its normals, and the tolerance of 0.1 comes on top.
@@ -144,11 +143,11 @@ TEST_P(VolumeEnds, CapsKeepThePromiseThatNothingMeets) {
   const LevelSet noise =
       make_level_set(dense(Coord(0, 0, 0), Coord(11, 11, 11), -1.0f, [&](int, int, int) { return value(random); }));
   const EndedMesh ended = extract(noise, 50.0, Ends::closed);
-  EXPECT_EQ(counts_of(ended.mesh).boundary_edges, 0);
-  if (!GetParam().promises.no_self_intersection) return;
-  const validation::MeshReport report = validation::judge(to_mesh_file(ended.mesh), {.libraries = false}, context);
-  ASSERT_TRUE(report.self_intersections);
-  EXPECT_EQ(report.self_intersections->pairs, 0);
+  const Promises& promises = GetParam().promises;
+  const Judgement judgement = judge(to_mesh_file(ended.mesh), promises,
+                                    promises.no_self_intersection ? kPromisesAlone : kCounts, context);
+  EXPECT_TRUE(judgement.promises.broken.empty()) << promise_verdict(promises, judgement.promises);
+  EXPECT_EQ(judgement.report.boundary_edges, 0);
 }
 
 TEST_P(VolumeEnds, CutBallHasAFlatCap) {
