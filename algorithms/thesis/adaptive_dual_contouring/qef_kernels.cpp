@@ -10,11 +10,12 @@ namespace {
 
 inline float larger(float a, float b) { return a < b ? b : a; }
 
-/// Jacobi's rotation of the axes p and q; r is the third.
+/// Jacobi's rotation in the plane of the axes p and q, which makes their common entry 0; r is the third axis.
 [[gnu::always_inline]] inline void rotate(EigenLanes& m, int p, int q, int r) {
   constexpr float kTiny = 1e-30f;
   for (int i = 0; i < kLanes; ++i) {
     const float d = m.diagonal[q][i] - m.diagonal[p][i], e = 2.0f * m.off[r][i];
+    // The tangent of the smaller of the two angles that do it; with kTiny a matrix that is 0 stays as it is.
     const float t = __builtin_copysignf(1.0f, d) * e / (__builtin_fabsf(d) + __builtin_sqrtf(d * d + e * e) + kTiny);
     const float c = 1.0f / __builtin_sqrtf(1.0f + t * t), s = t * c;
     m.diagonal[p][i] -= t * m.off[r][i];
@@ -31,6 +32,8 @@ inline float larger(float a, float b) { return a < b ? b : a; }
   }
 }
 
+/// Eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for a symmetric matrix
+/// of three rows this takes the place of the singular value decomposition of A (eq. 6.4).
 [[gnu::always_inline]] inline void decompose(EigenLanes& m) {
   for (int k = 0; k < 3; ++k)
     for (int a = 0; a < 3; ++a)
@@ -45,6 +48,7 @@ inline float larger(float a, float b) { return a < b ? b : a; }
 
 void solve(EigenLanes& m, float truncation, const Lanes (&slopes)[3], Lanes (&step)[3]) {
   decompose(m);
+  // Squares of singular values are compared, so the share is squared, too.
   const float share = truncation * truncation;
   for (int i = 0; i < kLanes; ++i) {
     const float largest = larger(m.diagonal[0][i], larger(m.diagonal[1][i], m.diagonal[2][i]));

@@ -5,7 +5,8 @@
 
 namespace hermesh::qef_kernels {
 
-/// As many at a time as keep the vector units busy; a lane's result does not depend on the others.
+/// Sums that are solved at a time: as many as keep the vector units busy. A lane's result does not depend on the
+/// others.
 constexpr int kLanes = 16;
 using Lanes = float[kLanes];
 
