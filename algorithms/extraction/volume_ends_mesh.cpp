@@ -1,8 +1,8 @@
 // What volume_ends.h does to meshes.
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 
+#include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/volume_ends.h"
@@ -131,26 +131,6 @@ class PlaneCut {
   std::vector<double> depth_;  ///< how far each point lies below the plane, in voxels; negative beyond it
   std::unordered_map<std::uint64_t, std::uint32_t> cuts_;
 };
-
-void drop_unused_points(PolygonMesh& mesh) {
-  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> number(mesh.points.size(), kUnused);
-  const auto for_each_corner = [&](auto&& f) {
-    for (Triangle& triangle : mesh.triangles)
-      for (std::uint32_t& corner : triangle) f(corner);
-    for (Quad& quad : mesh.quads)
-      for (std::uint32_t& corner : quad) f(corner);
-  };
-  for_each_corner([&](std::uint32_t corner) { number[corner] = 0; });
-  std::uint32_t kept = 0;
-  for (std::size_t i = 0; i < number.size(); ++i) {
-    if (number[i] == kUnused) continue;
-    mesh.points[kept] = mesh.points[i];
-    number[i] = kept++;
-  }
-  mesh.points.resize(kept);
-  for_each_corner([&](std::uint32_t& corner) { corner = number[corner]; });
-}
 
 }  // namespace
 

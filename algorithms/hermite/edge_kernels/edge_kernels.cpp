@@ -24,8 +24,9 @@ constexpr Kernels kKernels = {kLevel,
                               {sample_packed<ThesisNormalCode>, sample_packed<BaptistaNormalCode>,
                                sample_packed<RoundedNormalCode>, sample_packed<OctahedralNormalCode>,
                                sample_packed<NearestNormalCode>}};
-static_assert(int(NormalCodeId::thesis) == 0 && int(NormalCodeId::baptista) == 1 && int(NormalCodeId::rounded) == 2 &&
-              int(NormalCodeId::octahedral) == 3 && int(NormalCodeId::nearest) == 4);
+// The array is in the order of the codes, and has one kernel for each.
+static_assert(kNormalCodes.size() == 5 && int(NormalCodeId::thesis) == 0 && int(NormalCodeId::baptista) == 1 &&
+              int(NormalCodeId::rounded) == 2 && int(NormalCodeId::octahedral) == 3 && int(NormalCodeId::nearest) == 4);
 
 }  // namespace
 }  // namespace HERMESH_SIMD_LEVEL
