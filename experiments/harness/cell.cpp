@@ -4,6 +4,8 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
+#include "experiments/harness/provenance.h"
+
 namespace hermesh {
 
 RunContext child_context(const RunContext& context, bool with_progress) {
@@ -33,6 +35,22 @@ Timing::Timing(const Tier& tier, double first_seconds, StageSeconds first_stages
   if (warm) return;
   contender.seconds = {first_seconds};
   stages = {std::move(first_stages)};
+}
+
+void race_cells(std::vector<Racer> racers) {
+  const Json load = load_averages();
+  std::vector<Contender> contenders;
+  for (const Racer& racer : racers) {
+    contenders.push_back(racer.timing.contender);
+    contenders.back().run = racer.repeat;
+  }
+  race(contenders);
+  for (std::size_t i = 0; i < racers.size(); ++i) {
+    Json& row = racers[i].row;
+    row["seconds"] = seconds_json(contenders[i].seconds, racers[i].timing.warm);
+    row["stage_seconds"] = stages_json(racers[i].timing.stages);
+    row["load"] = load;
+  }
 }
 
 Json seconds_json(const std::vector<double>& seconds, bool warm) {

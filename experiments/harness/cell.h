@@ -33,6 +33,15 @@ struct Timing {
   Timing(const Tier& tier, double first_seconds, StageSeconds first_stages);
 };
 
+/// A cell that takes part in a race.
+struct Racer {
+  Timing& timing;
+  Json& row;
+  std::function<double()> repeat;  ///< does the work once more and returns its seconds
+};
+/// Races the cells (race()), and writes the seconds, those of the stages and the machine's load before it in their rows.
+void race_cells(std::vector<Racer> racers);
+
 Json seconds_json(const std::vector<double>& seconds, bool warm);
 Json stages_json(const std::vector<StageSeconds>& repetitions);
 Json optional_json(const std::optional<std::int64_t>& value);

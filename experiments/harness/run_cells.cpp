@@ -196,24 +196,13 @@ class Group {
 
   void time_all() {
     const Stage stage(context_, "timing");
-    const Json load = load_averages();
-    std::vector<Contender> contenders;
-    std::vector<Cell*> timed_cells;
-    for (Cell& cell : cells_) {
-      if (!cell.timing) continue;
-      contenders.push_back(cell.timing->contender);
-      contenders.back().run = [this, &cell] { return repeat(cell); };
-      timed_cells.push_back(&cell);
-    }
-    race(contenders);
-    for (std::size_t i = 0; i < contenders.size(); ++i) {
-      Json& row = timed_cells[i]->row;
-      row["seconds"] = seconds_json(contenders[i].seconds, timed_cells[i]->timing->warm);
-      row["stage_seconds"] = stages_json(timed_cells[i]->timing->stages);
-      row["nanoseconds_per_active_voxel"] =
-          1e9 * row["seconds"]["median"].get<double>() / static_cast<double>(level_set_.active_voxels());
-      row["load"] = load;
-    }
+    std::vector<Racer> racers;
+    for (Cell& cell : cells_)
+      if (cell.timing) racers.push_back({*cell.timing, cell.row, [this, &cell] { return repeat(cell); }});
+    race_cells(racers);
+    for (const Racer& racer : racers)
+      racer.row["nanoseconds_per_active_voxel"] =
+          1e9 * racer.row["seconds"]["median"].get<double>() / static_cast<double>(level_set_.active_voxels());
   }
 
   void picture(const std::vector<Json>& rows) {

@@ -224,23 +224,13 @@ class Group {
 
   void time_all() {
     const Stage stage(context_, "timing");
-    const Json load = load_averages();
-    std::vector<Contender> contenders;
-    std::vector<Cell*> timed_cells;
-    for (Cell& cell : cells_) {
-      if (!cell.timing) continue;
-      contenders.push_back(cell.timing->contender);
-      contenders.back().run = [this, &cell] { return repeat(cell); };
-      timed_cells.push_back(&cell);
-    }
-    race(contenders);
-    for (std::size_t i = 0; i < contenders.size(); ++i) {
-      const Timing& timing = *timed_cells[i]->timing;
-      Json& row = timed_cells[i]->row;
-      row["seconds"] = seconds_json(contenders[i].seconds, timing.warm);
-      row["stage_seconds"] = stages_json(timing.stages);
-      row["load"] = load;
-      const double seconds = median(contenders[i].seconds), cpu = median(timing.cpu_seconds);
+    std::vector<Racer> racers;
+    for (Cell& cell : cells_)
+      if (cell.timing) racers.push_back({*cell.timing, cell.row, [this, &cell] { return repeat(cell); }});
+    race_cells(racers);
+    for (const Racer& racer : racers) {
+      Json& row = racer.row;
+      const double seconds = row["seconds"]["median"].get<double>(), cpu = median(racer.timing.cpu_seconds);
       const double triangles = double(in_.input.mesh.triangle_count());
       row["cpu_seconds"] = cpu;
       row["cpu_microseconds_per_triangle"] = 1e6 * cpu / triangles;
