@@ -5,7 +5,7 @@
 hermesh_packages=(
   g++ cmake ninja-build ccache pkg-config ca-certificates git
   libopenvdb-dev libtbb-dev libeigen3-dev libimath-dev libboost-dev libcgal-dev libopenmesh-dev libembree-dev
-  libcairo2-dev gnuplot-nox libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libbenchmark-dev libgtest-dev
+  libcairo2-dev gnuplot-nox libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev libsqlite3-dev zlib1g-dev libbenchmark-dev libgtest-dev
   libopenvdb-tools)
 
 install_packages() {

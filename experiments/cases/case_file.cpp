@@ -95,9 +95,9 @@ class CaseFileReader {
     if (!files || files->empty()) fail(node.source(), "'files' must be a list of tables");
     for (const toml::node& item : *files) {
       const toml::table& file = table(item);
-      check_keys(file, {"file", "sha256", "from"});
-      result.files.push_back(
-          {text(file, "file"), text(file, "sha256"), file.contains("from") ? text(file, "from") : ""});
+      check_keys(file, {"file", "sha256", "from", "source", "licence"});
+      result.files.push_back({text(file, "file"), text(file, "sha256"), file.contains("from") ? text(file, "from") : "",
+                              text(file, "source"), text(file, "licence")});
     }
   }
 

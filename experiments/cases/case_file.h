@@ -18,6 +18,7 @@ struct CaseFile {
   std::string name;    ///< in the data folder and in the cache
   std::string sha256;  ///< hash of the file's bytes
   std::string from;    ///< where fetch_data.sh gets the file; empty for a file that only the data folder can have
+  std::string source, licence;  ///< where the file comes from, and on which terms
 };
 
 /// How a file of raw samples is laid out, as text for import_volume.h.

@@ -92,6 +92,7 @@ std::optional<LocatedFile> find_in(const fs::path& folder, const CaseRecipe& rec
 }
 
 LoadedCase load_stand_in(const CaseRecipe& recipe, const std::string& reason, RunContext& context) {
+  check_stand_in_allowed(recipe.name, reason);
   PolygonMesh mesh = make_recipe(recipe.stand_in, {{"triangles", double(recipe.triangles)}}, context);
   const std::string sha256 = sha256_of_mesh(mesh);
   return {recipe.name,
@@ -135,6 +136,8 @@ LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& rec
   return result;
 }
 
+bool data_required = false;
+
 std::string names_of(const std::vector<CaseRecipe>& recipes) {
   std::string names;
   for (const CaseRecipe& each : recipes) names += (names.empty() ? "" : ", ") + each.name;
@@ -142,6 +145,22 @@ std::string names_of(const std::vector<CaseRecipe>& recipes) {
 }
 
 }  // namespace
+
+void require_data(bool required) { data_required = required; }
+
+void check_stand_in_allowed(const std::string& name, const std::string& reason) {
+  if (data_required)
+    throw DataMissing("the case " + name + " would be a stand-in, because " + reason +
+                      "; put the file into the folder $HERMESH_DATA, or leave out --require-data");
+}
+
+bool is_at_hand(const std::string& name, RunContext& context) {
+  const std::vector<CaseRecipe> all = recipes_of_project();
+  const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
+  if (recipe == all.end()) throw Error("there is no case '" + name + "'; the cases are: " + names_of(all));
+  std::string reasons;
+  return recipe->files.empty() || locate_files(*recipe, reasons, context);
+}
 
 std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& reasons, RunContext& context) {
   const std::string data = environment("HERMESH_DATA");

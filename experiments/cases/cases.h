@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/core/error.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 
@@ -42,6 +43,19 @@ LoadedCase load_case(const std::string& name, RunContext& context);
 /// not made by a recipe, an unknown parameter, or a value out of range.
 LoadedCase load_changed_case(const std::string& name, const std::map<std::string, double>& changes,
                              RunContext& context);
+
+/// A case's file is wanted, and only its stand-in is to be had: `hermesh run --require-data`.
+class DataMissing : public Error {
+  using Error::Error;
+};
+/// Makes stand-ins an error from now on, in the whole process: loading one throws DataMissing.
+void require_data(bool required);
+/// @throws DataMissing naming the case and `reason`, why none of its files is to be had, if data are required.
+void check_stand_in_allowed(const std::string& name, const std::string& reason);
+
+/// Whether a file of the case is in the data folder, the cache or a registry, so that no stand-in would be taken.
+/// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
+bool is_at_hand(const std::string& name, RunContext& context);
 
 struct CaseRecipe;  // case_file.h
 

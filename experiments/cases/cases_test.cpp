@@ -255,7 +255,7 @@ std::string one_case(const std::string& files) {
          "]\ntriangles = 20000\nstand_in = \"noise-sphere\"\n";
 }
 std::string file_entry(const std::string& name, const std::string& sha256, const std::string& from = "") {
-  return "{ file = \"" + name + "\", sha256 = \"" + sha256 + "\"" +
+  return "{ file = \"" + name + "\", sha256 = \"" + sha256 + "\", source = \"here\", licence = \"ours\"" +
          (from.empty() ? "" : ", from = \"" + from + "\"") + " }";
 }
 
@@ -270,6 +270,7 @@ TEST_F(CasesTest, TheRecipesOfTheProjectAreInOrder) {
       EXPECT_NE(is_mesh_path(file.name), recipe.is_volume) << file.name;
       EXPECT_TRUE(files.insert(file.name).second) << file.name;
       EXPECT_EQ(file.sha256.size(), 64u) << file.name;
+      EXPECT_FALSE(file.source.empty() || file.licence.empty()) << file.name;
     }
 }
 
@@ -359,6 +360,12 @@ TEST_F(CasesTest, WhereNothingCanBeFetchedThereIsAStandIn) {
 TEST_F(CasesTest, HolesAreClosedInWhateverMeshThereIs) {
   use_recipes(one_case(file_entry("part.obj", triangle_sha256)) +
               "[[case]]\nname = \"closed\"\nsummary = \"x\"\nclose_holes_of = \"part\"\nsha256 = \"0\"\n");
+  require_data(true);
+  const std::string refused = error_in([&] { load_case("part", context); });
+  EXPECT_TRUE(refused.starts_with("the case part would be a stand-in, because ")) << refused;
+  EXPECT_THROW(load_case("closed", context), DataMissing);
+  EXPECT_FALSE(is_at_hand("part", context));
+  require_data(false);
   EXPECT_TRUE(load_case("closed", context).origin.starts_with("stand-in: "));
   write(folder / "data" / "part.obj", triangle);
   // The hash in the recipe is wrong on purpose.

@@ -118,6 +118,7 @@ LoadedVolume load_volume(const std::string& name, RunContext& context) {
   std::string reasons;
   if (const auto located = locate_files(*recipe, reasons, context))
     return {name, read_volume(*recipe, located->path, context), located->origin, located->sha256};
+  check_stand_in_allowed(name, reasons);
   return {name, make_volume_stand_in(recipe->stand_in), "stand-in: " + recipe->stand_in + ", because " + reasons, ""};
 }
 

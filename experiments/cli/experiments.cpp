@@ -1,15 +1,19 @@
-// hermesh run, report and compare: experiments, the tables made of them, and two runs beside each other.
+// hermesh run, report, compare and claims: experiments, the tables made of them, two runs beside each other, and what the
+// rows say of the thesis.
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
 #include "experiments/harness/compare.h"
 #include "experiments/harness/harness.h"
 #include "experiments/harness/rows.h"
+#include "experiments/ledger/claims.h"
+#include "experiments/ledger/pages.h"
 
 namespace hermesh::cli {
 namespace {
@@ -37,26 +41,101 @@ void add_run(CLI::App& app, Session& session) {
       "Folder for rows.jsonl, meshes and pictures (default: results/local/ and the file's name)");
   command->add_option("--filter", settings->filter,
                       "Only cells whose case/resolution/variant contains this text");
-  command->callback(
-      [settings, &session] { session.command = [settings, &session] { return run(*settings, session); }; });
+  auto with_data = std::make_shared<bool>(false);
+  command->add_flag("--require-data", *with_data,
+                    "Take no stand-in for a model that is not at hand: name it, and end with exit code 3");
+  command->callback([settings, with_data, &session] {
+    session.command = [settings, with_data, &session] {
+      require_data(*with_data);
+      return run(*settings, session);
+    };
+  });
+}
+
+/// The checkout that the experiments are read from.
+std::filesystem::path project_root() { return experiments_folder().parent_path(); }
+
+int fill_pages() {
+  for (const std::string& file : Pages(project_root()).fill()) std::cout << "filled " << file << '\n';
+  return kDone;
+}
+
+int check_pages() {
+  const std::vector<std::string> problems = Pages(project_root()).problems();
+  for (const std::string& problem : problems) std::cout << problem << '\n';
+  if (problems.empty()) std::cout << "all numbers of the pages come from the rows\n";
+  return problems.empty() ? kDone : kNotMet;
 }
 
 void add_report(CLI::App& app, Session& session) {
   struct Arguments {
     std::filesystem::path folder;
     std::string format = "md";
+    bool fill = false, check = false;
   };
-  CLI::App* command = add_command(app, session, "report", "Tables from the rows of earlier runs");
+  CLI::App* command = add_command(
+      app, session, "report", "Tables from the rows of earlier runs; and the numbers of the project's pages, filled or checked");
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("DIR", arguments->folder, "Folder with rows.jsonl")->required();
+  auto* folder = command->add_option("DIR", arguments->folder, "Folder with rows.jsonl");
+  auto* fill = command->add_flag("--fill", arguments->fill,
+                                 "Write into pages and results/*/table.md of the checkout what the rows of results/ say");
+  auto* check = command->add_flag("--check", arguments->check,
+                                  "Name each number of these that the rows do not give; if there are any, exit code 3");
+  folder->excludes(fill)->excludes(check);
+  fill->excludes(check);
   command
       ->add_option("--format", arguments->format,
                    "md, csv, tex, or plots to draw those of the rows into DIR (default: md)")
       ->check(CLI::IsMember({"md", "csv", "tex", "plots"}));
   command->callback([arguments, &session] {
+    if (arguments->folder.empty() && !arguments->fill && !arguments->check)
+      throw CLI::RequiredError("DIR, --fill or --check");
     session.command = [arguments] {
+      if (arguments->fill) return fill_pages();
+      if (arguments->check) return check_pages();
       write_report(arguments->folder, arguments->format, std::cout);
-      return kDone;
+      return static_cast<int>(kDone);
+    };
+  });
+}
+
+void add_claims(CLI::App& app, Session& session) {
+  struct Arguments {
+    std::filesystem::path file, results;
+    std::string id, format = "md";
+    bool doctor = false;
+  };
+  CLI::App* command = add_command(app, session, "claims",
+                                  "What the rows say of each claim of the thesis; exit code 3 if one has no verdict");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("--file", arguments->file, "Claims and their rules (default: paper/claims.toml)");
+  command->add_option("--results", arguments->results, "Folder of folders with rows.jsonl (default: results)");
+  command->add_option("--id", arguments->id, "Only claims whose id contains this text");
+  command->add_option("--format", arguments->format, "md or json (default: md)")->check(CLI::IsMember({"md", "json"}));
+  command->add_flag("--doctor", arguments->doctor,
+                    "Try each rule on doctored rows instead, and name those that cannot fail; if any, exit code 3");
+  command->callback([arguments, &session] {
+    session.command = [arguments] {
+      if (arguments->file.empty()) arguments->file = project_root() / "paper" / "claims.toml";
+      if (arguments->results.empty()) arguments->results = project_root() / "results";
+      std::vector<Claim> claims = read_claims(arguments->file);
+      std::erase_if(claims, [&](const Claim& claim) { return claim.id.find(arguments->id) == std::string::npos; });
+      if (claims.empty()) throw Error("no claim's id contains \"" + arguments->id + "\"");
+      RowDatabase rows;
+      rows.add_folders(arguments->results);
+      bool fine = true;
+      std::vector<Judged> verdicts;
+      for (const Claim& claim : claims) {
+        if (arguments->doctor)
+          for (const std::string& wrong : rules_that_cannot_fail(claim, rows)) {
+            fine = false;
+            std::cout << claim.id << ": " << wrong << '\n';
+          }
+        verdicts.push_back(judge(claim, rows));
+        fine = fine && (arguments->doctor || verdicts.back().verdict != Verdict::missing);
+      }
+      if (!arguments->doctor) write_claims(claims, verdicts, arguments->format, std::cout);
+      return fine ? kDone : kNotMet;
     };
   });
 }
@@ -85,6 +164,7 @@ void add_experiments(CLI::App& app, Session& session) {
   add_run(app, session);
   add_report(app, session);
   add_compare(app, session);
+  add_claims(app, session);
 }
 
 }  // namespace hermesh::cli

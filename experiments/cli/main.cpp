@@ -9,10 +9,12 @@
 #include <thread>
 
 #include "algorithms/core/shown.h"
+#include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/terminal_progress.h"
+#include "experiments/harness/provenance.h"
 
 namespace hermesh::cli {
 namespace {
@@ -73,6 +75,7 @@ int run_to_exit_code(Session& session) {
     if (const int exit_code = signal_exit_code()) end_process(exit_code);
     print_notes(session);
     if (dynamic_cast<const UsageError*>(&error)) return fail(kUsage, error.what());
+    if (dynamic_cast<const DataMissing*>(&error)) return fail(kNotMet, error.what());
     if (dynamic_cast<const std::bad_alloc*>(&error))
       return fail(kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory");
     return fail(kFailed, error.what());
@@ -95,7 +98,9 @@ int run_program(int argc, char** argv) {
   Session session;
   session.context.cancel = &handle_signals();
   CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
-  app.set_version_flag("--version", "hermesh " HERMESH_VERSION);
+  set_source_state(built_from());
+  app.set_version_flag("--version", [] { return "hermesh " HERMESH_VERSION "\n" + provenance_text(); },
+                       "Print the version, and what the program was built from and with, and exit");
   app.set_help_flag("--help,-h", "Print this help and exit");
   add_common_options(app, session);
   add_list(app, session);

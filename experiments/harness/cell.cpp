@@ -21,6 +21,8 @@ std::optional<std::string> attempt(const std::function<void()>& work) {
     return std::nullopt;
   } catch (const Cancelled&) {
     throw;
+  } catch (const DataMissing&) {
+    throw;
   } catch (const std::bad_alloc&) {
     return "there is not enough memory";
   } catch (const std::exception& error) {

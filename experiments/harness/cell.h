@@ -18,8 +18,8 @@ namespace hermesh {
 /// since a terminal has no business inside a timed repetition.
 RunContext child_context(const RunContext& context, bool with_progress);
 
-/// The sentence of what went wrong, if anything did. Being cancelled is no failure of a variant.
-/// @throws Cancelled.
+/// The sentence of what went wrong, if anything did. Being cancelled and data that are not there are no failures of a
+/// variant. @throws Cancelled; DataMissing.
 std::optional<std::string> attempt(const std::function<void()>& work);
 
 /// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools

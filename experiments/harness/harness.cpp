@@ -91,6 +91,12 @@ class ResultFolder {
   std::vector<std::filesystem::path> made_;  ///< the innermost first
 };
 
+/// The folder, if rows may go there.
+std::filesystem::path kept_folder(const std::filesystem::path& out) {
+  check_may_be_kept(out, experiments_folder().parent_path(), source_state());
+  return out;
+}
+
 /// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one
 /// starts.
 class Run {
@@ -103,7 +109,7 @@ class Run {
         experiment_(read_experiment(settings.experiment, {tables.extractors, tables.voxelizers, tables.cases,
                                                           column_names(), tables.measurements})),
         tier_(find_tier(experiment_, settings.tier)),
-        folder_(settings.out),
+        folder_(kept_folder(settings.out)),
         out_(folder_.path()),
         head_(run_head(experiment_, settings)) {}
 

@@ -19,6 +19,9 @@
 #include <optional>
 #include <string>
 
+#include "algorithms/core/error.h"
+#include "algorithms/lattice/simd/simd_level.h"
+
 #ifndef HERMESH_BUILD_TYPE
 #define HERMESH_BUILD_TYPE "unknown"
 #endif
@@ -30,6 +33,11 @@ namespace hermesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+SourceState& mutable_source_state() {
+  static SourceState state;
+  return state;
+}
 
 /// A path as one word of a shell command, whatever characters it has.
 std::string quoted(const std::string& text) {
@@ -78,7 +86,10 @@ Json build() {
 #else
   const std::string compiler = "g++ " __VERSION__;
 #endif
-  return {{"compiler", compiler}, {"flags", HERMESH_COMPILE_FLAGS}, {"type", HERMESH_BUILD_TYPE}};
+  return {{"compiler", compiler},
+          {"flags", HERMESH_COMPILE_FLAGS},
+          {"type", HERMESH_BUILD_TYPE},
+          {"simd", name(chosen_simd_level())}};
 }
 
 #define HERMESH_TEXT_OF(x) #x
@@ -106,17 +117,71 @@ std::string utc_now() {
 
 }  // namespace
 
+void set_source_state(SourceState state) { mutable_source_state() = std::move(state); }
+
+const SourceState& source_state() { return mutable_source_state(); }
+
+SourceState checked_out(const std::filesystem::path& folder) {
+  SourceState state;
+  const auto commit = git(folder, "rev-parse --verify HEAD");
+  if (!commit) return state;
+  state.commit = *commit;
+  // The same files as in build_stamp.cmake.
+  const auto changes = git(folder,
+                           "status --porcelain -- ':(top)' ':(top,exclude)results' ':(top,exclude)paper' "
+                           "':(top,exclude,glob)**/*.md'");
+  if (changes) state.dirty = !changes->empty();
+  return state;
+}
+
+void check_may_be_kept(const std::filesystem::path& out, const std::filesystem::path& checkout, const SourceState& built) {
+  const auto is_below = [](const std::filesystem::path& path, const std::filesystem::path& folder) {
+    const std::filesystem::path way = path.lexically_relative(folder);
+    return !way.empty() && *way.begin() != "..";
+  };
+  const std::filesystem::path target = std::filesystem::weakly_canonical(std::filesystem::absolute(out));
+  const std::filesystem::path results = std::filesystem::weakly_canonical(checkout / "results");
+  if (!is_below(target, results) || is_below(target, results / "local")) return;
+  const SourceState now = checked_out(checkout);
+  const auto refuse = [&](const std::string& why) {
+    throw Error(out.string() + " takes rows of a clean commit alone, and " + why +
+                "; name a folder such as results/local/" + target.filename().string() + " instead");
+  };
+  if (now.commit == "unknown" || !now.dirty) refuse("there is no git checkout to compare the program with");
+  if (built.commit != now.commit)
+    refuse("this program was built from commit " + built.commit.substr(0, 12) + " while " + now.commit.substr(0, 12) +
+           " is checked out: build it again");
+  if (built.dirty.value_or(true)) refuse("this program was built from files that differ from its commit: commit and build it again");
+  if (*now.dirty) refuse("files differ from the commit: commit them");
+}
+
 Json provenance(const std::filesystem::path& source_folder) {
-  const auto commit = git(source_folder, "rev-parse --verify HEAD");
-  // Results of runs are no part of what is run.
-  const auto changes = git(source_folder, "status --porcelain -- ':(top)' ':(top,exclude)results'");
-  return {{"commit", commit.value_or("unknown")},
-          {"dirty", changes ? Json(!changes->empty()) : Json(nullptr)},
+  const SourceState& built = source_state();
+  const SourceState now = checked_out(source_folder);
+  Json dirty = nullptr;
+  if (built.dirty) dirty = *built.dirty || now.dirty.value_or(false) || (now.commit != "unknown" && now.commit != built.commit);
+  return {{"commit", built.commit},
+          {"dirty", dirty},
           {"date", utc_now()},
           {"machine", machine()},
           {"build", build()},
           {"libraries", libraries()},
           {"threads", tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)}};
+}
+
+std::string provenance_text() {
+  const SourceState& built = source_state();
+  const Json made = build();
+  std::string text = "commit " + built.commit;
+  if (!built.dirty) text += ", whether files differed from it is unknown";
+  if (built.dirty.value_or(false)) text += ", with changes";
+  text += "\n" + made.at("compiler").get<std::string>() + ", " + made.at("type").get<std::string>() + ", " +
+          made.at("flags").get<std::string>() + "\nvector code " + made.at("simd").get<std::string>() + "\n";
+  std::string names;
+  const Json versions = libraries();
+  for (const auto& [library, version] : versions.items())
+    names += (names.empty() ? "" : ", ") + library + " " + version.get<std::string>();
+  return text + names;
 }
 
 Json load_averages() {

@@ -1,7 +1,6 @@
 // Table 9.2 of the thesis: what the threshold of adaptive dual contouring does to a large level set.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 
@@ -26,10 +25,7 @@ constexpr Printed kPrinted[] = {{0, 7'918'578, 7'918'809, 14.61},   {50, 1'889'4
 LoadedCase load_model(const MeasurementInput& input) {
   if (!input.parameters.is("case", "happy-buddha"))
     return input.tables.load(input.parameters.text("case"), input.context);
-  if (const char* folder = std::getenv("HERMESH_DATA"))
-    for (const char* name : {"happy_vrip.ply", "happy_vrip.ply.gz"})
-      if (const auto path = std::filesystem::path(folder) / name; std::filesystem::exists(path))
-        return input.tables.load(path.string(), input.context);
+  if (is_at_hand("happy-buddha-full", input.context)) return input.tables.load("happy-buddha-full", input.context);
   LoadedCase decimated = input.tables.load("happy-buddha", input.context);
   return decimated.origin.starts_with("stand-in") ? input.tables.load("dragon", input.context) : decimated;
 }

@@ -86,7 +86,20 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
     if (keep) keep(row);
     rows.push_back(std::move(row));
   };
-  MeasurementInput input{parameters, experiment.seed, tables, out, context, filter, {}, measurement.name};
+  // What the measurement loads is an input of the rows that come after.
+  Tables recorded = tables;
+  const auto record = [&](LoadedCase loaded) {
+    Json entry = {{"name", loaded.name}, {"origin", loaded.origin}, {"sha256", loaded.sha256}};
+    Json& inputs = full_head["inputs"];
+    if (std::ranges::find(inputs, entry) == inputs.end()) inputs.push_back(std::move(entry));
+    return loaded;
+  };
+  full_head["inputs"] = Json::array();
+  recorded.load = [&](const std::string& name, RunContext& loading) { return record(tables.load(name, loading)); };
+  recorded.load_changed = [&](const std::string& name, const RecipeParameters& changes, RunContext& loading) {
+    return record(tables.load_changed(name, changes, loading));
+  };
+  MeasurementInput input{parameters, experiment.seed, recorded, out, context, filter, {}, measurement.name};
   const auto start = std::chrono::steady_clock::now();
   const auto take = [&](const std::vector<MeasuredRow>& measured) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
