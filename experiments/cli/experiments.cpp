@@ -1,6 +1,7 @@
 // hermesh run, report, compare and claims: experiments, the tables made of them, two runs beside each other, and what the
 // rows say of the thesis.
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -67,11 +68,34 @@ int check_pages() {
   return problems.empty() ? kDone : kNotMet;
 }
 
+int print_query(const std::string& query) {
+  RowDatabase rows;
+  rows.add_folders(project_root() / "results");
+  const std::vector<RowDatabase::Row> found = rows.rows(query, std::numeric_limits<std::size_t>::max());
+  const auto line = [](const RowDatabase::Row& row, const auto& text) {
+    std::cout << '|';
+    for (const auto& column : row) std::cout << ' ' << text(column) << " |";
+    std::cout << '\n';
+  };
+  if (found.empty()) std::cout << "no rows\n";
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (i == 0) {
+      line(found[0], [](const auto& column) { return column.first; });
+      line(found[0], [](const auto&) { return std::string("---"); });
+    }
+    line(found[i], [](const auto& column) {
+      return column.second.is_string() ? column.second.template get<std::string>() : column.second.dump();
+    });
+  }
+  return kDone;
+}
+
 void add_report(CLI::App& app, Session& session) {
   struct Arguments {
     std::filesystem::path folder;
     std::string format = "md";
     bool fill = false, check = false;
+    std::string query;
   };
   CLI::App* command = add_command(
       app, session, "report", "Tables from the rows of earlier runs; and the numbers of the project's pages, filled or checked");
@@ -81,18 +105,23 @@ void add_report(CLI::App& app, Session& session) {
                                  "Write into pages and results/*/table.md of the checkout what the rows of results/ say");
   auto* check = command->add_flag("--check", arguments->check,
                                   "Name each number of these that the rows do not give; if there are any, exit code 3");
-  folder->excludes(fill)->excludes(check);
+  auto* query = command->add_option("--query", arguments->query,
+                                    "Print what SQL gives on the rows of results/: each folder is a table "
+                                    "(experiments/ledger/row_database.h lists the columns)");
+  folder->excludes(fill)->excludes(check)->excludes(query);
+  query->excludes(fill)->excludes(check);
   fill->excludes(check);
   command
       ->add_option("--format", arguments->format,
                    "md, csv, tex, or plots to draw those of the rows into DIR (default: md)")
       ->check(CLI::IsMember({"md", "csv", "tex", "plots"}));
   command->callback([arguments, &session] {
-    if (arguments->folder.empty() && !arguments->fill && !arguments->check)
-      throw CLI::RequiredError("DIR, --fill or --check");
+    if (arguments->folder.empty() && !arguments->fill && !arguments->check && arguments->query.empty())
+      throw CLI::RequiredError("DIR, --query, --fill or --check");
     session.command = [arguments] {
       if (arguments->fill) return fill_pages();
       if (arguments->check) return check_pages();
+      if (!arguments->query.empty()) return print_query(arguments->query);
       write_report(arguments->folder, arguments->format, std::cout);
       return static_cast<int>(kDone);
     };

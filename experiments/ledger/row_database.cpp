@@ -202,15 +202,22 @@ void RowDatabase::add_folders(const std::filesystem::path& results) {
   Statement(connection_.get(), "COMMIT").step();
 }
 
-std::vector<std::pair<std::string, Json>> RowDatabase::first_row(const std::string& query,
-                                                                  const std::map<std::string, Json>& bound) const {
+std::vector<RowDatabase::Row> RowDatabase::rows(const std::string& query, std::size_t most,
+                                                const std::map<std::string, Json>& bound) const {
   Statement statement(connection_.get(), query);
   statement.bind(bound);
-  std::vector<std::pair<std::string, Json>> row;
-  if (!statement.step()) return row;
-  for (int column = 0; column < statement.columns(); ++column)
-    row.emplace_back(statement.name(column), statement.value(column));
-  return row;
+  std::vector<Row> result;
+  while (result.size() < most && statement.step()) {
+    result.emplace_back();
+    for (int column = 0; column < statement.columns(); ++column)
+      result.back().emplace_back(statement.name(column), statement.value(column));
+  }
+  return result;
+}
+
+RowDatabase::Row RowDatabase::first_row(const std::string& query, const std::map<std::string, Json>& bound) const {
+  std::vector<Row> found = rows(query, 1, bound);
+  return found.empty() ? Row() : std::move(found[0]);
 }
 
 int RowDatabase::execute(const std::string& text) {

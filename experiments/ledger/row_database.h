@@ -34,12 +34,16 @@ class RowDatabase {
   /// Adds each folder right below `results` that has rows, except "local". @throws Error naming a file that cannot be read.
   void add_folders(const std::filesystem::path& results);
 
+  using Row = std::vector<std::pair<std::string, Json>>;
+  /// All rows that the query gives, at most `most`, each with its columns in their order. @throws Error as first_row().
+  std::vector<Row> rows(const std::string& query, std::size_t most, const std::map<std::string, Json>& bound = {}) const;
   /// The columns of the first row that the query gives, in their order; empty if it gives none. `bound` are the values of
   /// the query's parameters such as :printed. @throws Error with SQLite's sentence.
-  std::vector<std::pair<std::string, Json>> first_row(const std::string& query,
-                                                      const std::map<std::string, Json>& bound = {}) const;
+  Row first_row(const std::string& query, const std::map<std::string, Json>& bound = {}) const;
   /// Runs what changes rows, and returns how many rows it changed. @throws Error.
   int execute(const std::string& statement);
+  /// The names of all tables.
+  const std::vector<std::string>& tables() const { return tables_; }
   /// The names of the tables that occur in a query, sorted.
   std::vector<std::string> tables_in(const std::string& query) const;
 

@@ -66,7 +66,8 @@ std::span<const Measurement> all_measurements() {
       hermite_csg_measurement(),        hermite_speed_measurement(),  table_9_2_measurement(),
       tables_9_3_and_9_4_measurement(), volumes_measurement(),        guarantee_measurement(),
       fracture_measurement(),           fracture_speed_measurement(),
-      fracture_guarantee_measurement(), digests_measurement()};
+      fracture_guarantee_measurement(), digests_measurement(),
+      tests_measurement()};
   return table;
 }
 

@@ -115,5 +115,6 @@ Measurement fracture_measurement();
 Measurement fracture_speed_measurement();
 Measurement fracture_guarantee_measurement();
 Measurement digests_measurement();
+Measurement tests_measurement();
 
 }  // namespace hermesh
