@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <sstream>
 
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/parallel.h"
@@ -35,13 +36,17 @@ class CellsAround {
     }
   }
 
+  /// Writes the points of the four cells, and by how many levels the coarsest and the finest of their regions differ.
   /// @return false if one of the cells has no point.
-  bool find(int sample, Quad& points) const {
+  bool find(int sample, Quad& points, int& step) const {
     // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
     const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
     const std::uint16_t n[4] = {numbers_[cell_[low_u + low_v] + sample - u_ - v_], numbers_[cell_[low_v] + sample - v_],
                                 numbers_[cell_[0] + sample], numbers_[cell_[low_u] + sample - u_]};
-    points = {first_[low_u + low_v] + n[0], first_[low_v] + n[1], first_[0] + n[2], first_[low_u] + n[3]};
+    points = {first_[low_u + low_v] + point_of(n[0]), first_[low_v] + point_of(n[1]), first_[0] + point_of(n[2]),
+              first_[low_u] + point_of(n[3])};
+    const auto [finest, coarsest] = std::minmax({level_of(n[0]), level_of(n[1]), level_of(n[2]), level_of(n[3])});
+    step = coarsest - finest;
     return n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
   }
 
@@ -73,7 +78,9 @@ class Contourer {
     merge();
     number_points(mesh);
     connect(mesh);
-    if (field_.leaves_out_outside()) drop_unused_points(mesh);
+    // A region may hold a whole component of the surface where a topology test is left out; no polygon uses its point.
+    if (field_.leaves_out_outside() || options_.topology_tests != AdaptiveOptions::TopologyTests::both)
+      drop_unused_points(mesh);
     report();
     return mesh;
   }
@@ -136,9 +143,11 @@ class Contourer {
     std::vector<std::vector<Quad>> quads(groups_);
     std::vector<std::vector<Triangle>> triangles(groups_);
     std::vector<std::uint64_t> first_quad(groups_), first_triangle(groups_);
+    steps_.resize(groups_);
     parallel_blocks(groups_, context_, [&](std::size_t g) {
       for_each_block(g, [&](std::size_t b) {
-        for_each_polygon(b, [&](const Quad& polygon, int corners) {
+        for_each_polygon(b, [&](const Quad& polygon, int corners, int step) {
+          ++steps_[g][static_cast<std::size_t>(corners - 3)][static_cast<std::size_t>(step)];
           // Triangles are where an edge lies on the border between regions of different size (fig. 6.4).
           if (corners == 4)
             quads[g].push_back(polygon);
@@ -159,7 +168,7 @@ class Contourer {
     });
   }
 
-  /// Calls f(points, 3 or 4) for each polygon of the block's crossing edges (§6.5).
+  /// Calls f(points, 3 or 4, difference of level) for each polygon of the block's crossing edges (§6.5).
   template <class F>
   void for_each_polygon(std::size_t b, F&& f) const {
     const HermiteView::Block& block = view_.blocks()[b];
@@ -169,8 +178,8 @@ class Contourer {
       const CellsAround around(view_, mask_, b, axis);
       for_each_bit(block.crossing[axis], [&](int sample) {
         Quad polygon;
-        if (!around.find(sample, polygon)) return;
-        int corners = 0;
+        int corners = 0, step = 0;
+        if (!around.find(sample, polygon, step)) return;
         // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
         // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
         for (int i = 0; i < 4; ++i)
@@ -178,7 +187,7 @@ class Contourer {
         if (corners < 3) return;
         // The sign at the edge's first sample orients the polygon; a placement that mirrors turns all of them about.
         if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
-        f(polygon, corners);
+        f(polygon, corners, step);
       });
     }
   }
@@ -200,7 +209,33 @@ class Contourer {
     float largest = 0.0f;
     for (const BlockResult& result : results_) largest = std::max(largest, result.largest_plane_distance);
     context_.figure("largest_plane_distance", largest);
-    context_.figure("escaped", sum([](const BlockResult& r) { return r.escaped; }));
+    report_escapes();
+    // Polygons by the levels around them tell whether triangles are where fig. 6.4 has them.
+    for (std::size_t corners : {4, 3})
+      for (std::size_t step = 0; step < 4; ++step) {
+        double polygons = 0.0;
+        for (const Steps& steps : steps_) polygons += steps[corners - 3][step];
+        context_.figure((corners == 4 ? "quads_step_" : "triangles_step_") + std::to_string(step), polygons);
+      }
+  }
+
+  /// The figures about points outside their regions (trap T7).
+  void report_escapes() const {
+    std::array<double, kEscapeRanges.size() + 1> escaped{};
+    float largest = 0.0f;
+    for (const BlockResult& result : results_) {
+      for (std::size_t i = 0; i < escaped.size(); ++i) escaped[i] += result.escaped[i];
+      largest = std::max(largest, result.largest_escape);
+    }
+    context_.figure("escaped", std::accumulate(escaped.begin(), escaped.end(), 0.0));
+    context_.figure("largest_escape", largest);
+    // A range is called by its upper end, the last by its lower one.
+    for (std::size_t i = 0; i < kEscapeRanges.size(); ++i) {
+      std::ostringstream name;
+      name << "escaped_to_" << kEscapeRanges[i];
+      context_.figure(name.str(), escaped[i]);
+    }
+    context_.figure("escaped_beyond_4", escaped.back());
   }
 
   RunContext& context_;
@@ -214,7 +249,18 @@ class Contourer {
   std::vector<std::vector<Eigen::Vector3f>> places_;
   MaskGrid mask_;
   std::vector<BlockResult> results_;
+  /// Polygons by corners, less 3, and by difference of level.
+  using Steps = std::array<std::array<std::uint32_t, 4>, 2>;
+  std::vector<Steps> steps_;  ///< by group
 };
+
+AdaptiveOptions::TopologyTests topology_tests_of(const std::string& name) {
+  using Tests = AdaptiveOptions::TopologyTests;
+  // The option's declaration allows no other names.
+  if (name == "table") return Tests::table;
+  if (name == "signs") return Tests::signs;
+  return name == "none" ? Tests::none : Tests::both;
+}
 
 }  // namespace
 
@@ -228,6 +274,8 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
   if (input.options.is("placement", "average")) options.placement = AdaptiveOptions::Placement::average;
   options.threshold = input.options.number("threshold");
   options.truncation = input.options.number("truncation");
+  if (input.options.is("minimiser", "corner")) options.nearest = AdaptiveOptions::Nearest::corner;
+  options.topology_tests = topology_tests_of(input.options.text("topology_tests"));
   // Means of crossings that are never merged need no planes.
   const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
   const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
@@ -250,10 +298,23 @@ std::vector<OptionSpec> adaptive_dual_contouring_options() {
        {"optimal", "average"}},
       {"truncation",
        "0.1",
-       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features",
+       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features, 0 "
+       "drops none that can be told from 0",
        {},
-       0.001,
-       1.0}};
+       0.0,
+       1.0,
+       {"placement=optimal"}},
+      {.name = "minimiser",
+       .fallback = "mass-point",
+       .help = "where singular values are dropped, the minimiser nearest to the 'mass-point' of the crossings, or to the "
+               "first 'corner' of the cell or region (the pseudo-inverse alone)",
+       .choices = {"mass-point", "corner"},
+       .only_with = {"placement=optimal"}},
+      {.name = "topology_tests",
+       .fallback = "both",
+       .help = "what a region must pass to be merged: the look-up 'table', the 'signs' of middles, 'both' (as printed), "
+               "or 'none'; without one the topology may change",
+       .choices = {"both", "table", "signs", "none"}}};
   // The Hermite data has options of its own: where the crossings come from, and how they are stored
   // (hermite_input.h).
   const std::vector<OptionSpec> of_hermite = hermite_options();

@@ -3,9 +3,10 @@
 //
 // Faithful, by section:
 //   6.2    the QEF sums squared distances to the tangent planes of all crossings; its minimiser comes from a truncated
-//          singular value decomposition and is not held in its region (trap T7; the figure `escaped` counts).
+//          singular value decomposition and is not held in its region (trap T7; the figures `escaped…` count).
 //   6.3    both topology tests, the first by a table. They gate merging alone: a cell with several sheets still has
-//          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5).
+//          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5). Each can be switched
+//          off, to see what it is for.
 //   6.4    steps 1 to 4: level by level, a region is tried only if all its active cells are mergeable, and its cells
 //          are no longer mergeable once it fails; every block by itself; a mask grid of integers, which hold the
 //          number of the cell's point in the end: 16 bits that count within the block, where the thesis has 32.
@@ -18,7 +19,11 @@
 //     four times in the interior ("using the Hermite data of the corresponding cells"; Ju et al. add up the same way).
 //   - E is compared as "less than the threshold", at the place where the point would go. So threshold 0 merges nothing.
 //   - A region with no active cell in some child needs nothing of that child. One active cell may be a region.
-//   - A singular value is "minimal" below `truncation` times the largest.
+//   - A singular value is "minimal" below `truncation` times the largest. The singular values of A are the roots of the
+//     eigenvalues of AᵀA, which are found in single precision by Jacobi's rotations: the text decomposes A itself.
+//   - Where singular values are dropped the minimisers are a line or a plane. The one that is nearest to the mass point
+//     is taken (Ju et al. 2002). The text's bare pseudo-inverse takes the one nearest to the origin of the frame and
+//     does not say which frame: `Nearest::corner` has it, with the first sample of the cell or region as origin.
 //   - Where a region fails, its cells keep the regions that they have, and no larger one around them is tried.
 //   - A quad begins with the cell one step down both other axes from the edge's first sample, and is split from there.
 //
@@ -31,6 +36,7 @@
 // the QEFs, their minimisers, and waiting for crossings and fresh pages; connecting takes a sixth.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
@@ -47,19 +53,45 @@ struct AdaptiveOptions {
     optimal,  ///< minimiser of the QEF
     average   ///< mean of the crossings, each as often as it counts in the QEF
   };
+  /// Which of the minimisers, where singular values are dropped.
+  enum class Nearest {
+    mass_point,  ///< to the mean of the crossings
+    corner       ///< to the first sample of the cell or region: the pseudo-inverse of §6.2.1 alone
+  };
+  /// Which of the topology tests of §6.3 a region must pass to be merged.
+  enum class TopologyTests {
+    both,
+    table,  ///< the first alone: the corners' signs collapse to one edge
+    signs,  ///< the second alone: middles agree with corners
+    none
+  };
   Placement placement = Placement::optimal;
   /// Bound of E in square voxels: a region is merged if its E is less. Larger merges more; 0 nothing.
   double threshold = 0.1;
-  /// Share of the largest singular value below which others are dropped; at least 0.001. Larger is smoother.
+  /// Share of the largest singular value below which others are dropped; larger is smoother. At 0 none is, as if eq.
+  /// 6.4 were solved as it stands: but for directions in which E does not change as far as double precision can tell
+  /// (kLeastTruncation in qef_sum.h).
   double truncation = 0.1;
+  Nearest nearest = Nearest::mass_point;
+  TopologyTests topology_tests = TopologyTests::both;
 };
+
+/// Upper ends, in voxels, of the ranges in which the figures `escaped_to_…` count how far points are outside: each
+/// range begins where the one before it ends, the first above 0.
+inline constexpr std::array<float, 6> kEscapeRanges{0.01f, 0.1f, 0.5f, 1.0f, 2.0f, 4.0f};
 
 /// Meshes Hermite data adaptively. The mesh is closed and oriented, in the sense that as many polygons pass along an
 /// edge in one direction as in the other, except where `field` leaves polygons out; it is not manifold. `field` may
 /// be null. The bytes are the same at any number of threads.
 ///
-/// Figures of the run: `regions_1`, `regions_2` and `regions_3` (of 2³, 4³, 8³ cells), `largest_plane_distance`
-/// (voxels, from the point of a merged region to a plane of it), and `escaped` (points outside their cell or region).
+/// Figures of the run:
+///   - `regions_1`, `regions_2` and `regions_3`: regions of 2³, 4³, 8³ cells;
+///   - `largest_plane_distance`: voxels, from the point of a merged region to a plane of it;
+///   - `escaped`: points outside their cell or region (trap T7); `largest_escape`: how far at most, in voxels, along
+///     the axis on which it is farthest; `escaped_to_0.01`, …, `escaped_to_4`, `escaped_beyond_4`: how many by that
+///     distance (kEscapeRanges);
+///   - `quads_step_0`, …, `quads_step_3` and `triangles_step_0`, …: polygons by the difference of level between the
+///     coarsest and the finest region around their edge (§6.5, fig. 6.4); a lone cell has level 0.
 /// @throws Error for a mesh of more than 2³² points or polygons, and as FieldEvaluator does; Cancelled.
 PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);

@@ -96,17 +96,21 @@ TEST(AdaptiveDualContouring, ThresholdZeroIsUniformDualContouring) {
   EXPECT_EQ(polygons(contour(volume, {.threshold = 0.0}).mesh), polygons(uniform));
 }
 
+/// A cube with faces across the axes.
+AnalyticSurface cube(const Vector3d& centre, double half) {
+  return {[=](const Vector3d& p) { return (p - centre).cwiseAbs().maxCoeff() - half; },
+          [=](const Vector3d& p) {
+            Vector3d q = p - centre, n = Vector3d::Zero();
+            int axis;
+            q.cwiseAbs().maxCoeff(&axis);
+            n[axis] = q[axis];
+            return n;
+          }};
+}
+
 TEST(AdaptiveDualContouring, APlaneIsOnePointABlock) {
   // The top of a box at z = 35.5, and 8×8 blocks of 64 active cells of which those at the rim have other faces, too.
-  const AnalyticSurface box{
-      [](const Vector3d& p) { return (p - Vector3d::Constant(31.5)).cwiseAbs().maxCoeff() - 31.0; },
-      [](const Vector3d& p) {
-        Vector3d q = p - Vector3d::Constant(31.5), n = Vector3d::Zero();
-        int axis;
-        q.cwiseAbs().maxCoeff(&axis);
-        n[axis] = q[axis];
-        return n;
-      }};
+  const AnalyticSurface box = cube(Vector3d::Constant(31.5), 31.0);
   RunContext context;
   const FloatHermite hermite = sample_function(box, {}, {-8, -8, -8}, {71, 71, 71}, 1e-6, context);
   for (const Placement placement : {Placement::optimal, Placement::average}) {
@@ -158,6 +162,113 @@ TEST(AdaptiveDualContouring, SameBytesAtAnyNumberOfThreads) {
     EXPECT_EQ(meshes.back(), meshes.front());
   }
   EXPECT_THROW(contour(volume, {}, &field), Error);  // a level set is no scale: it has negative values
+}
+
+/// A ball within a hollow: its own surface lies wholly within one block, whose corners are all outside of the shell.
+LevelSet small_ball() {
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(1.0f);
+  auto access = grid->getAccessor();
+  // Inside at one sample, in the middle of the region of 4³ cells from (0, 0, 0), and in a large ball far away.
+  access.setValue({2, 2, 2}, -1.0f);
+  for (int x = 20; x < 60; ++x)
+    for (int y = 0; y < 40; ++y)
+      for (int z = 0; z < 40; ++z)
+        access.setValue({x, y, z}, float(std::hypot(x - 40.1, y - 20.2, z - 19.7) - 15.0));
+  return make_level_set(grid);
+}
+
+TEST(TopologyTests, EachKeepsWhatTheOtherLetsGo) {
+  using Tests = AdaptiveOptions::TopologyTests;
+  const auto made = [&](const LevelSet& volume, Tests tests) {
+    AdaptiveOptions options;
+    options.threshold = 1e9;
+    options.topology_tests = tests;
+    const Result result = contour(volume, options);
+    EXPECT_TRUE(is_closed_and_oriented(result.mesh));
+    EXPECT_TRUE(uses_all_points(result.mesh));
+    return result.mesh;
+  };
+  const auto near_ball = [](const PolygonMesh& mesh) {
+    return std::any_of(mesh.points.begin(), mesh.points.end(), [](const auto& point) { return point.x() < 10.0f; });
+  };
+  // The corners around the single sample are all outside: the table refuses them, and so do the signs of the middles.
+  EXPECT_TRUE(near_ball(made(small_ball(), Tests::both)));
+  EXPECT_TRUE(near_ball(made(small_ball(), Tests::table)));
+  EXPECT_TRUE(near_ball(made(small_ball(), Tests::signs)));
+  EXPECT_FALSE(near_ball(made(small_ball(), Tests::none)));
+  // On noise each test refuses regions that the other lets pass, so that both together leave the most points.
+  const LevelSet volume = noise(33, 4);
+  const std::size_t both = made(volume, Tests::both).points.size(), table = made(volume, Tests::table).points.size(),
+                    signs = made(volume, Tests::signs).points.size(), none = made(volume, Tests::none).points.size();
+  EXPECT_GT(both, table);
+  EXPECT_GT(both, signs);
+  EXPECT_GT(table, none);
+  EXPECT_GT(signs, none);
+}
+
+TEST(AdaptiveDualContouring, TrianglesLieWhereLevelsMeet) {
+  // A polygon has as many corners as there are different cells and regions around its edge. Around an edge with regions
+  // of one level there are one, two or four of them, so that a triangle needs two levels.
+  for (const LevelSet& volume : {sphere(40.0), noise(41, 6)}) {
+    const Result result = contour(volume, {.threshold = 0.05});
+    const auto figure = [&](const std::string& name) { return result.figures.at(name); };
+    EXPECT_EQ(figure("triangles_step_0"), 0.0);
+    double quads = 0.0, triangles = 0.0;
+    for (const char* step : {"0", "1", "2", "3"}) {
+      quads += figure(std::string("quads_step_") + step);
+      triangles += figure(std::string("triangles_step_") + step);
+    }
+    EXPECT_EQ(quads, double(result.mesh.quads.size()));
+    EXPECT_EQ(triangles, double(result.mesh.triangles.size()));
+    EXPECT_GT(triangles, 0.0);
+  }
+  const Result uniform = contour(sphere(20.0), {.threshold = 0.0});
+  EXPECT_EQ(uniform.figures.at("quads_step_0"), double(uniform.mesh.quads.size()));
+}
+
+TEST(AdaptiveDualContouring, EscapesAreCountedByTheirDistance) {
+  // Average placement never leaves a convex region, and minimisers may.
+  const LevelSet volume = noise(41, 3);
+  const auto escapes = [&](const AdaptiveOptions& options) {
+    const Result result = contour(volume, options);
+    double sum = result.figures.at("escaped_beyond_4");
+    for (const char* to : {"0.01", "0.1", "0.5", "1", "2", "4"})
+      sum += result.figures.at(std::string("escaped_to_") + to);
+    EXPECT_EQ(sum, result.figures.at("escaped"));
+    return result;
+  };
+  const Result average = escapes({.placement = Placement::average, .threshold = 1.0});
+  EXPECT_EQ(average.figures.at("escaped"), 0.0);
+  EXPECT_EQ(average.figures.at("largest_escape"), 0.0);
+  const Result held = escapes({.threshold = 0.0}), free = escapes({.threshold = 0.0, .truncation = 0.0});
+  EXPECT_GT(held.figures.at("escaped"), 0.0);
+  EXPECT_GT(held.figures.at("largest_escape"), 0.0);
+  EXPECT_GT(free.figures.at("escaped"), held.figures.at("escaped"));
+  EXPECT_GT(free.figures.at("largest_escape"), held.figures.at("largest_escape"));
+  // Every point that is put farther out by the measured distance than 4 voxels is in the last range.
+  EXPECT_EQ(held.figures.at("largest_escape") > 4.0, held.figures.at("escaped_beyond_4") > 0.0);
+}
+
+TEST(AdaptiveDualContouring, TheBarePseudoInverseLeansTowardsTheCorner) {
+  // On a plane every point of it is a minimiser: one lies below the mean of the crossings, one below the cell's corner.
+  RunContext context;
+  const FloatHermite hermite = sample_function(cube({3.5, 3.5, -0.75}, 4.0), {}, {-8, -8, -8}, {15, 15, 15}, 1e-6, context);
+  AdaptiveOptions options{.threshold = 0.0};
+  const PolygonMesh mean = adaptive_dual_contouring(hermite, options, nullptr, context);
+  options.nearest = AdaptiveOptions::Nearest::corner;
+  const PolygonMesh corner = adaptive_dual_contouring(hermite, options, nullptr, context);
+  ASSERT_EQ(mean.points.size(), corner.points.size());
+  int cells = 0;
+  for (std::size_t i = 0; i < mean.points.size(); ++i) {
+    // Cells at the rim have other faces, too.
+    const Eigen::Vector3f& at = mean.points[i];
+    if (at.x() < 1.0f || at.y() < 1.0f || at.x() > 6.0f || at.y() > 6.0f || std::fabs(at.z() - 3.25f) > 1e-3f) continue;
+    EXPECT_LT((at - Eigen::Vector3f(std::floor(at.x()) + 0.5f, std::floor(at.y()) + 0.5f, 3.25f)).norm(), 1e-4f);
+    EXPECT_LT((corner.points[i] - Eigen::Vector3f(std::floor(at.x()), std::floor(at.y()), 3.25f)).norm(), 1e-4f);
+    ++cells;
+  }
+  EXPECT_EQ(cells, 25);
 }
 
 TEST(AdaptiveDualContouring, AnEmptyVolumeGivesAnEmptyMesh) { EXPECT_TRUE(contour(noise(0, 1), {}).mesh.empty()); }

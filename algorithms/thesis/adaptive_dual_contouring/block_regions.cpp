@@ -243,6 +243,15 @@ class BlockMerger {
     return result;
   }
 
+  /// Whether a region passes the topology tests that are asked for.
+  bool passes(region_topology::Signs27 signs) const {
+    using Tests = AdaptiveOptions::TopologyTests;
+    const Tests tests = input_.options.topology_tests;
+    if (tests == Tests::both) return region_topology::passes(signs);
+    if (tests == Tests::table) return region_topology::kCollapsesToOneEdge[region_topology::corners(signs)];
+    return tests == Tests::none || region_topology::middles_agree(signs);
+  }
+
   /// Tries the regions of a level, topology first: it costs a few operations, and the minimisers of those that pass
   /// are found together.
   void merge_level(int number) {
@@ -252,12 +261,16 @@ class BlockMerger {
     for (std::uint64_t bits = mergeable(number); bits != 0; bits &= bits - 1) {
       const int region = std::countr_zero(bits), cell = kFirstCell[number][region];
       const auto signs = lattice_.around(cell >> 6, (cell >> 3) & 7, cell & 7, side_of(number));
-      if (region_topology::passes(signs)) regions[candidates++] = region;
+      if (passes(signs)) regions[candidates++] = region;
     }
     std::array<const QefSum*, 64> sums;
+    std::array<std::uint16_t, 64> cells;
     std::array<Vector3d, 64> places;
-    for (int i = 0; i < candidates; ++i) sums[i] = &level.sums[regions[i]];
-    place({sums.data(), static_cast<std::size_t>(candidates)}, places.data());
+    for (int i = 0; i < candidates; ++i) {
+      sums[i] = &level.sums[regions[i]];
+      cells[i] = kFirstCell[number][regions[i]];
+    }
+    place({sums.data(), static_cast<std::size_t>(candidates)}, cells.data(), places.data());
     for (int i = 0; i < candidates; ++i) {
       const int region = regions[i];
       if (!(sums[i]->error(places[i]) < level.limits[region])) continue;
@@ -266,15 +279,24 @@ class BlockMerger {
     }
   }
 
-  /// Places of points by the chosen placement, relative to the block's middle.
-  void place(std::span<const QefSum* const> sums, Vector3d* places) const {
-    if (input_.options.placement == AdaptiveOptions::Placement::optimal)
-      return minimisers(sums, input_.options.truncation, places);
-    for (std::size_t i = 0; i < sums.size(); ++i) places[i] = sums[i]->mass_point();
+  /// Places of points by the chosen placement, relative to the block's middle; `cells` holds the first cell of each
+  /// sum's cell or region.
+  void place(std::span<const QefSum* const> sums, const std::uint16_t* cells, Vector3d* places) {
+    if (input_.options.placement == AdaptiveOptions::Placement::average) {
+      for (std::size_t i = 0; i < sums.size(); ++i) places[i] = sums[i]->mass_point();
+      return;
+    }
+    if (input_.options.nearest == AdaptiveOptions::Nearest::mass_point)
+      return minimisers(sums, {}, input_.options.truncation, places);
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const int cell = cells[i];
+      starts_[i] = Vector3d(cell >> 6, (cell >> 3) & 7, cell & 7) - Vector3d::Constant(kMiddle);
+    }
+    minimisers(sums, {starts_.data(), sums.size()}, input_.options.truncation, places);
   }
 
   /// The level of the coarsest merged region of the cell, or kAlone.
-  int level_of(int cell) const {
+  int merged_level(int cell) const {
     for (int number = 2; number >= 0; --number)
       if (levels_[number].merged >> kRegion[number][cell] & 1) return number;
     return kAlone;
@@ -286,11 +308,11 @@ class BlockMerger {
     merged_into_.fill(kNoRegion);
     int alone = 0;
     for_each_bit(active_, [&](int cell) {
-      const int number = level_of(cell);
+      const int number = merged_level(cell);
       if (number == kAlone) {
         lone_cells_[alone] = static_cast<std::uint16_t>(cell);
         lone_sums_[alone++] = &sums_[slots_[cell]];
-        mask[cell] = static_cast<std::uint16_t>(result_.points++);
+        mask[cell] = entry(result_.points++, 0);
         return;
       }
       Level& level = levels_[number];
@@ -301,10 +323,15 @@ class BlockMerger {
         ++result_.regions[number];
         put(points[level.points[region]], level.places[region], kFirstCell[number][region], side_of(number));
       }
-      mask[cell] = level.points[region];
+      mask[cell] = entry(level.points[region], number + 1);
     });
-    place({lone_sums_.data(), static_cast<std::size_t>(alone)}, lone_places_.data());
-    for (int i = 0; i < alone; ++i) put(points[mask[lone_cells_[i]]], lone_places_[i], lone_cells_[i], 1);
+    place({lone_sums_.data(), static_cast<std::size_t>(alone)}, lone_cells_.data(), lone_places_.data());
+    for (int i = 0; i < alone; ++i) put(points[point_of(mask[lone_cells_[i]])], lone_places_[i], lone_cells_[i], 1);
+  }
+
+  /// An entry of the mask, of which point_of() and level_of() give the parts back.
+  static std::uint16_t entry(std::uint32_t point, int level) {
+    return static_cast<std::uint16_t>(point | static_cast<std::uint32_t>(level) << 9);
   }
 
   /// Writes the point of the region of that side that begins at the cell, and counts it if it is outside: nothing
@@ -312,10 +339,13 @@ class BlockMerger {
   void put(Eigen::Vector3f& out, const Vector3d& place, int cell, int side) {
     out = (place + Vector3d::Constant(kMiddle)).cast<float>();
     const int corner[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
-    bool escaped = false;
+    float escape = 0.0f;
     for (int a = 0; a < 3; ++a)
-      escaped |= out[a] < static_cast<float>(corner[a]) || out[a] > static_cast<float>(corner[a] + side);
-    result_.escaped += escaped;
+      escape = std::max({escape, static_cast<float>(corner[a]) - out[a], out[a] - static_cast<float>(corner[a] + side)});
+    if (escape == 0.0f) return;
+    const auto range = std::lower_bound(kEscapeRanges.begin(), kEscapeRanges.end(), escape) - kEscapeRanges.begin();
+    ++result_.escaped[static_cast<std::size_t>(range)];
+    result_.largest_escape = std::max(result_.largest_escape, escape);
   }
 
   /// How far the planes of merged regions are from the regions' points at most.
@@ -350,7 +380,7 @@ class BlockMerger {
   std::array<Level, 3> levels_;              ///< of regions of 2³, 4³ and 8³ cells
   std::array<std::uint16_t, 512> lone_cells_;
   std::array<const QefSum*, 512> lone_sums_;
-  std::array<Vector3d, 512> lone_places_;
+  std::array<Vector3d, 512> lone_places_, starts_;
   std::array<Plane, 3 * 9 * 9 * 8> planes_;
 };
 

@@ -41,9 +41,15 @@ struct QefSum {
   double error(const Eigen::Vector3d& x) const;
 };
 
-/// Writes for each sum the minimiser nearest to the mass point by truncated singular value decomposition (§6.2.1):
-/// singular values of A below `truncation`, at least 0.001, times the largest are set to zero. It may lie anywhere.
-/// `out` has room for as many places, in the sums' frame.
-void minimisers(std::span<const QefSum* const> sums, double truncation, Eigen::Vector3d* out);
+/// Least share of the largest singular value that minimisers() tells from zero: with a smaller `truncation` it takes
+/// this one. Sums of squares in double precision know no more of a singular value.
+inline constexpr double kLeastTruncation = 1e-6;
+
+/// Writes for each sum the minimiser nearest to its start by truncated singular value decomposition (§6.2.1): singular
+/// values of A below `truncation` times the largest are set to zero. It may lie anywhere. `starts` holds as many places
+/// as there are sums, or none for the mass points; they and `out`, which has room for as many, are in the sums' frame.
+/// Below a truncation of 0.001 single precision would not do, and each sum is solved by itself in double precision.
+void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts, double truncation,
+                Eigen::Vector3d* out);
 
 }  // namespace hermesh

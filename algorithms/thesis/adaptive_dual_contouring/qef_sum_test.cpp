@@ -30,7 +30,7 @@ struct Planes {
 Vector3d minimiser(const QefSum& sum, double truncation) {
   const QefSum* const one[] = {&sum};
   Vector3d result;
-  minimisers(one, truncation, &result);
+  minimisers(one, {}, truncation, &result);
   return result;
 }
 
@@ -53,7 +53,7 @@ TEST(QefSum, TheSameMinimisersAndErrorsAsInDoublePrecision) {
     for (int i = 0; i < 500; ++i) cases.push_back(random_planes(random, spread));
     for (const Planes& planes : cases) sums.push_back(&planes.sum);
     std::vector<Vector3d> places(cases.size());
-    minimisers(sums, 0.1, places.data());
+    minimisers(sums, {}, 0.1, places.data());
     for (std::size_t i = 0; i < cases.size(); ++i) {
       // A singular value next to the limit may fall on either side of it.
       const Vector3d a = cases[i].slow.minimiser(0.0999), b = cases[i].slow.minimiser(0.1001);
@@ -70,7 +70,7 @@ TEST(QefSum, ALanesResultDoesNotDependOnTheOthers) {
   for (int i = 0; i < 37; ++i) cases.push_back(random_planes(random, 0.5f));
   for (const Planes& planes : cases) sums.push_back(&planes.sum);
   std::vector<Vector3d> places(cases.size());
-  minimisers(sums, 0.1, places.data());
+  minimisers(sums, {}, 0.1, places.data());
   for (std::size_t i = 0; i < cases.size(); ++i) EXPECT_EQ(places[i], minimiser(cases[i].sum, 0.1));
 }
 
@@ -83,7 +83,7 @@ TEST(QefSum, MinimisersAreTheSameAtAnyLevelOfVectorCode) {
   std::vector<std::vector<Vector3d>> places;
   for (const SimdLevel level : available_simd_levels()) {
     setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);
-    minimisers(sums, 0.1, places.emplace_back(cases.size()).data());
+    minimisers(sums, {}, 0.1, places.emplace_back(cases.size()).data());
     EXPECT_EQ(places.front(), places.back()) << name(level);
   }
   unsetenv("HERMESH_SIMD");
@@ -94,6 +94,42 @@ TEST(QefSum, ThreePlanesMeetInTheirCorner) {
   Planes planes;
   for (int axis = 0; axis < 3; ++axis) planes.add(corner + 0.5f * Vector3f::Unit((axis + 1) % 3), Vector3f::Unit(axis));
   EXPECT_LT((minimiser(planes.sum, 0.1) - corner.cast<double>()).norm(), 1e-6);
+}
+
+TEST(QefSum, OfALineOfMinimisersTheNearestToTheStartIsTaken) {
+  // Two planes, x = 1 and y = 2, meet in a line along z; the crossings' mean has z = 1.5.
+  Planes planes;
+  planes.add({1.0f, 0.5f, 1.0f}, {1.0f, 0.0f, 0.0f});
+  planes.add({0.5f, 2.0f, 2.0f}, {0.0f, 1.0f, 0.0f});
+  const QefSum* const one[] = {&planes.sum};
+  const Vector3d start(-3.0, 0.25, -4.0);
+  for (const double truncation : {0.1, 0.0}) {
+    EXPECT_LT((minimiser(planes.sum, truncation) - Vector3d(1.0, 2.0, 1.5)).norm(), 1e-6) << truncation;
+    Vector3d place;
+    minimisers(one, {&start, 1}, truncation, &place);
+    EXPECT_LT((place - Vector3d(1.0, 2.0, -4.0)).norm(), 1e-6) << truncation;
+  }
+}
+
+TEST(QefSum, WithoutTruncationNearlyParallelPlanesMeetWhereTheyDo) {
+  // The planes z = 0.01 x and z = 0.2 − 0.01 x meet at x = 10: a truncation of 0.1 stays at the mass point.
+  const float c = 1.0f / std::sqrt(1.0f + 1e-4f), s = 0.01f * c;
+  Planes planes;
+  planes.add({0.0f, 0.0f, 0.0f}, {-s, 0.0f, c});
+  planes.add({0.0f, 0.0f, 0.2f}, {s, 0.0f, c});
+  // Along x the two normals have the singular value √2·0.01, the others √2 and none at all.
+  EXPECT_NEAR(minimiser(planes.sum, 0.1)[0], 0.0, 1e-3);
+  EXPECT_LT((minimiser(planes.sum, 0.0) - Vector3d(10.0, 0.0, 0.1)).norm(), 1e-3);
+  // The least truncation keeps a direction without a singular value where it is, so that no place is infinite.
+  EXPECT_EQ(minimiser(planes.sum, 0.0), minimiser(planes.sum, kLeastTruncation));
+}
+
+TEST(QefSum, BothPrecisionsMeetAtTheirBorder) {
+  std::mt19937 random(5);
+  for (int i = 0; i < 200; ++i) {
+    const Planes planes = random_planes(random, 1.0f);
+    EXPECT_LT((minimiser(planes.sum, 0.001) - minimiser(planes.sum, 0.000999)).norm(), 1e-4);
+  }
 }
 
 TEST(QefSum, SumsAddUp) {
