@@ -74,6 +74,20 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
   return hermite;
 }
 
+ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string& variant) {
+  Represented figures;
+  ThesisDense dense = [&] {
+    const FloatHermite hermite = sample(input, variant);
+    Stage stage(input.context, "store Hermite data");
+    figures.crossings = hermite.crossings.size();
+    return to_dense<ThesisVoxel>(hermite, input.context);
+  }();
+  if (input.written_in_single) about_world_origin(dense.placement);
+  figures.bytes = dense.memory_bytes();
+  report_size(figures, input.level_set, input.context);
+  return dense;
+}
+
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals) {
   const Representation representation = parse_representation(input.options.text("representation"));
   // Directed distances are offsets alone, which is all that average placement reads.

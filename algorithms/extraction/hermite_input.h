@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "algorithms/core/variant.h"
+#include "algorithms/hermite/dense_hermite.h"
 #include "algorithms/hermite/representation.h"
 
 namespace hermesh {
@@ -22,6 +23,11 @@ const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std:
 /// set. Its figures go to the run's context. None with another representation.
 /// @throws Error for exact data where there are no polygons at the isovalue.
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
+
+/// Samples as those options say and packs the data into the thesis's voxels, whatever `representation` is. The bytes go
+/// to the run's context as figures, but for the crossings that are lost: who reads the voxels counts them.
+/// @throws Error for exact data where there are no polygons at the isovalue.
+ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string& variant);
 
 /// Samples as those options say and passes the data through the representation; its figures go to the run's
 /// context, and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the

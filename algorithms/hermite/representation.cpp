@@ -33,7 +33,7 @@ Representation parse_representation(const std::string& name) {
               "'; there are sparse-float, sparse, dense-float, fixed, thesis and directed");
 }
 
-void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context) {
+void report_size(const Represented& data, const LevelSet& level_set, RunContext& context) {
   // Figures end up in tables; a ratio without a denominator is left out rather than shown as infinite.
   const auto bytes = static_cast<double>(data.bytes);
   context.figure("hermite_bytes", bytes);
@@ -42,6 +42,10 @@ void report_figures(const Represented& data, const LevelSet& level_set, RunConte
   // The band is the measure by which dense voxels are paid for, the crossings that of the sparse ones.
   const std::size_t voxels = level_set.active_voxels();
   if (voxels > 0) context.figure("hermite_bytes_per_voxel", bytes / static_cast<double>(voxels));
+}
+
+void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context) {
+  report_size(data, level_set, context);
   // Losses are a figure for tables and a note for whoever reads the run.
   context.figure("lost_crossings", static_cast<double>(data.lost));
   if (data.lost > 0)

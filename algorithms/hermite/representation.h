@@ -30,7 +30,9 @@ struct Represented {
 };
 
 /// Adds figures to the run: the bytes of the representation, in all, for each crossing and for each active voxel of
-/// the level set, and what it lost.
+/// the level set.
+void report_size(const Represented& data, const LevelSet& level_set, RunContext& context);
+/// Adds those figures, and what the representation lost, with a note where it lost something.
 void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context);
 
 /// Stores the data in a representation, with normals in `code` where it packs them, and reads them again.

@@ -205,7 +205,7 @@ class Digests {
         all.push_back({{"flatness", "0.05"}});
       }
       if (extractor.name == "adaptive-dual-contouring")
-        all.push_back({{"representation", "thesis"}, {"threshold", "1"}});
+        all.push_back({{"representation", "sparse-float"}, {"threshold", "1"}});
       for (const Given& given : all)
         row("mesh: " + extractor.name + text(given), [&](RunContext& child) {
           const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, extractor.name, given)};

@@ -52,7 +52,7 @@ struct Contender {
   GivenOptions options;
 };
 const std::vector<Contender>& others() {
-  static const std::vector<Contender> table = {{"adaptive-dual-contouring", {{"threshold", "0.1"}}},
+  static const std::vector<Contender> table = {{"adaptive-dual-contouring", {{"threshold", "0.1"}, {"representation", "sparse-float"}}},
                                                {"dual-contouring", {}},
                                                {"marching-cubes", {}},
                                                {"openvdb", {{"adaptivity", "0.1"}}}};

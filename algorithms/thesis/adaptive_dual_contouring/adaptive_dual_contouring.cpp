@@ -23,13 +23,13 @@ struct MaskGrid {
 /// The points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
 class CellsAround {
  public:
-  CellsAround(const HermiteView& view, const MaskGrid& mask, std::size_t block, int axis)
+  CellsAround(const HermiteView::Blocks& blocks, const MaskGrid& mask, std::size_t block, int axis)
       : numbers_(mask.numbers.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
     for (int side = 0; side < 4; ++side) {
       int d[3] = {0, 0, 0};
       d[(axis + 1) % 3] = -(side & 1);
       d[(axis + 2) % 3] = -(side >> 1);
-      const std::int64_t there = view.blocks()[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
+      const std::int64_t there = blocks[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
       // Coordinate −1 is 7 there. A block that is not there has no cell of a crossing edge, and is not asked for.
       cell_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
       first_[side] = there < 0 ? 0 : static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(there)]);
@@ -61,20 +61,20 @@ class CellsAround {
 /// One run of adaptive_dual_contouring(), stage by stage.
 class Contourer {
  public:
-  Contourer(const FloatHermite& hermite, const AdaptiveOptions& options, const AdaptivityField* field,
-            RunContext& context)
+  Contourer(const EdgeSource& edges, const IndexToWorld& placement, const AdaptiveOptions& options,
+            const AdaptivityField* field, RunContext& context)
       : context_(context),
-        hermite_(hermite),
+        edges_(edges),
+        placement_(placement),
         options_(options),
-        field_(field, hermite.placement),
-        view_(make_view(hermite, context)),
-        input_{hermite, view_, options_, field_},
-        blocks_(view_.blocks().size()),
+        field_(field, placement),
+        input_{edges, options_, field_},
+        blocks_(edges.blocks().size()),
         groups_((blocks_ + kGroup - 1) / kGroup) {}
 
   PolygonMesh run() {
     PolygonMesh mesh;
-    mesh.origin = hermite_.placement.origin;
+    mesh.origin = placement_.origin;
     merge();
     number_points(mesh);
     connect(mesh);
@@ -88,13 +88,6 @@ class Contourer {
  private:
   /// Blocks of a task. Groups depend on the data alone, and so does the order of points and polygons.
   static constexpr std::size_t kGroup = 64;
-  using View = decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>()));
-
-  /// Blocks and their neighbours; every cell with a crossing edge has one.
-  static View make_view(const FloatHermite& hermite, RunContext& context) {
-    Stage stage(context, "blocks");
-    return view_of(hermite, context);
-  }
 
   /// Merges the cells of every block by itself, as §6.4 does. Groups of blocks keep their points until it is known
   /// how many there are before them: far fewer than active cells.
@@ -122,15 +115,14 @@ class Contourer {
     mask_.first.resize(blocks_);
     for (std::size_t b = 0; b < blocks_; ++b) mask_.first[b] = results_[b].points;
     mesh.points.resize(exclusive_scan(mask_.first, "points"));
-    const IndexToWorld& placement = hermite_.placement;
     parallel_blocks(groups_, context_, [&](std::size_t g) {
       // A group's points are in the order of its blocks, so that one pointer walks over all of them.
       const Eigen::Vector3f* place = places_[g].data();
       for_each_block(g, [&](std::size_t b) {
         Eigen::Vector3d lower;
-        for (int a = 0; a < 3; ++a) lower[a] = view_.blocks()[b].lower[a] - placement.base[a];
+        for (int a = 0; a < 3; ++a) lower[a] = edges_.blocks()[b].lower[a] - placement_.base[a];
         for (std::uint32_t i = 0; i < results_[b].points; ++i)
-          mesh.points[mask_.first[b] + i] = placement.local(lower + (place++)->cast<double>()).cast<float>();
+          mesh.points[mask_.first[b] + i] = placement_.local(lower + (place++)->cast<double>()).cast<float>();
       });
     });
     places_ = {};
@@ -171,11 +163,11 @@ class Contourer {
   /// Calls f(points, 3 or 4, difference of level) for each polygon of the block's crossing edges (§6.5).
   template <class F>
   void for_each_polygon(std::size_t b, F&& f) const {
-    const HermiteView::Block& block = view_.blocks()[b];
-    const bool mirrors = hermite_.placement.mirrors();
+    const HermiteView::Block& block = edges_.blocks()[b];
+    const bool mirrors = placement_.mirrors();
     for (int axis = 0; axis < 3; ++axis) {
       if (!any(block.crossing[axis])) continue;
-      const CellsAround around(view_, mask_, b, axis);
+      const CellsAround around(edges_.blocks(), mask_, b, axis);
       for_each_bit(block.crossing[axis], [&](int sample) {
         Quad polygon;
         int corners = 0, step = 0;
@@ -239,10 +231,10 @@ class Contourer {
   }
 
   RunContext& context_;
-  const FloatHermite& hermite_;
+  const EdgeSource& edges_;
+  const IndexToWorld& placement_;
   const AdaptiveOptions options_;
   const FieldEvaluator field_;
-  const View view_;
   const RegionInput input_;
   const std::size_t blocks_, groups_;
   /// Points of each group, those of its blocks one after another: voxels from the block's first sample.
@@ -266,7 +258,29 @@ AdaptiveOptions::TopologyTests topology_tests_of(const std::string& name) {
 
 PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context) {
-  return Contourer(hermite, options, field, context).run();
+  const SparseEdges edges = [&] {
+    Stage stage(context, "blocks");
+    return SparseEdges(hermite, context);
+  }();
+  return Contourer(edges, hermite.placement, options, field, context).run();
+}
+
+PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveOptions& options,
+                                     const AdaptivityField* field, RunContext& context) {
+  const PackedEdges edges = [&] {
+    Stage stage(context, "blocks");
+    return PackedEdges(hermite, context);
+  }();
+  PolygonMesh mesh = Contourer(edges, hermite.placement, options, field, context).run();
+  // A region may have lost all edges that lead out of it, and its point is then no polygon's.
+  if (edges.lost() + edges.needless() > 0) drop_unused_points(mesh);
+  context.figure("lost_crossings", static_cast<double>(edges.lost()));
+  context.figure("needless_crossings", static_cast<double>(edges.needless()));
+  if (edges.lost() > 0)
+    context.note(std::to_string(edges.lost()) + " of " + std::to_string(edges.lost() + edges.tagged() - edges.needless()) +
+                 " edge crossings were lost by the 10 bytes of §4.2 and leave holes; -o lost_crossings=repaired closes "
+                 "them, other representations lose none");
+  return mesh;
 }
 
 PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
@@ -276,6 +290,10 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
   options.truncation = input.options.number("truncation");
   if (input.options.is("minimiser", "corner")) options.nearest = AdaptiveOptions::Nearest::corner;
   options.topology_tests = topology_tests_of(input.options.text("topology_tests"));
+  // As printed: what is meshed are the 10 bytes themselves, with the edges that they say have data.
+  if (input.options.is("representation", "thesis") && input.options.is("lost_crossings", "kept"))
+    return adaptive_dual_contouring(thesis_hermite_input(input, "adaptive-dual-contouring"), options, input.field,
+                                    input.context);
   // Means of crossings that are never merged need no planes.
   const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
   const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
@@ -317,8 +335,17 @@ std::vector<OptionSpec> adaptive_dual_contouring_options() {
        .choices = {"both", "table", "signs", "none"}}};
   // The Hermite data has options of its own: where the crossings come from, and how they are stored
   // (hermite_input.h).
-  const std::vector<OptionSpec> of_hermite = hermite_options();
+  // What the print says is the default here: its own 10 bytes.
+  std::vector<OptionSpec> of_hermite = hermite_options();
+  for (OptionSpec& option : of_hermite)
+    if (option.name == "representation") option.fallback = "thesis";
   options.insert(options.end(), of_hermite.begin(), of_hermite.end());
+  options.push_back({.name = "lost_crossings",
+                     .fallback = "kept",
+                     .help = "crossings along x and y whose normal has the code 0, which the print takes for none: 'kept' "
+                             "lost, so that the mesh has holes there, or 'repaired' by the middle of their edge",
+                     .choices = {"kept", "repaired"},
+                     .only_with = {"representation=thesis"}});
   return options;
 }
 

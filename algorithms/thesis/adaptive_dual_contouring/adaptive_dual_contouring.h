@@ -2,12 +2,15 @@
 // block, in parallel and without an octree. Nothing is repaired.
 //
 // Faithful, by section:
+//   6.1    the Hermite data are the 10 bytes of §4.2 unless an option says otherwise, and are meshed as they are packed:
+//          where they lose a crossing (trap T2) there is a hole. `lost_crossings = repaired` puts the middle of the edge
+//          in its place, and other representations lose none; then the mesh is closed and oriented.
 //   6.2    the QEF sums squared distances to the tangent planes of all crossings; its minimiser comes from a truncated
 //          singular value decomposition and is not held in its region (trap T7; the figures `escaped…` count).
 //   6.3    both topology tests, the first by a table. They gate merging alone: a cell with several sheets still has
 //          one point, so that edges and points may be non-manifold even at threshold 0 (trap T5). Each can be switched
 //          off, to see what it is for.
-//   6.4    steps 1 to 4: level by level, a region is tried only if all its active cells are mergeable, and its cells
+//   6.4    steps 1 to 4: active are the cells around edges tagged with data; level by level, a region is tried only if all its active cells are mergeable, and its cells
 //          are no longer mergeable once it fails; every block by itself; a mask grid of integers, which hold the
 //          number of the cell's point in the end: 16 bits that count within the block, where the thesis has 32.
 //          (While a block is at work its levels and flags are one bit a region: nobody else reads them.)
@@ -42,7 +45,7 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/variant.h"
 #include "algorithms/extraction/adaptivity_field.h"
-#include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/hermite/dense_hermite.h"
 
 namespace hermesh {
 
@@ -94,6 +97,13 @@ inline constexpr std::array<float, 6> kEscapeRanges{0.01f, 0.1f, 0.5f, 1.0f, 2.0
 ///     coarsest and the finest region around their edge (§6.5, fig. 6.4); a lone cell has level 0.
 /// @throws Error for a mesh of more than 2³² points or polygons, and as FieldEvaluator does; Cancelled.
 PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
+                                     const AdaptivityField* field, RunContext& context);
+
+/// Meshes the thesis's 10 bytes as they are packed (§6.1): the edges that have data are those whose voxel says so. So
+/// the mesh has holes where a crossing is lost (trap T2), and polygons inside or outside of the solid where eq. 7.1 left
+/// data between samples of one sign (trap T11): it is neither closed nor oriented. Otherwise as above. Further figures
+/// are `lost_crossings` and `needless_crossings`, those two in this order; a note says what is lost.
+PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
 /// The variant: meshes a level set by way of Hermite data, with the input's options.

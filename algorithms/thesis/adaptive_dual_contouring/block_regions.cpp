@@ -18,28 +18,6 @@ constexpr std::uint8_t kNoRegion = 255;
 constexpr float kMiddle =
     4.0f;  ///< planes and points are relative to the block's middle, for the sake of their squares
 
-/// Finds the signs of the block and its upper neighbours, also of those that own no crossing edge: none of their
-/// edges changes the sign, so all their samples have that of the sample before them.
-std::array<SignLattice::Part, 8> parts_of(const RegionInput& input, const HermiteView::Block& block) {
-  std::array<SignLattice::Part, 8> parts;
-  std::array<std::int32_t, 8> leaf;
-  for (int part = 0; part < 8; ++part) {
-    const std::int32_t there = block.neighbours[neighbour_slot(part >> 2, (part >> 1) & 1, part & 1)];
-    leaf[part] = there >= 0 ? input.view.blocks()[there].leaf : -1;
-    if (leaf[part] >= 0) {
-      parts[part].inside = &input.view.blocks()[there].inside;
-    } else if (part == 0) {
-      parts[part].uniform = input.hermite.sign_without_leaf(block.lower);
-    } else {
-      // One step down from the part, along the lowest of its axes; that part has been looked at already.
-      const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
-      parts[part].uniform =
-          leaf[before] >= 0 ? input.hermite.leaves[leaf[before]].beyond[axis] & 1 : parts[before].uniform;
-    }
-  }
-  return parts;
-}
-
 /// A crossing as the QEF takes it, relative to the block's middle, in voxels.
 struct Plane {
   float point[3], normal[3];
@@ -58,43 +36,35 @@ Plane plane_of(const EdgeCrossing& crossing, int axis, const int (&at)[3]) {
   return plane;
 }
 
-/// Collects the crossing edges along an axis that the block at (d[0], d[1], d[2]), each 0 or 1, owns and the cells of
-/// the merged block share; returns the end.
-Plane* gather_owned(const RegionInput& input, const HermiteView::Block& owner, int axis, const int (&d)[3],
-                    Plane* plane) {
+/// Collects the tagged edges along an axis that a block owns and the cells of the merged block share; the owner lies
+/// (d[0], d[1], d[2]) blocks above the merged one, each 0 or 1. Returns the end.
+Plane* gather_owned(const EdgeSource& edges, std::int32_t owner, int axis, const int (&d)[3], Plane* plane) {
   // Of an upper neighbour the first layers count.
   const std::uint64_t layer = first_layers(d[1], d[2]);
-  std::uint64_t wanted = 0;
-  for (int x = 0; x < (d[0] ? 1 : 8); ++x) wanted |= owner.crossing[axis][x];
-  if (!(wanted & layer)) return plane;
-  // Crossings are stored by axis and then by sample, so that those of a layer are found by counting bits.
-  const EdgeCrossing* next = input.hermite.crossings.data() + input.hermite.leaves[owner.leaf].first;
-  for (int a = 0; a < axis; ++a) next += count(owner.crossing[a]);
-  for (int x = 0; x < (d[0] ? 1 : 8); ++x) {
-    const std::uint64_t word = owner.crossing[axis][x];
-    if (!(word & layer)) {
-      next += std::popcount(word);
-      continue;
-    }
-    for (std::uint64_t bits = word; bits != 0; bits &= bits - 1, ++next) {
-      const int bit = std::countr_zero(bits);
-      if (layer >> bit & 1)
-        *plane++ = plane_of(*next, axis, {x + 8 * d[0], (bit >> 3) + 8 * d[1], (bit & 7) + 8 * d[2]});
-    }
-  }
+  BlockMask wanted{};
+  std::uint64_t some = 0;
+  for (int x = 0; x < (d[0] ? 1 : 8); ++x) some |= wanted[x] = edges.blocks()[owner].crossing[axis][x] & layer;
+  if (some == 0) return plane;
+  std::array<EdgeCrossing, 512> data;
+  edges.read(owner, axis, wanted, data.data());
+  const EdgeCrossing* next = data.data();
+  for_each_bit(wanted, [&](int sample) {
+    *plane++ = plane_of(*next++, axis, {(sample >> 6) + 8 * d[0], (sample >> 3 & 7) + 8 * d[1], (sample & 7) + 8 * d[2]});
+  });
   return plane;
 }
 
-/// Collects every crossing edge of the block's cells; returns their number.
-int gather_planes(const RegionInput& input, const HermiteView::Block& block, Plane* planes) {
+/// Collects every tagged edge of the block's cells; returns their number.
+int gather_planes(const EdgeSource& edges, const HermiteView::Block& block, Plane* planes) {
   Plane* end = planes;
   for (int axis = 0; axis < 3; ++axis)
     for (int part = 0; part < 8; ++part) {
       const int d[3] = {part >> 2, (part >> 1) & 1, part & 1};
       const std::int32_t number = block.neighbours[neighbour_slot(d[0], d[1], d[2])];
-      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells.
-      if (d[axis] || number < 0 || input.view.blocks()[number].leaf < 0) continue;
-      end = gather_owned(input, input.view.blocks()[number], axis, d, end);
+      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells. A block
+      // without a leaf owns none.
+      if (d[axis] || number < 0 || edges.blocks()[number].leaf < 0) continue;
+      end = gather_owned(edges, number, axis, d, end);
     }
   return static_cast<int>(end - planes);
 }
@@ -149,9 +119,12 @@ class BlockMerger {
  public:
   BlockMerger(const RegionInput& input, std::int32_t block)
       : input_(input),
-        block_(input.view.blocks()[block]),
-        lattice_(parts_of(input, block_)),
-        active_(lattice_.active_cells()) {
+        block_(input.edges.blocks()[block]),
+        lattice_(input.edges.signs(block)),
+        plane_count_(gather_planes(input.edges, block_, planes_.data())) {
+    // Step 1 of §6.4: the mask holds the cells around tagged edges.
+    for (int i = 0; i < plane_count_; ++i)
+      for_each_cell_around(planes_[i], [&](int cell) { active_[cell >> 6] |= std::uint64_t{1} << (cell & 63); });
     if (input.field.leaves_out_outside()) active_ = input.field.inside(block_.lower, active_);
   }
 
@@ -172,7 +145,7 @@ class BlockMerger {
   }
 
  private:
-  /// The QEF of each active cell: every crossing goes to the up to four cells around its edge.
+  /// The QEF of each active cell: every tagged edge goes to the up to four cells around its edge.
   void sum_cells() {
     slots_.fill(kNoSlot);  // what lies in cells that get no point goes to a sum of its own
     for_each_bit(active_, [&](int cell) {
@@ -180,7 +153,6 @@ class BlockMerger {
       slots_[cell] = static_cast<std::uint16_t>(cells_++);
     });
     sums_[kNoSlot].clear();
-    plane_count_ = gather_planes(input_, block_, planes_.data());
     for (int i = 0; i < plane_count_; ++i) {
       const QefSum sum = QefSum::of_plane(planes_[i].point, planes_[i].normal);
       for_each_cell_around(planes_[i], [&](int cell) { sums_[slots_[cell]] += sum; });
@@ -371,9 +343,11 @@ class BlockMerger {
   const RegionInput& input_;
   const HermiteView::Block& block_;
   const SignLattice lattice_;
-  BlockMask active_;
+  std::array<Plane, 3 * 9 * 9 * 8> planes_;
+  const int plane_count_;
+  BlockMask active_{};
   BlockResult result_;
-  int cells_ = 0, plane_count_ = 0;
+  int cells_ = 0;
   std::array<std::uint16_t, 512> slots_;  ///< where the sum of each cell is
   std::array<QefSum, 513> sums_;
   std::array<std::uint8_t, 512> merged_into_;  ///< region of each cell, plus 64 times its level
@@ -381,7 +355,6 @@ class BlockMerger {
   std::array<std::uint16_t, 512> lone_cells_;
   std::array<const QefSum*, 512> lone_sums_;
   std::array<Vector3d, 512> lone_places_, starts_;
-  std::array<Plane, 3 * 9 * 9 * 8> planes_;
 };
 
 }  // namespace

@@ -5,16 +5,15 @@
 #include <cstdint>
 
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/thesis/adaptive_dual_contouring/edge_source.h"
 #include "algorithms/thesis/adaptive_dual_contouring/qef_sum.h"
 #include "algorithms/thesis/adaptive_dual_contouring/region_topology.h"
-#include "algorithms/hermite/hermite_view.h"
 
 namespace hermesh {
 
 /// Hermite data as blocks, with what decides about regions.
 struct RegionInput {
-  const FloatHermite& hermite;
-  const HermiteView& view;  ///< of the same data
+  const EdgeSource& edges;
   const AdaptiveOptions& options;
   const FieldEvaluator& field;
 };
@@ -36,8 +35,8 @@ struct BlockResult {
 };
 
 /// Merges the cells of one block. Writes for each active one of the 512 cells its point and level to `mask`, whose other entries stay as they are, and that many points, voxels from the block's first sample,
-/// to `points`, which has room for 512. Cells are active whose corners differ in sign, less those that the field
-/// leaves out. Blocks do not depend on each other, so that any thread may merge any.
+/// to `points`, which has room for 512. Cells are active that lie around a tagged edge, less those that the field leaves
+/// out. Blocks do not depend on each other, so that any thread may merge any.
 BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points);
 
 }  // namespace hermesh

@@ -94,24 +94,6 @@ class SignLattice {
       }
   }
 
-  /// The cells whose corners differ in sign, by their first samples.
-  BlockMask active_cells() const {
-    BlockMask active;
-    for (int x = 0; x < 8; ++x) {
-      std::uint64_t word = 0;
-      std::uint32_t some = rows_[x][0] | rows_[x + 1][0], every = rows_[x][0] & rows_[x + 1][0];
-      for (int y = 0; y < 8; ++y) {
-        const std::uint32_t next_some = rows_[x][y + 1] | rows_[x + 1][y + 1];
-        const std::uint32_t next_every = rows_[x][y + 1] & rows_[x + 1][y + 1];
-        const std::uint32_t any = some | next_some, all = every & next_every;
-        word |= std::uint64_t{((any | any >> 1) & ~(all & all >> 1)) & 0xff} << 8 * y;
-        some = next_some, every = next_every;
-      }
-      active[x] = word;
-    }
-    return active;
-  }
-
   /// The signs at the 27 samples of the region of `side` 2, 4 or 8 cells whose first sample is (x, y, z).
   region_topology::Signs27 around(int x, int y, int z, int side) const {
     const int half = side / 2;
