@@ -61,26 +61,10 @@ std::span<const Voxelizer> our_voxelizers() {
       {.name = "thesis",
        .summary =
            "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
-       .options =
-           {{.name = "sign_angle",
-             .fallback = "90",
-             .help =
-                 "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
-                 "larger makes more outside",
-             .minimum = 1e-6,
-             .maximum = 180.0},
-            {.name = "shuffle_seed",
-             .fallback = "0",
-             .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
-             .maximum = 1e15}},
+       .options = thesis_voxelizer_options(),
        .voxelize =
-           // The options of chapter 5 are a struct of their own; a seed is a whole number of up to 1e15, which a
-           // double holds exactly.
            [](const VoxelizationInput& input) {
-             ThesisVoxelizerOptions options;
-             options.sign_angle = input.options.number("sign_angle");
-             options.shuffle_seed = std::uint64_t(input.options.number("shuffle_seed"));
-             return thesis_voxelizer(input, options);
+             return thesis_voxelizer(input, thesis_voxelizer_options(input.options));
            }},
   };
   return table;

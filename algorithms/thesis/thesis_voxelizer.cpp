@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <string>
 #include <utility>
@@ -12,30 +13,49 @@
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/thesis/thesis_stages.h"
+#include "algorithms/thesis/thesis_volumes.h"
 
 namespace hermesh {
 namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
+using IdLeaf = openvdb::Int32Tree::LeafNodeType;
 
-/// Shuffles by Fisher & Yates, spelled out because std::shuffle gives another order on another standard library.
-void shuffle(std::vector<Triangle>& triangles, std::uint64_t seed, const RunContext& context) {
+/// The numbers of triangles in the mesh, by those in the local copy.
+struct Numbers {
+  std::vector<std::uint32_t> shuffled;  ///< none where both are the same
+  std::int32_t operator()(std::uint32_t id) const { return std::int32_t(shuffled.empty() ? id : shuffled[id]); }
+};
+
+/// Numbers from 0 on, shuffled by Fisher & Yates, spelled out because std::shuffle gives another order on another
+/// standard library.
+std::vector<std::uint32_t> shuffled(std::size_t count, std::uint64_t seed, const RunContext& context) {
+  std::vector<std::uint32_t> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0u);
   std::mt19937_64 random(seed);
-  for (std::size_t i = triangles.size(); i > 1; --i) {
+  for (std::size_t i = count; i > 1; --i) {
     if (i % 65536 == 0) context.check();
-    std::swap(triangles[i - 1], triangles[random() % i]);
+    std::swap(numbers[i - 1], numbers[random() % i]);
   }
+  return numbers;
 }
 
-/// Stage 1 of §5.1: triangles in the grid's local space, whose unit is a voxel and whose origin the mesh's.
-thesis::Triangles local_copy(const VoxelizationInput& input, std::uint64_t shuffle_seed) {
+/// Stage 1 of §5.1: triangles in the grid's local space, whose unit is a voxel and whose origin the mesh's. `numbers`
+/// are those of the mesh in the order of the triangles, or none where the order is the mesh's.
+thesis::Triangles local_copy(const VoxelizationInput& input, std::uint64_t shuffle_seed,
+                             std::vector<std::uint32_t>& numbers) {
   const Stage stage(input.context, "local copy");
   thesis::Triangles result;
   result.points.reserve(input.mesh.points.size());
   for (const Eigen::Vector3f& point : input.mesh.points)
     result.points.push_back(point.cast<double>() / input.voxel_size);
   result.corners = triangulated(input.mesh);
-  if (shuffle_seed != 0) shuffle(result.corners, shuffle_seed, input.context);
+  if (shuffle_seed == 0) return result;
+  numbers = shuffled(result.corners.size(), shuffle_seed, input.context);
+  std::vector<Triangle> corners;
+  corners.reserve(numbers.size());
+  for (const std::uint32_t number : numbers) corners.push_back(result.corners[number]);
+  result.corners = std::move(corners);
   return result;
 }
 
@@ -44,46 +64,70 @@ struct Widths {
   double exterior, interior;
 };
 
-/// A leaf of the band's distances with their signs, or null when no voxel is within its side's band. Inactive values
-/// are for signedFloodFill to set.
-std::unique_ptr<Leaf> make_leaf(const thesis::BandBlock& block, const Widths& widths, double voxel_size) {
-  auto leaf = std::make_unique<Leaf>(openvdb::Coord(block.lower[0], block.lower[1], block.lower[2]),
-                                     float(widths.exterior * voxel_size));
+/// The leaves of one block, both null when no voxel is within its side's band.
+struct Leaves {
+  std::unique_ptr<Leaf> distance;
+  std::unique_ptr<IdLeaf> nearest;
+};
+
+/// Makes leaves of the band's distances with their signs and, where `numbers` says so, of their triangles. Inactive
+/// values are for signedFloodFill to set.
+Leaves make_leaves(const thesis::BandBlock& block, const Widths& widths, double voxel_size, const Numbers* numbers) {
+  const openvdb::Coord lower(block.lower[0], block.lower[1], block.lower[2]);
+  Leaves leaves{std::make_unique<Leaf>(lower, float(widths.exterior * voxel_size)),
+                numbers ? std::make_unique<IdLeaf>(lower, -1) : nullptr};
   for_each_bit(block.set, [&](int sample) {
     const bool outside = test(block.outside, sample);
     // Until here distances are squared, in voxels, and have no sign; the thesis stores negative ones.
     const double distance = std::sqrt(double(block.squared_distance[sample]));
     if (!(distance < (outside ? widths.exterior : widths.interior))) return;
-    leaf->setValueOn(openvdb::Index(sample), float((outside ? distance : -distance) * voxel_size));
+    leaves.distance->setValueOn(openvdb::Index(sample), float((outside ? distance : -distance) * voxel_size));
+    if (numbers) leaves.nearest->setValueOn(openvdb::Index(sample), (*numbers)(block.triangle[sample]));
   });
-  return leaf->isEmpty() ? nullptr : std::move(leaf);
+  if (leaves.distance->isEmpty()) return {};
+  return leaves;
 }
 
-/// The grid in world units. It frees the band block by block, so that the two are never whole at a time.
-openvdb::FloatGrid::Ptr make_grid(thesis::Band& band, const Widths& widths, const VoxelizationInput& input) {
-  const Stage stage(input.context, "level set");
-  const auto outside = float(widths.exterior * input.voxel_size),
-             inside = float(-widths.interior * input.voxel_size);
-  const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(outside);
-  std::vector<std::unique_ptr<Leaf>> leaves(band.size());
-  parallel_blocks(leaves.size(), input.context, [&](std::size_t i) {
-    leaves[i] = make_leaf(band.block(std::int32_t(i)), widths, input.voxel_size);
-    // Each block is one thread's; leaves are handed to the tree by one thread, in the order of the blocks.
-    band.release(std::int32_t(i));
-  });
-  for (std::unique_ptr<Leaf>& leaf : leaves)
-    if (leaf) grid->tree().addLeaf(leaf.release());
-  input.context.check();
-  openvdb::tools::signedFloodFillWithValues(grid->tree(), outside, inside);
-
-  // Voxel (0, 0, 0) is at the mesh's origin, as in the local copy of the points.
+/// Names the grid and puts voxel (0, 0, 0) at the mesh's origin, as in the local copy of the points.
+void place(openvdb::GridBase& grid, const char* name, const VoxelizationInput& input) {
   const auto transform = openvdb::math::Transform::createLinearTransform(input.voxel_size);
   const Eigen::Vector3d& origin = input.mesh.origin;
   transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
-  grid->setTransform(transform);
-  grid->setName("sdf");
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  return grid;
+  grid.setTransform(transform);
+  grid.setName(name);
+}
+
+/// The grids in world units. It frees the band block by block, so that it and they are never whole at a time.
+Voxelization make_grids(thesis::Band& band, const Widths& widths, const VoxelizationInput& input, bool is_signed,
+                        const Numbers* numbers) {
+  const Stage stage(input.context, "level set");
+  const auto outside = float(widths.exterior * input.voxel_size),
+             inside = float(-widths.interior * input.voxel_size);
+  Voxelization result{openvdb::FloatGrid::create(outside), is_signed,
+                      numbers ? openvdb::Int32Grid::create(-1) : nullptr};
+  std::vector<Leaves> leaves(band.size());
+  parallel_blocks(leaves.size(), input.context, [&](std::size_t i) {
+    leaves[i] = make_leaves(band.block(std::int32_t(i)), widths, input.voxel_size, numbers);
+    // Each block is one thread's; leaves are handed to the tree by one thread, in the order of the blocks.
+    band.release(std::int32_t(i));
+  });
+  for (Leaves& leaf : leaves) {
+    if (leaf.distance) result.distance->tree().addLeaf(leaf.distance.release());
+    if (leaf.nearest) result.nearest->tree().addLeaf(leaf.nearest.release());
+  }
+  input.context.check();
+  // Without signs what is beyond the band is the background, on either side.
+  if (is_signed) openvdb::tools::signedFloodFillWithValues(result.distance->tree(), outside, inside);
+  place(*result.distance, is_signed ? "sdf" : "udf", input);
+  // Programs take a level set to have signs.
+  result.distance->setGridClass(is_signed ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
+  if (result.nearest) place(*result.nearest, "triangle-id", input);
+  return result;
+}
+
+/// Takes all distances for those of the outside, as they are before there are signs.
+void forget_signs(thesis::Band& band) {
+  for (std::int32_t i = 0; i < band.size(); ++i) band.block(i).outside = band.block(i).set;
 }
 
 /// Whether more than a hundredth of the voxels is inside. A closed mesh has about as many inside as outside; of an
@@ -99,24 +143,74 @@ bool has_inside(const thesis::Band& band) {
 
 }  // namespace
 
-LevelSet thesis_voxelizer(const VoxelizationInput& input, const ThesisVoxelizerOptions& options) {
+std::vector<OptionSpec> thesis_voxelizer_options() {
+  return {{.name = "sign_angle",
+           .fallback = "90",
+           .help = "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
+                   "larger makes more outside",
+           .minimum = 1e-6,
+           .maximum = 180.0,
+           .only_with = {"signs=flood-fill"}},
+          {.name = "shuffle_seed",
+           .fallback = "0",
+           .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
+           .maximum = 1e15},
+          {.name = "signs",
+           .fallback = "flood-fill",
+           .help = "stage 3: flood-fill from outside and angles (§5.3), or unsigned distances",
+           .choices = {"flood-fill", "unsigned"}},
+          {.name = "clean_up",
+           .fallback = "true",
+           .help = "stage 4: whether voxels that self-intersections left inside are removed (§5.4)",
+           .choices = {"true", "false"},
+           .only_with = {"signs=flood-fill"}},
+          {.name = "expansion",
+           .fallback = "true",
+           .help = "stage 5: whether the band is expanded to its widths (§5.5); else it is about a voxel wide to either "
+                   "side, or less where less is asked for",
+           .choices = {"true", "false"}}};
+}
+
+ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) {
+  ThesisVoxelizerOptions result;
+  result.sign_angle = options.number("sign_angle");
+  // A seed is a whole number of up to 1e15, which a double holds exactly.
+  result.shuffle_seed = std::uint64_t(options.number("shuffle_seed"));
+  result.signs = options.is("signs", "flood-fill");
+  result.clean_up = options.is("clean_up", "true");
+  result.expansion = options.is("expansion", "true");
+  return result;
+}
+
+Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options, bool nearest) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);
   // A negation, so that an angle that is no number is refused, too.
   if (!(options.sign_angle > 0.0 && options.sign_angle <= 180.0))
     throw Error("The sign angle must be above 0 and at most 180 degrees, not " +
                 std::to_string(options.sign_angle) + ".");
   initialize_openvdb();
-  const thesis::Triangles triangles = local_copy(input, options.shuffle_seed);
+  Numbers numbers;
+  const thesis::Triangles triangles = local_copy(input, options.shuffle_seed, numbers.shuffled);
   // The stages 2 to 5 of §5.1 in their order; stage 6, fog, is for whoever has the level set.
   thesis::Band band = thesis::rasterize(triangles, input.context);
-  thesis::determine_signs(band, triangles, options.sign_angle, input.context);
-  thesis::remove_unwanted_voxels(band, input.context);
-  thesis::expand(band, triangles, input.exterior_band, input.interior_band, input.context);
-  if (!has_inside(band))
+  Widths widths{input.exterior_band, input.interior_band};
+  if (options.signs) {
+    thesis::determine_signs(band, triangles, options.sign_angle, input.context);
+    if (options.clean_up) thesis::remove_unwanted_voxels(band, input.context);
+  } else {
+    forget_signs(band);
+    widths.interior = widths.exterior;
+  }
+  if (options.expansion) thesis::expand(band, triangles, widths.exterior, widths.interior, input.context);
+  if (options.signs && !has_inside(band))
     input.context.note(
         "The level set has next to no inside: the thesis's voxelizer needs a closed mesh, thicker than a "
         "voxel.");
-  return make_level_set(make_grid(band, {input.exterior_band, input.interior_band}, input));
+  return make_grids(band, widths, input, options.signs, nearest ? &numbers : nullptr);
+}
+
+LevelSet thesis_voxelizer(const VoxelizationInput& input, const ThesisVoxelizerOptions& options) {
+  return make_level_set(thesis_voxelization(input, options, false).distance);
 }
 
 }  // namespace hermesh

@@ -23,13 +23,22 @@ struct ThesisVoxelizerOptions {
   double sign_angle = 90.0;
   /// Seed of the triangles' order: 0 takes them as in the mesh (then the quads' halves), any other shuffles them.
   std::uint64_t shuffle_seed = 0;
+  // Stages 3 to 5, which §5.1 calls optional. Stage 6, fog, is made of what these leave.
+  bool signs = true;      ///< stage 3; without it distances have no sign, and there is nothing to clean up
+  bool clean_up = true;   ///< stage 4; without it voxels of self-intersections stay in the band
+  bool expansion = true;  ///< stage 5; without it the band is that of the rasterisation, about a voxel to either side
 };
 
-/// The level set of any polygon soup, with any winding, as a grid "sdf" of class level set. Active voxels lie within
-/// the band of their side; values outside of it are exterior_band and −interior_band voxels in world units. A note
-/// says so when next to nothing is inside. The bytes do not depend on the number of threads.
+/// Options that the variant declares: those of ThesisVoxelizerOptions.
+std::vector<OptionSpec> thesis_voxelizer_options();
+/// The values of those options.
+ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options);
+
+/// The level set of any polygon soup, with any winding, as a grid "sdf" of class level set, or without signs as "udf".
+/// Active voxels lie within the band of their side; values outside of it are exterior_band and −interior_band voxels in
+/// world units. A note says so when next to nothing is inside. The bytes do not depend on the number of threads.
 ///
-/// Readings, where the text leaves a choice:
+/// Readings, where the text leaves a choice (paper/readings.md, R1 to R13, says what each changes):
 /// - §5.2, subsets: 32 runs of consecutive triangles, whatever the number of threads. Each is rasterised into a grid
 /// of its own; two neighbouring grids are merged at a time, the smaller distance wins, and of equal ones the earlier
 /// triangle's.
@@ -43,7 +52,11 @@ struct ThesisVoxelizerOptions {
 /// - §5.4: "marked as outside" includes the boundary voxels that the rule above found outside.
 /// - §5.5: N_closest is the neighbour with the least distance, the first of equal ones in the order of kNeighbours; a
 /// layer sees only the layers before it.
+/// - §5.5, end: layers are added until one finds no voxel within the width, rather than as many as the width has voxels.
 /// - The first band reaches up to 2.3 voxels; what of it lies beyond a narrower band is dropped in the end.
+/// - What lies beyond the band has the sign of the band's voxels before it along z (OpenVDB's flood fill of values).
+/// Kept in another form than the text's: distances squared and in single precision, and instead of the closest point the
+/// triangle that it lies on, which gives it again.
 /// @throws Error for what check_voxelization_fits() refuses, and for a sign_angle out of range; Cancelled
 LevelSet thesis_voxelizer(const VoxelizationInput& input, const ThesisVoxelizerOptions& options = {});
 

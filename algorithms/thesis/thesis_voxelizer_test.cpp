@@ -11,9 +11,12 @@
 #include <cstdio>
 #include <map>
 #include <random>
+#include <set>
 #include <thread>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/thesis/thesis_volumes.h"
+#include "algorithms/voxelization/outputs/surface_transfer.h"
 
 namespace hermesh {
 namespace {
@@ -313,6 +316,79 @@ TEST(ThesisVoxelizer, SignAngleIsCheckedAndMatters) {
   for (const double angle : {0.0, -1.0, 181.0, std::nan("")})
     EXPECT_THROW(voxelize(mesh, 1.0, {.sign_angle = angle}), Error) << angle;
   EXPECT_FALSE(same(*voxelize(mesh, 1.0, {.sign_angle = 20}), *voxelize(mesh, 1.0, {.sign_angle = 150})));
+}
+
+// Stage 4 (fig. 5.5): without it the band keeps what self-intersections left inside.
+TEST(ThesisVoxelizer, WithoutCleanUpVoxelsOfSelfIntersectionsStay) {
+  const Vector3d left(-14, 0, 0), right(14, 0, 0);
+  const PolygonMesh mesh = joined(sphere(30.0, 5, left), sphere(30.0, 5, right));
+  const auto clean = voxelize(mesh, 1.0), kept = voxelize(mesh, 1.0, {.clean_up = false});
+  std::size_t deep = 0, gone = 0;
+  for_each_voxel(46, [&](const Coord& xyz) {
+    const double truth = std::min((position(xyz) - left).norm(), (position(xyz) - right).norm()) - 30.0;
+    if (truth < -8.0) deep += kept->tree().isValueOn(xyz) ? 1 : 0;
+    gone += clean->tree().isValueOn(xyz) && !kept->tree().isValueOn(xyz) ? 1 : 0;
+  });
+  EXPECT_GT(deep, 1000u);
+  // The expansion rests on other neighbours, so that single voxels at the band's end are not found.
+  EXPECT_LT(gone, 30u);
+  EXPECT_GT(kept->activeVoxelCount(), clean->activeVoxelCount());
+  // A mesh that does not meet itself has next to nothing to remove.
+  const PolygonMesh single = sphere(20.0, 5);
+  EXPECT_TRUE(same(*voxelize(single, 1.0), *voxelize(single, 1.0, {.clean_up = false})));
+}
+
+// Stage 5 (fig. 5.6): without it the band is that of fig. 5.2.
+TEST(ThesisVoxelizer, WithoutExpansionTheBandIsThatOfTheRasterisation) {
+  const PolygonMesh mesh = sphere(20.0, 5);
+  const auto wide = voxelize(mesh, 1.0), first = voxelize(mesh, 1.0, {.expansion = false});
+  double most = 0.0;
+  for (auto value = first->cbeginValueOn(); value; ++value) {
+    most = std::max(most, double(std::abs(*value)));
+    EXPECT_EQ(*value, wide->tree().getValue(value.getCoord()));
+  }
+  // A neighbour of a voxel that the surface touches is at most √3/2 + √2 from it.
+  EXPECT_GT(most, 1.0);
+  EXPECT_LT(most, 2.3);
+  EXPECT_LT(2 * first->activeVoxelCount(), wide->activeVoxelCount() * 3 / 2);
+  EXPECT_FLOAT_EQ(first->tree().getValue({0, 0, 0}), -3.0f);
+}
+
+TEST(ThesisVoxelizer, WithoutSignsDistancesArePositive) {
+  const PolygonMesh mesh = sphere(20.0, 5);
+  const auto with = voxelize(mesh, 1.0), without = voxelize(mesh, 1.0, {.signs = false});
+  EXPECT_EQ(without->getName(), "udf");
+  EXPECT_NE(without->getGridClass(), openvdb::GRID_LEVEL_SET);
+  EXPECT_EQ(without->activeVoxelCount(), with->activeVoxelCount());
+  for (auto value = without->cbeginValueOn(); value; ++value)
+    EXPECT_EQ(*value, std::abs(with->tree().getValue(value.getCoord())));
+  EXPECT_FLOAT_EQ(without->tree().getValue({0, 0, 0}), 3.0f);
+}
+
+// §5.1: the triangle of each voxel is the one that its distance is from, whatever the order that they came in.
+TEST(ThesisVoxelizer, EachVoxelHasTheTriangleOfItsDistance) {
+  initialize_openvdb();
+  const PolygonMesh mesh = joined(cube(9.3), sphere(6.0, 2, Vector3d(4, 3, 8)));
+  const std::vector<Triangle> triangles = triangulated(mesh);
+  for (const std::uint64_t seed : {0, 7}) {
+    RunContext context;
+    const Voxelization made = thesis_voxelization({mesh, 0.5, 3.0, 3.0, context}, {.shuffle_seed = seed}, true);
+    ASSERT_TRUE(made.nearest);
+    EXPECT_EQ(made.nearest->getName(), "triangle-id");
+    EXPECT_TRUE(made.nearest->tree().hasSameTopology(made.distance->tree()));
+    std::set<std::int32_t> seen;
+    for (auto id = made.nearest->cbeginValueOn(); id; ++id) {
+      ASSERT_GE(*id, 0);
+      ASSERT_LT(std::size_t(*id), triangles.size());
+      seen.insert(*id);
+      const auto at = [&](int corner) -> Vector3d { return mesh.points[triangles[std::size_t(*id)][corner]].cast<double>(); };
+      const Vector3d p = 0.5 * position(id.getCoord());
+      const double distance = (closest_point(p, at(0), at(1), at(2)).position - p).norm();
+      ASSERT_NEAR(std::abs(made.distance->tree().getValue(id.getCoord())), distance, 1e-5);
+    }
+    EXPECT_GT(seen.size(), triangles.size() / 2);
+    EXPECT_FALSE(thesis_voxelization({mesh, 0.5, 3.0, 3.0, context}, {}, false).nearest);
+  }
 }
 
 TEST(ThesisVoxelizer, StopsSoonWhenAskedTo) {

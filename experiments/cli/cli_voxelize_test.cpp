@@ -60,6 +60,26 @@ TEST_F(VoxelizeTest, AllGridsInOneFileAndHermiteBesideIt) {
   EXPECT_EQ(run({"extract", "out.vdb", "out.ply"}).exit_code, 0);
 }
 
+/// All outputs that §5.1 of the thesis names come from its own voxelizer, too, with the triangles of its own band.
+TEST_F(VoxelizeTest, TheThesisMakesAllGrids) {
+  write_tetrahedron();
+  const Outcome outcome = voxelize("t.obj", {"--grids", kAllGrids, "--voxelizer", "thesis"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(grids("out.vdb"), (std::vector<std::string>{"closest-point", "colour", "fog", "material",
+                                                        "normal", "sdf", "triangle-id", "udf", "uv"}));
+  EXPECT_EQ(run({"info", "out.hermite.vdb"}).exit_code, 0);
+  EXPECT_EQ(run({"extract", "out.vdb", "out.ply"}).exit_code, 0);
+  for (const char* option : {"clean_up=false", "expansion=false", "signs=unsigned"})
+    EXPECT_EQ(voxelize("t.obj", {"--grids", "udf,triangle-id,closest-point", "--voxelizer", "thesis",
+                                 "--voxelizer-option", option})
+                  .exit_code,
+              0)
+        << option;
+  expect_refusal(1, {"--grids", "fog", "--voxelizer", "thesis", "--signs", "unsigned"}, {"fog", "sign"}, "t.obj");
+  expect_refusal(2, {"--voxelizer", "thesis", "--signs", "unsigned", "--voxelizer-option", "clean_up=false"},
+                 {"clean_up", "signs"}, "t.obj");
+}
+
 /// OpenVDB's tool reads the file. It returns 0 whatever happens, so its text is what counts.
 TEST_F(VoxelizeTest, OpenVdbsToolReadsTheFile) {
   ASSERT_EQ(std::system("command -v vdb_print > /dev/null"), 0)

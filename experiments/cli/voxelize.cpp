@@ -8,6 +8,7 @@
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 #include "algorithms/voxelization/distance/quad_diagonals.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
+#include "algorithms/thesis/thesis_volumes.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/signals.h"
@@ -22,6 +23,9 @@ struct Arguments {
   std::string grids = "sdf";
   bool fog_exterior = false;
 };
+
+/// Whether a voxelizer knows which triangle each distance is from, so that all volumes can be made.
+bool knows_triangles(const std::string& voxelizer) { return voxelizer == "hermesh" || voxelizer == "thesis"; }
 
 /// Refuses `--like` for what cannot take it. @throws Error
 void check_like(const Arguments& arguments, const VolumeRequest& request) {
@@ -38,8 +42,8 @@ VolumeRequest requested(const Arguments& arguments) {
     request.fog_exterior = arguments.fog_exterior;
     if (request.fog_exterior && !request.fog)
       throw Error("--fog-exterior is about the grid fog: name it in --grids");
-    if (arguments.voxelizing.voxelizer != "hermesh" && !request.only_sdf())
-      throw Error("only the voxelizer hermesh makes other --grids than sdf, not " +
+    if (!knows_triangles(arguments.voxelizing.voxelizer) && !request.only_sdf())
+      throw Error("only the voxelizers hermesh and thesis make other --grids than sdf, not " +
                   arguments.voxelizing.voxelizer);
     check_like(arguments, request);
     return request;
@@ -77,7 +81,19 @@ PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& s
   return mesh;
 }
 
-/// Makes the grids of the request by the voxelizer that knows which triangle is nearest, and writes them.
+/// The volumes of the request, by a voxelizer that knows_triangles().
+VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& input, const VolumeRequest& request) {
+  VoxelizeOptions options = voxelize_options(input);
+  if (voxelizer == "hermesh") return make_volume_outputs(input.mesh, options, request, input.context);
+  // Of the options only the signs are read before the voxelizer is asked: fog and Hermite data need some.
+  const ThesisVoxelizerOptions of_thesis = thesis_voxelizer_options(input.options);
+  options.signs = of_thesis.signs ? SignRule::flood_fill : SignRule::none;
+  return make_volume_outputs(
+      input.mesh, options, request,
+      [&](const VoxelizeOptions& asked) { return thesis_voxelization(input, of_thesis, asked.nearest); }, input.context);
+}
+
+/// Makes the grids of the request by a voxelizer that knows which triangle is nearest, and writes them.
 void write_outputs(const Arguments& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
                    Session& session) {
   const Paths& paths = arguments.paths;
@@ -95,7 +111,7 @@ void write_outputs(const Arguments& arguments, VolumeRequest request, const Chos
   const VoxelizationInput input =
       voxelization_input(mesh, recipe_of(mesh, paths.in, voxelizing, chosen), session.context);
   const Stopwatch watch;
-  const VolumeOutputs outputs = make_volume_outputs(mesh, voxelize_options(input), request, session.context);
+  const VolumeOutputs outputs = outputs_by(chosen.voxelizer.name, input, request);
   if (voxelizing.like) out_of_frame(outputs.grids, frame, first);
   session.context.check();
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
@@ -114,7 +130,7 @@ int run_voxelize(const Arguments& arguments, Session& session) {
   const VolumeRequest request = requested(arguments);
   check_volume_output(arguments.paths.out);
   if (request.hermite) check_writable(hermite_path(arguments.paths.out));
-  if (chosen.voxelizer.name == "hermesh") {
+  if (knows_triangles(chosen.voxelizer.name)) {
     write_outputs(arguments, request, chosen, session);
   } else {
     const PolygonMesh mesh = read_polygons(arguments.paths.in, session);

@@ -207,6 +207,12 @@ VolumeRequest parse_volume_request(const std::string& list) {
 
 VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options,
                                   const VolumeRequest& request, RunContext& context) {
+  return make_volume_outputs(
+      mesh, options, request, [&](const VoxelizeOptions& asked) { return voxelize(mesh, asked, context); }, context);
+}
+
+VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
+                                  const VoxelizeBy& by, RunContext& context) {
   const std::vector<const MeshAttribute*> attributes = chosen_attributes(mesh, request);
   check_signs(request, options.signs != SignRule::none);
   // For the distances alone voxelize() does the same.
@@ -215,7 +221,7 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
   // The triangles cost a number a voxel, so they are kept only where something is made from them.
   VoxelizeOptions with_nearest = options;
   with_nearest.nearest = request.triangle_id || request.closest_point || !attributes.empty();
-  const Voxelization made = voxelize(mesh, with_nearest, context);
+  const Voxelization made = by(with_nearest);
   check_signs(request, made.is_signed);
 
   VolumeOutputs outputs;

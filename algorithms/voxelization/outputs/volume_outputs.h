@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,6 +55,13 @@ struct VolumeOutputs {
 /// there are no signs, and for more memory than there is; Cancelled.
 VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options,
                                   const VolumeRequest& request, RunContext& context);
+
+/// How a voxelization comes about: as the options say, with Voxelization::nearest where they ask for it.
+using VoxelizeBy = std::function<Voxelization(const VoxelizeOptions&)>;
+/// Makes those volumes from another voxelizer's distances and triangles. `options` are what it works by.
+/// @throws Error and Cancelled also as `by` does.
+VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
+                                  const VoxelizeBy& by, RunContext& context);
 
 /// The path of the Hermite data beside the other grids: OUT.hermite.vdb for OUT.vdb.
 std::filesystem::path hermite_path(const std::filesystem::path& path);
