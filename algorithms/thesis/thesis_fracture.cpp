@@ -7,9 +7,9 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/core/stopwatch.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
-#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/fracture/labelled_solid.h"
 #include "algorithms/hermite/combine.h"
+#include "algorithms/hermite/dense_combine.h"
 
 namespace hermesh {
 namespace {
@@ -145,12 +145,111 @@ class CodeSolid {
   std::vector<BlockMask> masks_;
 };
 
-/// Meshes a piece by itself: along a rim its points need not be those of the next piece.
-PolygonMesh meshed(const FloatHermite& piece, double threshold, RunContext& context) {
-  if (piece.leaves.empty()) return {};
-  if (threshold > 0) return adaptive_dual_contouring(piece, {.threshold = threshold}, nullptr, context);
-  return dual_contouring(view_of(piece, context), {}, context);
+/// The data in the form that a rule combines.
+template <class Data>
+Data converted(const FloatHermite& hermite, RunContext& context) {
+  if constexpr (std::is_same_v<Data, ThesisDense>)
+    return to_dense<ThesisVoxel>(hermite, context);
+  else
+    return hermite;
 }
+
+bool is_empty(const FloatHermite& hermite) { return hermite.leaves.empty(); }
+bool is_empty(const ThesisDense& hermite) { return hermite.leaves() == 0; }
+
+/// The steps of §7.1, one after the other, on grids of one form.
+template <class Data>
+class InTurn {
+ public:
+  InTurn(const FloatHermite& object, const Cutters& cutters, double threshold,
+         const std::function<void(ThesisPiece&&)>& hand_over, RunContext& context)
+      : object_(object),
+        cutters_(cutters),
+        threshold_(threshold),
+        hand_over_(hand_over),
+        context_(context),
+        rest_(converted<Data>(object, context)) {
+    // The meshes report by themselves; here their figures are summed, so that there is one sentence for all pieces.
+    meshing_.cancel = context.cancel;
+  }
+
+  void run() {
+    // Solids have Hermite data of their own; planes and cells of seeds are made into solids code by code.
+    const bool solids = cutters_.count() > 0 && !cutters_.plane_sides() && cutters_.signs(0, {}).has_value();
+    std::vector<CutCode> codes = codes_within(object_, cutters_, context_);
+    if (solids) {  // each is a solid of its own, and what is left is no cutter's
+      codes.resize(cutters_.count());
+      for (std::size_t k = 0; k < codes.size(); ++k) codes[k] = k;
+    }
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+      context_.check();
+      take(codes[i], solids);
+      context_.progress("fracture", double(i + 1) / double(codes.size()));
+    }
+    if (!is_empty(rest_)) {
+      Stopwatch watch;
+      ThesisPiece last{"what no cutter takes", meshed(rest_), 0.0, 0.0, 0.0};
+      last.extraction_seconds = watch.seconds();
+      if (!last.mesh.empty()) hand_over_(std::move(last));
+    }
+    report();
+  }
+
+ private:
+  /// Cuts one piece off, meshes it and hands it over.
+  void take(CutCode code, bool solids) {
+    ThesisPiece piece;
+    piece.name = cutters_.name_of(code);
+    Stopwatch watch;
+    // The first step of §7.1: the cutter as a Hermite grid.
+    FloatHermite made;
+    if (!solids) made = solid_of_code(object_, cutters_, code, context_);
+    const FloatHermite* const solid = solids ? cutters_.solid(code) : &made;
+    Data cutter;
+    if (solid) cutter = converted<Data>(*solid, context_);
+    // The watch gives lap times, so that each step has its own.
+    piece.conversion_seconds = watch.seconds();
+    Data taken;
+    if (solid) {
+      // The second and the third: what is left is the object from now on.
+      taken = combine(Boolean::intersect, rest_, cutter, context_);
+      rest_ = combine(Boolean::subtract, std::move(rest_), std::move(cutter), context_);
+    }
+    piece.csg_seconds = watch.seconds();
+    if (solid && !is_empty(taken)) piece.mesh = meshed(taken);
+    piece.extraction_seconds = watch.seconds();
+    hand_over_(std::move(piece));
+  }
+
+  /// Meshes a piece by itself, by chapter 6: along a rim its points need not be those of the next piece.
+  PolygonMesh meshed(const Data& piece) {
+    return adaptive_dual_contouring(piece, {.threshold = threshold_}, nullptr, meshing_);
+  }
+
+  void report() {
+    const auto sum = [&](const char* name) {
+      double total = 0.0;
+      for (const auto& [figure, value] : meshing_.figures) total += figure == name ? value : 0.0;
+      context_.figure(name, total);
+      return total;
+    };
+    sum("escaped");
+    const double lost = sum("lost_crossings"), needless = sum("needless_crossings");
+    if (lost + needless > 0)
+      context_.note("in the 10-byte data of the pieces " + std::to_string(static_cast<std::uint64_t>(lost)) +
+                    " crossings are missing, which leaves holes, and " +
+                    std::to_string(static_cast<std::uint64_t>(needless)) +
+                    " lie between samples of one sign, which makes polygons that bound nothing");
+  }
+
+  const FloatHermite& object_;
+  const Cutters& cutters_;
+  const double threshold_;
+  const std::function<void(ThesisPiece&&)>& hand_over_;
+  RunContext& context_;
+  RunContext meshing_;
+  Data rest_;  ///< what no cutter has taken yet
+};
 
 }  // namespace
 
@@ -165,45 +264,12 @@ std::vector<CutCode> codes_within(const FloatHermite& object, const Cutters& cut
   return solid.code_values;
 }
 
-void thesis_fracture(const FloatHermite& object, const Cutters& cutters, double threshold,
+void thesis_fracture(const FloatHermite& object, const Cutters& cutters, const ThesisFractureOptions& options,
                      const std::function<void(ThesisPiece&&)>& hand_over, RunContext& context) {
-  FloatHermite rest = object;
-  // Solids have Hermite data of their own; planes and cells of seeds are made into solids code by code.
-  const bool solids = cutters.count() > 0 && !cutters.plane_sides() && cutters.signs(0, {}).has_value();
-  std::vector<CutCode> codes = codes_within(object, cutters, context);
-  if (solids) {  // each is a solid of its own, and what is left is no cutter's
-    codes.resize(cutters.count());
-    for (std::size_t k = 0; k < codes.size(); ++k) codes[k] = k;
-  }
-  for (std::size_t i = 0; i < codes.size(); ++i) {
-    context.check();
-    ThesisPiece piece;
-    piece.name = cutters.name_of(codes[i]);
-    Stopwatch watch;
-    // The first step of §7.1: the cutter as a Hermite grid.
-    const FloatHermite* solid = solids ? cutters.solid(codes[i]) : nullptr;
-    FloatHermite made;
-    if (!solids) made = solid_of_code(object, cutters, codes[i], context);
-    // The watch gives lap times, so that each step has its own.
-    piece.conversion_seconds = watch.seconds();
-    FloatHermite taken;
-    if (!solids) solid = &made;
-    if (solid) {
-      // The second and the third: what is left is the object from now on.
-      taken = combine(Boolean::intersect, rest, *solid, context);
-      rest = combine(Boolean::subtract, rest, *solid, context);
-    }
-    piece.csg_seconds = watch.seconds();
-    piece.mesh = meshed(taken, threshold, context);
-    piece.extraction_seconds = watch.seconds();
-    context.progress("fracture", double(i + 1) / double(codes.size()));
-    hand_over(std::move(piece));
-  }
-  if (rest.leaves.empty()) return;
-  Stopwatch watch;
-  ThesisPiece last{"what no cutter takes", meshed(rest, threshold, context), 0.0, 0.0, 0.0};
-  last.extraction_seconds = watch.seconds();
-  hand_over(std::move(last));
+  if (options.rule == ThesisFractureOptions::Rule::printed)
+    InTurn<ThesisDense>(object, cutters, options.threshold, hand_over, context).run();
+  else
+    InTurn<FloatHermite>(object, cutters, options.threshold, hand_over, context).run();
 }
 
 }  // namespace hermesh

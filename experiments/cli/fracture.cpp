@@ -23,7 +23,7 @@ constexpr const char* kSizeGroup = "Voxel size, exactly one of";
 struct Arguments {
   Paths paths;
   VoxelizeArguments voxelizing;
-  std::string cutters, hermite = "auto", density;
+  std::string cutters, hermite = "auto", density, rule = "printed";
   FractureMethod method;
   CutterChoices choices;
   std::vector<double> impact;
@@ -63,6 +63,7 @@ nlohmann::ordered_json head_of(const Arguments& arguments, const FractureObject&
   return {{"object", std::filesystem::path(arguments.paths.in).filename().string()},
           {"method", arguments.method.name},
           {"tolerance", arguments.method.tolerance},
+          {"rule", arguments.method.name == "thesis" ? nlohmann::ordered_json(arguments.rule) : nlohmann::ordered_json()},
           {"cutters_given", without_folders(arguments.cutters)},
           {"seed", arguments.choices.seed},
           {"voxel_size", object.level_set.voxel_size()},
@@ -116,6 +117,7 @@ void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, con
                 "'" + arguments.paths.in + "' has voxels already");
   if (arguments.method.name != "labelled")
     refuse_idle(command, {"--min-volume", "--no-split"}, "only --method labelled looks at it");
+  if (arguments.method.name != "thesis") refuse_idle(command, {"--rule"}, "only --method thesis looks at it");
   if (spec.kind != Kind::chunks) refuse_idle(command, {"--roughness"}, "only the walls of chunks are rough");
   const bool copies =
       std::ranges::any_of(spec.files, [](const CutterSpec::File& file) { return file.copies > 0; });
@@ -135,6 +137,7 @@ int run_fracture_command(const Arguments& given, const CLI::App& command, Sessio
   refuse_idle_options(arguments, spec, command);
   if (!arguments.impact.empty())
     arguments.choices.impact = Eigen::Vector3d(arguments.impact[0], arguments.impact[1], arguments.impact[2]);
+  if (arguments.rule == "repaired") arguments.method.rule = ThesisFractureOptions::Rule::repaired;
   arguments.method.options.split = !arguments.no_split;
   arguments.method.options.least_samples = static_cast<std::uint64_t>(arguments.least_volume);
   { const AtomicFolder reserved(arguments.paths.out); }
@@ -204,9 +207,15 @@ void add_fracture(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"labelled", "thesis", "openvdb"}));
   command
       ->add_option("--tolerance", arguments->method.tolerance,
-                   "labelled: how far the pieces may be from their finest meshes, in voxels; thesis: how far merged "
-                   "cells may be off; openvdb: its adaptivity (default: 0, nothing is merged)")
+                   "labelled: how far the pieces may be from their finest meshes, in voxels; thesis: the root of its QEF "
+                   "threshold, in voxels: cells merge while the sum of their squared distances to all planes is below "
+                   "its square; openvdb: its adaptivity (default: 0, nothing is merged)")
       ->check(finite_number());
+  command
+      ->add_option("--rule", arguments->rule,
+                   "thesis: printed combines 10-byte voxels by eq. 7.1; repaired combines exact data by signs (default: "
+                   "printed)")
+      ->check(CLI::IsMember({"printed", "repaired"}));
   command
       ->add_option(
           "--min-volume", arguments->least_volume,

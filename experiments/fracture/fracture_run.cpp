@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/piece_attributes.h"
-#include "algorithms/thesis/thesis_fracture.h"
 #include "reference/openvdb_fracture.h"
 
 namespace hermesh {
@@ -92,7 +92,8 @@ class Run {
 
   void thesis() {
     thesis_fracture(
-        object_.hermite, *cutters_.cutters, method_.tolerance * method_.tolerance,
+        object_.hermite, *cutters_.cutters,
+        {.rule = method_.rule, .threshold = method_.tolerance * method_.tolerance},
         [&](ThesisPiece&& made) {
           if (made.mesh.empty()) return summary_.empty.push_back(made.name);
           finish(piece_of(std::move(made)));

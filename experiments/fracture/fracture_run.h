@@ -9,6 +9,7 @@
 #include "algorithms/core/level_set.h"
 #include "algorithms/fracture/fracture.h"
 #include "algorithms/fracture/mass_properties.h"
+#include "algorithms/thesis/thesis_fracture.h"
 #include "experiments/fracture/fracture_cutters.h"
 
 namespace hermesh {
@@ -27,9 +28,10 @@ double uncut_volume(const FractureObject& object, RunContext& context);
 struct FractureMethod {
   std::string name = "labelled";  ///< or thesis, openvdb
   /// labelled: two-sided distance to the finest mesh, in voxels; thesis: the root of adaptive_dual_contouring's
-  /// threshold, in voxels; openvdb: adaptivity, 0 to 1.
+  /// threshold, in voxels, so that 0.3 is a threshold of 0.09 square voxels; openvdb: adaptivity, 0 to 1.
   double tolerance = 0.0;
   FractureOptions options;
+  ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;  ///< of the method thesis alone
 };
 
 struct PieceOutput {

@@ -246,16 +246,19 @@ class Digests {
     struct Break {
       const char *cutters, *method;
       double tolerance;
+      ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;
     };
     std::vector<Break> all = {{"voronoi:8", "labelled", 0.0},
                               {"chunks:8", "labelled", 0.0},
                               {"planes:2", "labelled", 0.0},
                               {"voronoi:8", "labelled", 0.2},
-                              {"voronoi:4", "thesis", 0.1}};
+                              {"voronoi:4", "thesis", 0.1},
+                              {"voronoi:4", "thesis", 0.1, ThesisFractureOptions::Rule::repaired}};
     if (references()) all.push_back({"voronoi:4", "openvdb", 0.0});
     for (const Break& each : all)
       row("pieces: " + std::string(each.method) + " " + each.cutters +
-              " tolerance=" + readable(each.tolerance),
+              " tolerance=" + readable(each.tolerance) +
+              (each.rule == ThesisFractureOptions::Rule::repaired ? " repaired" : ""),
           [&](RunContext& child) {
             const FractureObject object{sample_polygons(level_set(), 0.0, mesh(), child), level_set(),
                                         &mesh()};
@@ -265,7 +268,7 @@ class Digests {
                 make_cutters(parse_cutters(each.cutters), object.hermite, choices, child);
             std::vector<PolygonMesh> meshes;
             run_fracture(
-                object, made, {.name = each.method, .tolerance = each.tolerance, .options = {}},
+                object, made, {.name = each.method, .tolerance = each.tolerance, .options = {}, .rule = each.rule},
                 [&](PieceOutput&& piece) { meshes.push_back(std::move(piece.mesh)); }, child);
             return digest(meshes);
           });

@@ -40,6 +40,17 @@ struct Range {
   }
 };
 
+/// A method as a row names it: the thesis's by either rule.
+struct Named {
+  const char *label, *method;
+  ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::repaired;
+};
+constexpr std::array<Named, 4> kMethods = {
+    {{"labelled", "labelled"},
+     {"thesis printed", "thesis", ThesisFractureOptions::Rule::printed},
+     {"thesis repaired", "thesis", ThesisFractureOptions::Rule::repaired},
+     {"openvdb", "openvdb"}}};
+
 class FractureBooks {
  public:
   explicit FractureBooks(const MeasurementInput& input) : input_(input) {}
@@ -62,24 +73,26 @@ class FractureBooks {
   }
 
  private:
-  /// The other methods mean something else by it, so they run at their finest.
+  /// What each method calls its tolerance (FractureMethod); OpenVDB's adaptivity is something else, so it runs at its
+  /// finest.
   std::vector<double> tolerances_of(const std::string& method) const {
-    return method == "labelled" ? numbers(input_.parameters.text("tolerances")) : std::vector{0.0};
+    if (method == "openvdb") return {0.0};
+    return numbers(input_.parameters.text(method == "thesis" ? "thesis_tolerances" : "tolerances"));
   }
 
   struct Cell {
     std::string label;
     std::size_t count;
-    std::string method;
+    Named method;
     double tolerance;
   };
   /// The cells that the filter leaves.
   std::vector<Cell> cells_of(const FractureSubject& subject) const {
     std::vector<Cell> cells;
     for (const double count : numbers(input_.parameters.text("pieces")))
-      for (const char* method : {"labelled", "thesis", "openvdb"})
-        for (const double tolerance : tolerances_of(method)) {
-          std::string label = subject.label + ", " + std::to_string(std::size_t(count)) + ", " + method;
+      for (const Named& method : kMethods)
+        for (const double tolerance : tolerances_of(method.method)) {
+          std::string label = subject.label + ", " + std::to_string(std::size_t(count)) + ", " + method.label;
           if (tolerance > 0) label += " " + readable(tolerance);
           if (input_.wants("ledger", label) || input_.wants("tags", label))
             cells.push_back({label, std::size_t(count), method, tolerance});
@@ -109,12 +122,14 @@ class FractureBooks {
   }
 
   void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object, const Cell& cell) {
-    const auto& [label, count, method, tolerance] = cell;
+    const auto& [label, count, named, tolerance] = cell;
+    const std::string method = named.method;
     RunContext child = child_context(input_.context, false);
     CutterChoices choices;
     choices.seed = input_.seed;
     const MadeCutters cutters = make_cutters(spec(count), object.hermite, choices, child);
-    std::string name = subject.source + "-" + std::to_string(count) + "-" + method;
+    std::string name = subject.source + "-" + std::to_string(count) + "-" + named.label;
+    std::ranges::replace(name, ' ', '-');
     if (tolerance > 0) name += "-" + readable(tolerance);
     std::filesystem::remove_all(input_.out / name);
     FractureFolder folder(input_.out / name, bounds_of(object.hermite));
@@ -124,7 +139,7 @@ class FractureBooks {
     const bool tagged = method != "thesis" && input_.parameters.is("cutters", "voronoi");
     TagJudge tags(*tag_oracle_, tag_origin_, object.level_set.voxel_size(), cutters.seeds);
     const FractureSummary summary = run_fracture(
-        object, cutters, {.name = method, .tolerance = tolerance, .options = {}},
+        object, cutters, {.name = method, .tolerance = tolerance, .options = {}, .rule = named.rule},
         [&](PieceOutput&& piece) {
           conversion.add(piece.conversion_seconds);
           csg.add(piece.csg_seconds);
@@ -135,7 +150,8 @@ class FractureBooks {
         },
         child);
     const validation::FractureLedger ledger = folder.judge(child, uncut_volume_);
-    if (method == "labelled")
+    // The printed pieces are kept, too, for their picture.
+    if (method == "labelled" || (method == "thesis" && named.rule == ThesisFractureOptions::Rule::printed))
       folder.commit({{"object", subject.source}, {"seed", input_.seed}}, summary, true, child);
     Json& values = row.values;
     values = {{"pieces", ledger.pieces},
@@ -151,6 +167,8 @@ class FractureBooks {
               {"conversion", conversion.in_milliseconds()},
               {"csg", csg.in_milliseconds()},
               {"extraction", extraction.in_milliseconds()}};
+    for (const auto& [figure, value] : child.figures)
+      if (figure == "lost_crossings" || figure == "needless_crossings" || figure == "escaped") values[figure] = value;
     // Without tags what is no seam counts as original, and the difference says nothing.
     if (ledger.gaps_can_be_judged) {
       values["unmatched"] = ledger.unmatched_cut;
@@ -240,6 +258,10 @@ std::vector<MeasuredColumn> ledger_columns() {
       {"volume", "Δ volume",
        "between the sum of the pieces' volumes and that within the original surface, relative"},
       {"uncut", "Δ uncut", "sum of the pieces' volumes less that of the uncut mesh, relative"},
+      {"lost_crossings", "lost", "crossings that the thesis's 10 bytes lose in all pieces, which leave holes"},
+      {"needless_crossings", "needless",
+       "data that eq. 7.1 leaves between samples of one sign, which are polygons that bound nothing"},
+      {"escaped", "escaped", "points outside their cell or region"},
       {"changed", "changed", "samples that changed their piece so that all are manifold"},
       {"seconds", "time [s]", "of the fracture, the object's Hermite data and writing left out"},
       {"object", "object [s]", "the object's Hermite data"},
@@ -266,6 +288,7 @@ Measurement fracture_measurement() {
               {{"cases", "all", "all, or one", {"all", "dragon", "fandisk", "noise-sphere-1m", "armadillo"}},
                {"pieces", "20", "numbers of cells", {"2", "20", "50", "200", "2 20", "2 20 200"}},
                {"tolerances", "0", "of the method labelled, voxels", {"0", "0.2", "1", "0 0.2", "0 0.2 1"}},
+               {"thesis_tolerances", "0 0.3", "of the method thesis: roots of its threshold, voxels", {"0", "0.3", "0 0.3"}},
                {"cutters", "voronoi", "cells with plane or rough walls", {"voronoi", "chunks"}},
                {"scale", "1", "of the resolutions", {}, 0.05, 4.0},
                {"order", "yes", "whether the order of the volume's difference is measured", {"yes", "no"}}},
