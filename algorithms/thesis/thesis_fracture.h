@@ -14,7 +14,7 @@
 // of one sign where a cut runs beside the surface (trap T11), which become polygons that bound nothing, and 10 bytes lose
 // some data (trap T2), which leaves holes. fracture.h has the method that repairs all of it.
 //
-// Where the text leaves a gap (paper/readings.md, R33 to R36):
+// Where the text leaves a gap (paper/readings.md, R33 to R37):
 //   - Planes and Voronoi cells are made into solids code by code, each cut off by a box around the object. As the cutters
 //     are there as functions, their "conversion" samples these; that of a mesh packs its Hermite data.
 //   - The difference is the intersection with the complement; a component without data is infinite (dense_combine.h).

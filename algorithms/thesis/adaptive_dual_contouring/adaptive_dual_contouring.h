@@ -17,7 +17,7 @@
 //   6.5    for every crossing edge the four cells around it give a quad, a triangle where they have three points, and
 //          nothing where they have fewer. The sign at the edge's first sample orients it.
 //
-// Where the text leaves a gap:
+// Where the text leaves a gap (paper/readings.md, R20 to R32, says what each reading changes):
 //   - A region's QEF is the sum of those of its cells, so a crossing counts once for each of its cells in the region:
 //     four times in the interior ("using the Hermite data of the corresponding cells"; Ju et al. add up the same way).
 //   - E is compared as "less than the threshold", at the place where the point would go. So threshold 0 merges nothing.
