@@ -1,117 +1,14 @@
 #include "experiments/pictures/render.h"
 
-#include <cairo.h>
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <sstream>
 
-#include "algorithms/io/atomic_file.h"
+#include "experiments/pictures/canvas.h"
 #include "experiments/pictures/ray_scene.h"
 
 namespace hermesh {
 namespace {
-
-struct Tone {
-  double red, green, blue;
-};
-constexpr Tone kPaper{1.0, 1.0, 1.0}, kInk{0.11, 0.13, 0.17}, kQuiet{0.38, 0.41, 0.46},
-    kMark{0.85, 0.33, 0.16};
-
-constexpr double kMargin = 24, kGap = 14, kTitleSize = 22, kSubtitleSize = 13, kLabelSize = 15,
-                 kCaptionSize = 12.5;
-
-/// A Cairo surface with its context; text is drawn from its base line.
-class Canvas {
- public:
-  Canvas(int width, int height)
-      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height), cairo_surface_destroy),
-        cairo_(cairo_create(surface_.get()), cairo_destroy) {
-    if (cairo_status(cairo_.get()) != CAIRO_STATUS_SUCCESS)
-      throw Error("a picture of " + std::to_string(width) + " by " + std::to_string(height) +
-                  " pixels cannot be made; show fewer variants");
-    tone(kPaper);
-    cairo_paint(cairo_.get());
-  }
-
-  /// Shortens the text with an ellipsis where it is wider than `room` pixels.
-  void text(double x, double y, std::string words, double size, Tone colour, double room, bool bold = false) {
-    tone(colour);
-    font(size, bold);
-    if (width_of(words) > room) {
-      while (!words.empty() && width_of(words + "…") > room) drop_last_letter(words);
-      words += "…";
-    }
-    cairo_move_to(cairo_.get(), x, y);
-    cairo_show_text(cairo_.get(), words.c_str());
-  }
-
-  /// Lines no wider than `room` pixels, broken between words; a word that is wider has one to itself.
-  std::vector<std::string> lines(const std::string& text, double size, double room) {
-    font(size, false);
-    std::vector<std::string> lines;
-    std::istringstream words(text);
-    for (std::string word; words >> word;) {
-      if (!lines.empty() && width_of(lines.back() + " " + word) <= room)
-        lines.back() += " " + word;
-      else
-        lines.push_back(word);
-    }
-    return lines;
-  }
-
-  void image(double x, double y, const Image& picture) {
-    const int stride = cairo_format_stride_for_width(CAIRO_FORMAT_RGB24, picture.width);
-    const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> source(
-        cairo_image_surface_create(CAIRO_FORMAT_RGB24, picture.width, picture.height), cairo_surface_destroy);
-    unsigned char* rows = cairo_image_surface_get_data(source.get());
-    if (!rows) throw Error("a picture of " + std::to_string(picture.width) + " pixels across cannot be made");
-    for (int row = 0; row < picture.height; ++row)
-      std::copy_n(picture.pixels.data() + static_cast<std::size_t>(row) * picture.width, picture.width,
-                  reinterpret_cast<std::uint32_t*>(rows + static_cast<std::size_t>(row) * stride));
-    cairo_surface_mark_dirty(source.get());
-    cairo_set_source_surface(cairo_.get(), source.get(), x, y);
-    cairo_paint(cairo_.get());
-  }
-
-  void frame(double x, double y, double width, double height, Tone colour, double line) {
-    tone(colour);
-    cairo_set_line_width(cairo_.get(), line);
-    cairo_rectangle(cairo_.get(), x, y, width, height);
-    cairo_stroke(cairo_.get());
-  }
-
-  void write(const std::filesystem::path& png) const {
-    AtomicFile file(png);
-    const cairo_status_t status = cairo_surface_write_to_png(surface_.get(), file.path().c_str());
-    if (status != CAIRO_STATUS_SUCCESS)
-      throw Error("cannot write the picture " + png.string() + ": " + cairo_status_to_string(status));
-    file.commit();
-  }
-
- private:
-  void font(double size, bool bold) {
-    cairo_select_font_face(cairo_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo_.get(), size);
-  }
-  void tone(Tone t) { cairo_set_source_rgb(cairo_.get(), t.red, t.green, t.blue); }
-  double width_of(const std::string& words) const {
-    cairo_text_extents_t extents;
-    cairo_text_extents(cairo_.get(), words.c_str(), &extents);
-    return extents.x_advance;
-  }
-  /// One UTF-8 letter, which may be several bytes.
-  static void drop_last_letter(std::string& words) {
-    while (!words.empty() && (static_cast<unsigned char>(words.back()) & 0xc0) == 0x80) words.pop_back();
-    if (!words.empty()) words.pop_back();
-  }
-
-  std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface_;
-  std::unique_ptr<cairo_t, void (*)(cairo_t*)> cairo_;
-};
 
 /// Where everything on the sheet goes, in pixels, and the two views that all pictures share.
 struct Layout {
@@ -154,7 +51,7 @@ void set_views(Layout& layout, const Sheet& sheet, const Camera& camera) {
                                  sheet.close_up.centre[2]);
   close.centre = sheet.frame.lower + sheet.frame.size().cwiseProduct(fraction);
   close.occlusion_radius = 0.06 * longest;
-  close.edges = true;
+  close.edges = sheet.close_up.edges;
 
   const double pixel = whole.world_width / pixels;
   const Eigen::Vector3d offset = close.centre - whole.centre;

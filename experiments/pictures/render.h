@@ -23,6 +23,7 @@ struct Viewpoint {
 struct CloseUp {
   std::array<double, 3> centre{0.5, 0.5, 0.5};  ///< along x, y and z of the box, 0 to 1
   double size = 0.12;  ///< side of the square, as a fraction of the box's longest side
+  bool edges = true;   ///< whether the polygons' edges are drawn
 };
 
 struct Picture {
