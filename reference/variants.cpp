@@ -7,6 +7,7 @@
 #include "reference/marching_cubes_decimated.h"
 #include "reference/openvdb_mesh_to_volume.h"
 #include "reference/openvdb_volume_to_mesh.h"
+#include "reference/pseudo_normal_voxelizer.h"
 
 namespace hermesh {
 
@@ -69,7 +70,7 @@ std::span<const Extractor> reference_extractors() {
 }
 
 std::span<const Voxelizer> reference_voxelizers() {
-  static const std::array<Voxelizer, 2> kTable = {{
+  static const std::array<Voxelizer, 3> kTable = {{
       {.name = "openvdb",
        .summary = "OpenVDB's meshToVolume: flooded nearest polygons, signs by the surface's side",
        .options = {{.name = "renormalize",
@@ -85,6 +86,10 @@ std::span<const Voxelizer> reference_voxelizers() {
                             "not meet; or what the polygons wind around, for parts that overlap or touch",
                     .choices = {"parity", "winding-number"}}},
        .voxelize = exact_voxelizer},
+      {.name = "pseudo-normals",
+       .summary = "exact distances, signs from angle-weighted pseudo-normals (Bærentzen & Aanæs 2005), for clean models",
+       .options = {},
+       .voxelize = pseudo_normal_voxelizer},
   }};
   return kTable;
 }
