@@ -1,20 +1,27 @@
-// Tables 9.3 and 9.4 of the thesis, and their figures: a large level set contoured finely only where a camera looks.
+// Tables 9.3 and 9.4 of the thesis, and their figures: a large level set contoured finely only where a camera
+// looks. And what becomes of the points when the resolution doubles, as it does from the one table to the
+// other.
 #include <openvdb/tools/Composite.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iomanip>
+#include <limits>
+#include <map>
 #include <optional>
+#include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/frustum.h"
+#include "experiments/cases/recipes.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"
-#include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
-#include "experiments/cases/recipes.h"
-#include "experiments/pictures/render.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measurements/measurements.h"
+#include "experiments/pictures/render.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -34,11 +41,18 @@ const Treatment kTreatments[] = {
     {"none", Outside::everywhere, {2'366'433, 10.86}, {}},
     {"max simplification outside", Outside::simplify, {1'227'972, 7.05}, {6'845'410, 37.99}},
     {"no mesh outside", Outside::nothing, {1'052'087, 5.64}, {6'196'708, 29.6}}};
+/// What OpenVDB's mesher stands in for: the thesis's old method without a mask, in the caption of table 9.3.
+constexpr Printed kPrintedOld{6'762'593, 28.72};
+/// What the threshold is divided by where the points of two resolutions are compared.
+constexpr std::array<double, 5> kDivisors = {1, 2, 4, 6, 8};
+/// How many times as many points a surface takes on a lattice twice as fine if its mesh does not depend on
+/// scale: each region then stands for a quarter of the area.
+constexpr double kScaleFree = 4.0;
 constexpr int kMaskResolution = 84;  ///< longest side of the printed mask, 84 x 72 x 63
 constexpr double kTable93Resolution = 2671.0, kTable94Resolution = 5337.0;
 
-/// A camera within the splash that looks along it. Its frustum has the printed mask's proportions and sees somewhat less than
-/// half of the surface, as the printed points say: 1 052 087 of 2 366 433.
+/// A camera within the splash that looks along it. Its frustum has the printed mask's proportions and sees
+/// somewhat less than half of the surface, as the printed points say: 1 052 087 of 2 366 433.
 Frustum camera(double length) {
   constexpr double kFar = 0.62, kShare = 0.285;
   const Eigen::Vector3d position(0.0, 0.02, 0.45);
@@ -62,6 +76,155 @@ LevelSet united(const LevelSet& a, const LevelSet& b) {
   return make_level_set(all);
 }
 
+struct Splash {
+  LevelSet level_set;
+  Bounds box;
+  std::size_t triangles = 0;
+  double seconds = 0.0;
+};
+
+/// The parts one by one, and their union: within a part next to nothing overlaps, and what lies inside others
+/// need not be looked for among the polygons.
+Splash make_splash(double length, const MeasurementInput& input) {
+  const VoxelizeRecipe recipe{.chosen = choose(input.tables.voxelizers, "hermesh"), .voxel_size = 1.0};
+  Splash splash;
+  for (const double part : {1.0, 2.0, 3.0, 4.0}) {
+    const PolygonMesh mesh = make_recipe(
+        "splash", {{"length", length}, {"seed", double(input.seed)}, {"part", part}}, input.context);
+    splash.triangles += mesh.triangle_count();
+    const Bounds box = bounds(mesh);
+    splash.box.add(box.lower);
+    splash.box.add(box.upper);
+    splash.seconds += timed([&] {
+      const LevelSet made = voxelize(mesh, recipe, input.context);
+      splash.level_set = part == 1.0 ? made : united(splash.level_set, made);
+    });
+  }
+  return splash;
+}
+
+/// The number with all its digits, for thresholds that are searched for.
+std::string all_digits(double value) {
+  std::ostringstream text;
+  text << std::setprecision(17) << value;
+  return text.str();
+}
+
+std::string growth_label(const Treatment& treatment, double divisor) {
+  return std::string(treatment.label) + (divisor == 1.0 ? ", same E" : ", E / " + readable(divisor));
+}
+std::string law_label(const Treatment& treatment, bool printed) {
+  return std::string(treatment.label) + (printed ? ", as printed" : ", scale-free");
+}
+/// How many times the points of table 9.3 those of table 9.4 are.
+std::optional<double> printed_growth(const Treatment& treatment) {
+  if (!treatment.table_9_4.points) return std::nullopt;
+  return *treatment.table_9_4.points / *treatment.table_9_3.points;
+}
+
+/// Points of the splash at two resolutions, the second twice the first, with thresholds divided by more and
+/// more.
+class Growth {
+ public:
+  explicit Growth(const MeasurementInput& input)
+      : input_(input),
+        length_(input.parameters.number("resolution")),
+        threshold_(250.0 / input.parameters.number("units_per_square_voxel")) {}
+
+  std::vector<MeasuredRow> run() {
+    std::vector<const Treatment*> wanted;
+    for (const Treatment& treatment : kTreatments)
+      if (std::ranges::any_of(
+              kDivisors, [&](double by) { return input_.wants("growth", growth_label(treatment, by)); }) ||
+          input_.wants("law", law_label(treatment, false)) || input_.wants("law", law_label(treatment, true)))
+        wanted.push_back(&treatment);
+    if (wanted.empty()) return {};
+    std::map<const Treatment*, double> base;
+    load(0.5 * length_);
+    for (const Treatment* treatment : wanted) base[treatment] = points(*treatment, 1.0);
+    load(length_);
+    for (const Treatment* treatment : wanted) measure(*treatment, base[treatment]);
+    return std::move(rows_);
+  }
+
+ private:
+  void load(double length) {
+    level_set_ = {};
+    level_set_ = make_splash(length, input_).level_set;
+    mask_ = frustum_mask(camera(length), kMaskResolution, input_.context);
+  }
+
+  double points(const Treatment& treatment, double divisor) const {
+    input_.context.check();
+    const AdaptivityField field{.mask = mask_, .outside = treatment.outside, .scale = {}};
+    const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, "adaptive-dual-contouring",
+                                                {{"threshold", all_digits(threshold_ / divisor)},
+                                                 {"representation", input_.parameters.text("representation")},
+                                                 {"hermite", "level-set"}}),
+                               .field = &field};
+    RunContext child = child_context(input_.context, false);
+    return double(extract(level_set_, nullptr, recipe, child).mesh.points.size());
+  }
+
+  void measure(const Treatment& treatment, double base) {
+    std::map<double, double> found;  // growth by divisor
+    const double most = points(treatment, std::numeric_limits<double>::infinity()) / base;
+    for (const double divisor : kDivisors) {
+      input_.context.progress(growth_label(treatment, divisor), 0.0);
+      const double fine = points(treatment, divisor);
+      found[divisor] = fine / base;
+      MeasuredRow row{"growth", growth_label(treatment, divisor)};
+      row.values = {{"divisor", divisor},
+                    {"threshold", threshold_ / divisor},
+                    {"coarse_points", base},
+                    {"fine_points", fine},
+                    {"growth", fine / base}};
+      if (const auto printed = printed_growth(treatment)) row.values["printed_growth"] = *printed;
+      rows_.push_back(std::move(row));
+    }
+    add_law(treatment, base, most, found, kScaleFree, false);
+    if (const auto printed = printed_growth(treatment)) add_law(treatment, base, most, found, *printed, true);
+  }
+
+  /// The divisor at which the points grow as asked: by the straight line through the two nearest pairs of
+  /// logarithms, whose answer joins them, until it is met within one in two hundred. Points grow with the
+  /// divisor, but for noise.
+  void add_law(const Treatment& treatment, double base, double most, std::map<double, double>& found,
+               double growth, bool printed) {
+    if (!input_.wants("law", law_label(treatment, printed))) return;
+    constexpr int kMost = 6;
+    constexpr double kTolerance = 0.005;
+    double divisor = 1.0;
+    for (int i = 0; growth < most; ++i) {
+      std::vector<std::pair<double, double>> near(found.begin(), found.end());
+      std::ranges::sort(near, {}, [&](const auto& each) { return std::abs(std::log(each.second / growth)); });
+      divisor = near[0].first;
+      if (i == kMost || std::abs(near[0].second / growth - 1.0) < kTolerance) break;
+      const double slope =
+          std::log(near[1].second / near[0].second) / std::log(near[1].first / near[0].first);
+      if (!(slope > 1e-3)) break;
+      const double next = near[0].first * std::exp(std::log(growth / near[0].second) / slope);
+      if (!(next > 1e-3 && next < 1e6)) break;
+      found[next] = points(treatment, next) / base;
+    }
+    MeasuredRow row{"law", law_label(treatment, printed)};
+    const bool met = std::abs(found[divisor] / growth - 1.0) < kTolerance;
+    row.values = {{"target", growth}, {"met", int(met)}, {"growth", found[divisor]}, {"most", most}};
+    if (met) {
+      row.values["divisor"] = divisor;
+      row.values["exponent"] = std::log2(divisor);
+    } else if (most > growth * (1.0 + kTolerance)) {
+      row.broken.push_back("the threshold at which the points grow as asked was not found");
+    }
+    rows_.push_back(std::move(row));
+  }
+
+  const MeasurementInput& input_;
+  const double length_, threshold_;
+  LevelSet level_set_, mask_;
+  std::vector<MeasuredRow> rows_;
+};
+
 class Measurer {
  public:
   explicit Measurer(const MeasurementInput& input)
@@ -72,48 +235,39 @@ class Measurer {
   std::vector<MeasuredRow> run() {
     const bool adaptive = wants("adaptive-dual-contouring");
     const bool guaranteed = input_.parameters.is("guaranteed", "yes") && wants("manifold-dual-contouring");
-    if (adaptive || guaranteed || input_.wants("input", splash_label())) make_level_set();
+    const bool old = input_.wants("old-method", kOldLabel);
+    if (adaptive || guaranteed || old || input_.wants("input", splash_label())) make_level_set();
     if (adaptive || guaranteed || input_.wants("input", kMaskLabel)) make_mask();
     const double threshold = 250.0 / input_.parameters.number("units_per_square_voxel");
     if (adaptive)
-      measure("adaptive-dual-contouring", {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
+      measure("adaptive-dual-contouring",
+              {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
     if (guaranteed)
       measure("manifold-dual-contouring",
               {{"tolerance", input_.parameters.text("tolerance")}, {"hermite", "level-set"}});
+    if (old) measure_old();
     if (!meshes_.empty()) draw();
     return std::move(rows_);
   }
 
  private:
+  static constexpr const char* kOldLabel = "openvdb, no mask";
   static constexpr const char* kMaskLabel = "frustum mask; printed: 84 × 72 × 63, 159 ms";
   std::string splash_label() const { return "splash, procedural, seed " + std::to_string(input_.seed); }
   bool wants(const std::string& table) const {
-    return std::ranges::any_of(kTreatments, [&](const Treatment& each) { return input_.wants(table, each.label); });
+    return std::ranges::any_of(kTreatments,
+                               [&](const Treatment& each) { return input_.wants(table, each.label); });
   }
 
-  /// The parts one by one, and their union: within a part next to nothing overlaps, and what lies inside others need not be
-  /// looked for among the polygons.
   void make_level_set() {
-    const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, "hermesh"), .voxel_size = 1.0};
-    std::size_t triangles = 0;
-    double seconds = 0.0;
-    for (const double part : {1.0, 2.0, 3.0, 4.0}) {
-      const PolygonMesh mesh = make_recipe(
-          "splash", {{"length", resolution_}, {"seed", double(input_.seed)}, {"part", part}}, input_.context);
-      triangles += mesh.triangle_count();
-      const Bounds box = bounds(mesh);
-      box_.add(box.lower);
-      box_.add(box.upper);
-      seconds += timed([&] {
-        const LevelSet made = voxelize(mesh, recipe, input_.context);
-        level_set_ = part == 1.0 ? made : united(level_set_, made);
-      });
-    }
+    Splash splash = make_splash(resolution_, input_);
+    level_set_ = splash.level_set;
+    box_ = splash.box;
     MeasuredRow row{"input", splash_label()};
-    row.values["triangles"] = triangles;
+    row.values["triangles"] = splash.triangles;
     row.values["dimensions"] = dimensions_of(level_set_);
     row.values["active"] = level_set_.active_voxels();
-    row.values["seconds"] = seconds;
+    row.values["seconds"] = splash.seconds;
     rows_.push_back(std::move(row));
   }
 
@@ -143,9 +297,40 @@ class Measurer {
     }
   }
 
+  /// The rate of the same level set by OpenVDB's mesher, which has no mask, beside that of the caption.
+  void measure_old() {
+    const auto [row, mesh] =
+        repeat("old-method", kOldLabel, {.chosen = choose(input_.tables.extractors, "openvdb")});
+    rows_.push_back(row);
+    if (resolution_ == kTable93Resolution) set_printed(rows_.back(), kPrintedOld);
+    const auto adaptive = std::ranges::find_if(rows_, [](const MeasuredRow& each) {
+      return each.table == "adaptive-dual-contouring" && each.label == kTreatments[0].label;
+    });
+    if (adaptive == rows_.end()) return;
+    for (const char* what : {"points", "seconds"})
+      rows_.back().values[std::string(what) + "_of_new"] =
+          row.values[what].get<double>() / adaptive->values[what].get<double>();
+  }
+
+  static void set_printed(MeasuredRow& row, const Printed& printed) {
+    if (printed.points) row.values["printed_points"] = *printed.points;
+    if (printed.seconds) row.values["printed_seconds"] = *printed.seconds;
+  }
+
   MeasuredRow measure(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
     const AdaptivityField field{.mask = mask_, .outside = treatment.outside, .scale = {}};
-    const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, name, given), .field = &field};
+    auto [row, mesh] = repeat(name, treatment.label,
+                              {.chosen = choose(input_.tables.extractors, name, given), .field = &field});
+    if (resolution_ == kTable93Resolution) set_printed(row, treatment.table_9_3);
+    if (resolution_ == kTable94Resolution) set_printed(row, treatment.table_9_4);
+    if (name == "adaptive-dual-contouring" && pixels_ > 0)
+      meshes_.emplace_back(treatment.label, std::move(mesh));
+    return row;
+  }
+
+  /// Repetitions of an extraction: the row of their median, and the mesh.
+  std::pair<MeasuredRow, PolygonMesh> repeat(const std::string& table, const std::string& label,
+                                             const ExtractRecipe& recipe) {
     std::vector<double> seconds;
     std::optional<std::int64_t> peak;
     PolygonMesh mesh;
@@ -157,21 +342,16 @@ class Measurer {
       seconds.push_back(timed([&] { mesh = extract(level_set_, nullptr, recipe, child).mesh; }));
       if (i == 0) peak = memory.bytes();
     }
-    MeasuredRow row{name, treatment.label};
+    MeasuredRow row{table, label};
     row.values["points"] = mesh.points.size();
     row.values["polygons"] = mesh.triangles.size() + mesh.quads.size();
     row.values["seconds"] = median(seconds);
     if (peak) row.values["peak"] = double(*peak) / (1 << 20);
-    const Printed printed = resolution_ == kTable93Resolution   ? treatment.table_9_3
-                            : resolution_ == kTable94Resolution ? treatment.table_9_4
-                                                                : Printed();
-    if (printed.points) row.values["printed_points"] = *printed.points;
-    if (printed.seconds) row.values["printed_seconds"] = *printed.seconds;
-    if (name == "adaptive-dual-contouring" && pixels_ > 0) meshes_.emplace_back(treatment.label, std::move(mesh));
-    return row;
+    return {std::move(row), std::move(mesh)};
   }
 
-  /// Figures 9.12 and 9.14 on one sheet, the whole with a close-up of the frustum's border; figure 9.13 on another.
+  /// Figures 9.12 and 9.14 on one sheet, the whole with a close-up of the frustum's border; figure 9.13 on
+  /// another.
   void draw() const {
     Sheet whole;
     whole.title = "Figures 9.12 and 9.14: the threshold holds within a camera's view alone";
@@ -190,7 +370,8 @@ class Measurer {
     view.frame.add((length * Eigen::Vector3d(0.134, 0.17, 0.27)));
     view.close_up = {{0.5, 0.35, 0.9}, 0.2};
     for (const auto& [label, mesh] : meshes_) {
-      const Picture picture{label, {std::to_string(mesh.points.size()) + " points"}, [&mesh = mesh] { return mesh; }};
+      const Picture picture{
+          label, {std::to_string(mesh.points.size()) + " points"}, [&mesh = mesh] { return mesh; }};
       whole.pictures.push_back(picture);
       view.pictures.push_back(picture);
     }
@@ -208,7 +389,12 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+  if (input.parameters.is("growth", "only")) return Growth(input).run();
+  std::vector<MeasuredRow> rows = Measurer(input).run();
+  if (input.parameters.is("growth", "yes")) std::ranges::move(Growth(input).run(), std::back_inserter(rows));
+  return rows;
+}
 
 }  // namespace
 
@@ -221,24 +407,63 @@ Measurement tables_9_3_and_9_4_measurement() {
       {"seconds", "time [s]", "median, Hermite data included"},
       {"printed_seconds", "printed [s]", "16 cores of 2011, the copy to a host included"},
       {"peak", "peak [MiB]", "resident memory beyond the level set"}};
-  return {.name = "tables-9-3-and-9-4",
-          .summary = "a frustum as a mask of adaptive extraction, on a procedural splash",
-          .parameters = {{"resolution", "2671", "voxels along the longest side; 5337 for table 9.4", {}, 100, 20000},
-                         {"units_per_square_voxel", "1000", "see table_9_2.toml", {}, 1e-6, 1e12},
-                         {"repetitions", "3", "timed runs", {}, 1, 100},
-                         {"guaranteed", "no", "whether manifold-dual-contouring runs beside it", {"yes", "no"}},
-                         {"tolerance", "0.25", "its tolerance, voxels", {}, 1e-3, 100},
-                         {"pixels", "600", "width of a picture; 0 draws none", {}, 0, 4000}},
-          .tables = {{"input",
-                      "the level sets",
-                      "what",
-                      {{"triangles", "triangles", "that it was made from"},
-                       {"dimensions", "voxels", "dimensions of the active voxels' box"},
-                       {"active", "active voxels", "of the level set"},
-                       {"seconds", "time [s]", "to make it"}}},
-                     {"adaptive-dual-contouring", "the thesis's method, threshold 250", "mask", columns},
-                     {"manifold-dual-contouring", "ours, with its guarantees", "mask", columns}},
-          .measure = measure};
+  std::vector<MeasuredColumn> old_columns = columns;
+  std::erase_if(old_columns, [](const MeasuredColumn& column) { return column.name == "share"; });
+  old_columns.push_back(
+      {"points_of_new", "÷ new points", "points over those of the new method without a mask; printed: 2.86"});
+  old_columns.push_back(
+      {"seconds_of_new", "÷ new time", "time over that of the new method without a mask; printed: 2.64"});
+  return {
+      .name = "tables-9-3-and-9-4",
+      .summary = "a frustum as a mask of adaptive extraction, on a procedural splash",
+      .parameters =
+          {{"resolution", "2671", "voxels along the longest side; 5337 for table 9.4", {}, 100, 20000},
+           {"units_per_square_voxel", "1000", "see table_9_2.toml", {}, 1e-6, 1e12},
+           {"repetitions", "3", "timed runs", {}, 1, 100},
+           {"guaranteed", "no", "whether manifold-dual-contouring runs beside it", {"yes", "no"}},
+           {"tolerance", "0.25", "its tolerance, voxels", {}, 1e-3, 100},
+           {"growth",
+            "no",
+            "whether the points are compared with those at half the resolution, or nothing else is done",
+            {"no", "yes", "only"}},
+           {"representation",
+            "sparse-float",
+            "Hermite data of that comparison; 'thesis' has the printed 10 bytes",
+            {"sparse-float", "thesis"}},
+           {"pixels", "600", "width of a picture; 0 draws none", {}, 0, 4000}},
+      .tables = {{"input",
+                  "the level sets",
+                  "what",
+                  {{"triangles", "triangles", "that it was made from"},
+                   {"dimensions", "voxels", "dimensions of the active voxels' box"},
+                   {"active", "active voxels", "of the level set"},
+                   {"seconds", "time [s]", "to make it"}}},
+                 {"adaptive-dual-contouring", "the thesis's method, threshold 250", "mask", columns},
+                 {"manifold-dual-contouring", "ours, with its guarantees", "mask", columns},
+                 {"old-method", "what stands in for the old method, on the same level set", "method",
+                  old_columns},
+                 {"growth",
+                  "points at this resolution over those at half of it, thresholds divided",
+                  "mask, threshold",
+                  {{"divisor", "÷ E", "by which the threshold is divided at the finer resolution"},
+                   {"threshold", "E [vx²]", "threshold at the finer resolution"},
+                   {"coarse_points", "coarse", "points at half the resolution, threshold undivided"},
+                   {"fine_points", "fine", "points at this resolution"},
+                   {"growth", "growth", "one over the other"},
+                   {"printed_growth", "printed",
+                    "that from table 9.3 to table 9.4, where the threshold was not divided"}}},
+                 {"law",
+                  "the divisor at which the points grow as asked",
+                  "mask, target",
+                  {{"target", "target",
+                    "the growth asked for: that of the tables, or 4, as of a mesh without a scale"},
+                   {"divisor", "÷ E", "by which the threshold has to be divided when the resolution doubles"},
+                   {"met", "met", "1 where a threshold was found at which they do"},
+                   {"growth", "growth", "met at that divisor, or the nearest that was found"},
+                   {"most", "at E = 0", "growth where nothing is merged at the finer resolution"},
+                   {"exponent", "exponent",
+                    "power of the voxel's size that the threshold in square voxels goes with"}}}},
+      .measure = measure};
 }
 
 }  // namespace hermesh
