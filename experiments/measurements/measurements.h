@@ -2,7 +2,7 @@
 // makes (errors of a code, bytes of a data structure, the rate of an operation).
 //
 // To add one:
-//   1. In experiments/measure_NAME.cpp write a function from MeasurementInput to rows, and below it
+//   1. In experiments/measurements/measure_NAME.cpp write a function from MeasurementInput to rows, and below it
 //      `Measurement NAME_measurement()`: the name, the parameters with their defaults and ranges, the tables
 //      with what their columns mean, and that function. Add the file to experiments/CMakeLists.txt.
 //   2. Declare it at the end of this header, and enter it in the table in measurements.cpp.
@@ -116,5 +116,13 @@ Measurement fracture_speed_measurement();
 Measurement fracture_guarantee_measurement();
 Measurement digests_measurement();
 Measurement tests_measurement();
+Measurement figure_9_1_measurement();
+Measurement figure_9_3_measurement();
+Measurement figure_9_4_measurement();
+Measurement figure_9_6_measurement();
+Measurement threads_measurement();
+Measurement sampling_measurement();
+Measurement arithmetic_measurement();
+Measurement surface_noise_measurement();
 
 }  // namespace hermesh

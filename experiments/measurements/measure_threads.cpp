@@ -1,0 +1,215 @@
+// How every part of the pipeline gains from threads: voxelizers, extractors, Booleans, fractures.
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "algorithms/hermite/combine.h"
+#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/samplers.h"
+#include "experiments/cases/cases.h"
+#include "experiments/fracture/fracture_run.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/measure.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/measurements/measurements.h"
+#include "experiments/pipeline.h"
+
+namespace hermesh {
+namespace {
+
+constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
+constexpr const char* kVoxelizers[] = {"thesis", "hermesh", "openvdb"};
+constexpr const char* kExtractors[] = {"adaptive-dual-contouring", "dual-contouring",
+                                       "marching-cubes",           "certified-octree",
+                                       "manifold-dual-contouring", "openvdb"};
+constexpr const char* kSampling[] = {"level set → sparse, packed", "polygons → sparse, float"};
+constexpr const char* kBooleans[] = {"union, sparse, packed", "union, thesis's 10-byte voxels",
+                                     "union, fixed 10-byte voxels"};
+constexpr const char* kMethods[] = {"labelled", "thesis", "openvdb"};
+
+/// 1, 2, 4, … and all that there are.
+std::vector<std::size_t> thread_counts() {
+  std::vector<std::size_t> counts;
+  const std::size_t most = tbb::global_control::active_value(kThreads);
+  for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
+  counts.push_back(most);
+  return counts;
+}
+
+/// One piece of work with every number of threads, in turns; it returns its seconds.
+std::vector<MeasuredRow> by_threads(const std::string& table, const std::string& label,
+                                    const std::function<double()>& work, const MeasurementInput& input) {
+  const std::vector<std::size_t> counts = thread_counts();
+  std::vector<double> cpu(counts.size(), 0.0);
+  std::vector<Contender> contenders;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const auto limited = [&, i] {
+      input.context.check();
+      const tbb::global_control limit(kThreads, counts[i]);
+      const double start = process_cpu_seconds();
+      const double seconds = work();
+      cpu[i] += process_cpu_seconds() - start;
+      return seconds;
+    };
+    contenders.push_back({.run = limited,
+                          .budget_seconds = input.parameters.number("budget"),
+                          .repetitions = int(input.parameters.number("repetitions")),
+                          .seconds = {}});
+  }
+  contenders.back().run();  // warms caches and pools
+  cpu.back() = 0.0;
+  race(contenders);
+  std::vector<MeasuredRow> rows;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const double seconds = median(contenders[i].seconds);
+    MeasuredRow row{table, label};
+    row.values = {{"threads", counts[i]},
+                  {"seconds", seconds},
+                  {"shortest", std::ranges::min(contenders[i].seconds)},
+                  {"cpu_seconds", cpu[i] / double(contenders[i].seconds.size())},
+                  {"speedup", median(contenders[0].seconds) / seconds},
+                  {"efficiency", median(contenders[0].seconds) / seconds / double(counts[i])}};
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+class Measurer {
+ public:
+  explicit Measurer(const MeasurementInput& input) : input_(input) {}
+
+  std::vector<MeasuredRow> run() {
+    const bool voxelizers = input_.wants_any("voxelizers", kVoxelizers);
+    const bool extractors = input_.wants_any("extractors", kExtractors);
+    const bool hermite = input_.wants_any("hermite", kSampling) || input_.wants_any("hermite", kBooleans);
+    const bool fractures = input_.wants_any("fracture", kMethods);
+    if (!voxelizers && !extractors && !hermite && !fractures) return {};
+    model_ = input_.tables.load(input_.parameters.text("case"), input_.context).mesh;
+    if (voxelizers) race_voxelizers();
+    if (!extractors && !hermite && !fractures) return std::move(rows_);
+    level_set_ = voxelize(model_, recipe("hermesh"), input_.context);
+    if (extractors) race_extractors();
+    if (hermite) race_hermite();
+    if (fractures) race_fractures();
+    return std::move(rows_);
+  }
+
+ private:
+  VoxelizeRecipe recipe(const std::string& voxelizer) const {
+    return {.chosen = choose(input_.tables.voxelizers, voxelizer),
+            .resolution = input_.parameters.number("resolution")};
+  }
+
+  /// The work gets a context of its own each time, so that no progress is shown within what is timed.
+  void add(const std::string& table, const std::string& label, const std::function<void(RunContext&)>& work) {
+    if (!input_.wants(table, label)) return;
+    input_.context.progress(table + ", " + label, 0.0);
+    const auto once = [&] {
+      RunContext child = child_context(input_.context, false);
+      return timed([&] { work(child); });
+    };
+    std::ranges::move(by_threads(table, label, once, input_), std::back_inserter(rows_));
+  }
+
+  void race_voxelizers() {
+    for (const char* name : kVoxelizers)
+      add("voxelizers", name,
+          [&, chosen = recipe(name)](RunContext& context) { voxelize(model_, chosen, context); });
+  }
+
+  void race_extractors() {
+    for (const char* name : kExtractors) {
+      const auto& options = find_variant(input_.tables.extractors, name).options;
+      GivenOptions given;
+      if (std::ranges::find(options, "hermite", &OptionSpec::name) != options.end())
+        given["hermite"] = "level-set";
+      const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, name, given)};
+      add("extractors", name,
+          [&, recipe](RunContext& context) { extract(level_set_, nullptr, recipe, context); });
+    }
+  }
+
+  void race_hermite() {
+    constexpr NormalCodeId kCode = NormalCodeId::octahedral;
+    add("hermite", kSampling[0],
+        [&](RunContext& context) { sample_level_set_packed(level_set_, 0.0, kCode, context); });
+    add("hermite", kSampling[1],
+        [&](RunContext& context) { sample_polygons(level_set_, 0.0, model_, context); });
+    if (!input_.wants_any("hermite", kBooleans)) return;
+    RunContext& context = input_.context;
+    const PackedHermite a = sample_level_set_packed(level_set_, 0.0, kCode, context);
+    PackedHermite b = a;
+    std::int32_t low = 0, high = 0;
+    for (const SignLeaf& leaf : b.leaves)
+      low = std::min(low, leaf.lower[0]), high = std::max(high, leaf.lower[0]);
+    for (SignLeaf& leaf : b.leaves) leaf.lower[0] += ((high - low) / 10) & ~7;
+    add("hermite", kBooleans[0], [&](RunContext& own) { combine(Boolean::unite, a, b, own); });
+    {
+      const ThesisDense x = to_dense<ThesisVoxel>(a, context), y = to_dense<ThesisVoxel>(b, context);
+      add("hermite", kBooleans[1], [&](RunContext& own) { combine(Boolean::unite, x, y, own); });
+    }
+    const FixedDense x = to_dense<FixedVoxel>(a, context), y = to_dense<FixedVoxel>(b, context);
+    add("hermite", kBooleans[2], [&](RunContext& own) { combine(Boolean::unite, x, y, own); });
+  }
+
+  void race_fractures() {
+    RunContext& context = input_.context;
+    const VoxelizeRecipe coarser{.chosen = choose(input_.tables.voxelizers, "hermesh"),
+                                 .resolution = input_.parameters.number("fracture_resolution")};
+    FractureObject object;
+    object.level_set = voxelize(model_, coarser, context);
+    object.hermite = sample_polygons(object.level_set, 0.0, model_, context);
+    CutterChoices choices;
+    choices.seed = input_.seed;
+    const std::string word = "voronoi:" + readable(input_.parameters.number("pieces"));
+    const MadeCutters cutters = make_cutters(parse_cutters(word), object.hermite, choices, context);
+    for (const char* method : kMethods) {
+      if (!input_.wants("fracture", method)) continue;
+      context.progress(std::string("fracture, ") + method, 0.0);
+      const auto once = [&] {
+        RunContext child = child_context(context, false);
+        return run_fracture(
+                   object, cutters, {.name = method, .options = {}}, [](PieceOutput&&) {}, child)
+            .seconds;
+      };
+      std::ranges::move(by_threads("fracture", method, once, input_), std::back_inserter(rows_));
+    }
+  }
+
+  const MeasurementInput& input_;
+  PolygonMesh model_;
+  LevelSet level_set_;
+  std::vector<MeasuredRow> rows_;
+};
+
+std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+
+}  // namespace
+
+Measurement threads_measurement() {
+  const std::vector<MeasuredColumn> columns = {
+      {"threads", "threads", "how many"},
+      {"seconds", "time [s]", "median"},
+      {"shortest", "min [s]", "shortest"},
+      {"cpu_seconds", "CPU [s]", "of all threads, mean"},
+      {"speedup", "speedup", "times as fast as with one thread, by medians"},
+      {"efficiency", "efficiency", "speedup over threads; 1 is perfect"}};
+  return {
+      .name = "threads",
+      .summary = "speed of every part by number of threads",
+      .parameters = {{"case", "dragon", "model", case_choices()},
+                     {"resolution", "400", "voxels along its longest side", {}, 8, 20000},
+                     {"fracture_resolution", "200", "the same for the object that is broken", {}, 8, 20000},
+                     {"pieces", "20", "Voronoi cells that it is broken into", {}, 2, 1000},
+                     {"repetitions", "5", "of every number of threads, in turns", {}, 1, 1000},
+                     {"budget", "20", "seconds that the repetitions of one number may take", {}, 0, 1e6}},
+      .tables = {{"voxelizers", "polygons to a level set", "voxelizer", columns},
+                 {"extractors", "level set to a mesh, Hermite data included", "extractor", columns},
+                 {"hermite", "Hermite data: made, and united with the same moved by a tenth", "operation",
+                  columns},
+                 {"fracture", "a fracture by plane cuts, meshes included", "method", columns}},
+      .measure = measure};
+}
+
+}  // namespace hermesh
