@@ -30,9 +30,10 @@ using Normal = std::array<float, 3>;
 
 /// Cases of files; what the list does not say, scans are told from the rest by name: the rest was modelled by
 /// people.
-constexpr const char* kScans[] = {
-    "dragon", "bunny",   "happy-buddha", "lucy",       "armadillo", "asian-dragon",     "nefertiti",
-    "horse",  "laurana", "dragon-res2",  "rocker-arm", "elephant",  "many-small-holes", "thai-statue"};
+constexpr const char* kScans[] = {"dragon",           "bunny",        "happy-buddha",     "lucy",
+                                  "armadillo",        "asian-dragon", "nefertiti",        "horse",
+                                  "laurana",          "dragon-res2",  "rocker-arm",       "elephant",
+                                  "many-small-holes", "thai-statue",  "happy-buddha-full"};
 constexpr const char* kGroups[] = {"all", "scanned", "modelled"};
 
 struct Census {

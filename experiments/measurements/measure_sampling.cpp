@@ -182,6 +182,7 @@ class Measurer {
   explicit Measurer(const MeasurementInput& input) : input_(input) {}
 
   std::vector<MeasuredRow> run() {
+    std::size_t swept = 0;
     for (const char* name : kModels) {
       const bool misses = input_.wants("missed", name) || input_.wants("where", name);
       const bool signs = input_.wants("sign-angle", name);
@@ -191,7 +192,10 @@ class Measurer {
       const double voxel = bounds(model.mesh).size().maxCoeff() / input_.parameters.number("resolution");
       if (misses) find_misses(name, model, voxel);
       if (signs) sweep_angles(name, model, voxel);
+      swept += signs;
     }
+    if (swept == kModels.size())
+      for (std::size_t i = 0; i < kAngles.size(); ++i) add_angle_row(kAll, kAngles[i], sums_[i]);
     return std::move(rows_);
   }
 
@@ -254,25 +258,35 @@ class Measurer {
     const WindingOracle winding(surface);
     const VoxelSelection selection{3.0, std::int64_t(input_.parameters.number("samples")), input_.seed};
     const SignTruth truth(surface, winding, SignOracle::kParity, selection, input_.context);
-    for (const double angle : kAngles) {
+    for (std::size_t i = 0; i < kAngles.size(); ++i) {
       input_.context.check();
       RunContext child = child_context(input_.context, false);
       const VoxelizeRecipe recipe{
-          .chosen = choose(input_.tables.voxelizers, "thesis", {{"sign_angle", readable(angle)}}),
+          .chosen = choose(input_.tables.voxelizers, "thesis", {{"sign_angle", readable(kAngles[i])}}),
           .voxel_size = voxel};
       const SignReport report = truth.judge(voxelize(model.mesh, recipe, child));
-      MeasuredRow row{"sign-angle", name};
-      row.values = {{"angle", angle},
-                    {"judged", report.inside + report.outside},
-                    {"wrong_inside", report.wrong_inside},
-                    {"wrong_outside", report.wrong_outside},
-                    {"wrong", report.wrong()},
-                    {"wrong_share", report.wrong_share()}};
-      rows_.push_back(std::move(row));
+      add_angle_row(name, kAngles[i], report);
+      sums_[i].inside += report.inside;
+      sums_[i].outside += report.outside;
+      sums_[i].wrong_inside += report.wrong_inside;
+      sums_[i].wrong_outside += report.wrong_outside;
     }
   }
 
+  void add_angle_row(const std::string& label, double angle, const SignReport& report) {
+    MeasuredRow row{"sign-angle", label};
+    row.values = {{"angle", angle},
+                  {"judged", report.inside + report.outside},
+                  {"wrong_inside", report.wrong_inside},
+                  {"wrong_outside", report.wrong_outside},
+                  {"wrong", report.wrong()},
+                  {"wrong_share", report.wrong_share()}};
+    rows_.push_back(std::move(row));
+  }
+
+  static constexpr const char* kAll = "all models";
   const MeasurementInput& input_;
+  std::array<SignReport, kAngles.size()> sums_;  ///< over the models
   std::vector<MeasuredRow> rows_;
 };
 
