@@ -10,9 +10,9 @@
 //
 // Both sides of a cut have the same crossings on the same edges. But along a rim a cell holds, for each
 // piece, other crossings (the original surface's on one side of the cut only, those of a later cutter in one
-// piece only), so that the pieces' points differ there, and the volumes do not add up. Eq. 7.1 adds data between samples
-// of one sign where a cut runs beside the surface (trap T11), which become polygons that bound nothing, and 10 bytes lose
-// some data (trap T2), which leaves holes. fracture.h has the method that repairs all of it.
+// piece only), so that the pieces' points differ there, and the volumes do not add up. Eq. 7.1 leaves data between samples
+// of one sign where a cut runs beside the surface, and the whole wall where two cutters share one (trap T11); these become
+// polygons that bound nothing. 10 bytes lose some data (trap T2), which leaves holes. fracture.h has the method that repairs all of it.
 //
 // Where the text leaves a gap (paper/readings.md, R33 to R37):
 //   - Planes and Voronoi cells are made into solids code by code, each cut off by a box around the object. As the cutters

@@ -120,7 +120,12 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
   const double pixel = (1.0 + kExplosion) * object_.size().maxCoeff() / kPixels;
   if (drawn_triangles_ > kExact) piece.mesh = sketched(piece.mesh, 0.5 * pixel);
   piece.mesh.attributes.clear();
-  sketches_.push_back({std::move(piece.mesh), piece.mass.centre});
+  // The centre of mass of a mesh that is not closed may lie anywhere; a picture has the piece where it belongs.
+  const Bounds box = bounds(piece.mesh);
+  const Vector3d& centre = piece.mass.centre;
+  const bool within = !box.empty() && (centre - box.lower).minCoeff() >= 0.0 && (box.upper - centre).minCoeff() >= 0.0;
+  const Vector3d place = within || box.empty() ? centre : Vector3d(0.5 * (box.lower + box.upper));
+  sketches_.push_back({std::move(piece.mesh), place});
 }
 
 validation::FractureLedger FractureFolder::judge(RunContext& context,
@@ -176,7 +181,7 @@ void FractureFolder::draw(const std::string& title, RunContext& context) const {
                                 for (std::size_t p = 0; p < sketch.mesh.points.size(); ++p)
                                   all.points.push_back(
                                       Vector3d(sketch.mesh.world(p) + shift(sketch) - middle).cast<float>());
-                                for (const Triangle& t : sketch.mesh.triangles)
+                                for (const Triangle& t : triangulated(sketch.mesh))
                                   all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
                               }
                               return all;

@@ -27,11 +27,12 @@ PolygonMesh load_subject(const FractureSubject& subject, const MeasurementInput&
   return mesh;
 }
 
-SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input) {
+SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input,
+                              const std::string& voxelizer) {
   RunContext child = child_context(input.context, false);
   SampledSubject result;
   result.object.level_set =
-      voxelize(mesh, {.chosen = choose(input.tables.voxelizers, "hermesh"), .resolution = longest}, child);
+      voxelize(mesh, {.chosen = choose(input.tables.voxelizers, voxelizer), .resolution = longest}, child);
   result.hermite_seconds =
       timed([&] { result.object.hermite = sample_polygons(result.object.level_set, 0.0, mesh, child); });
   return result;

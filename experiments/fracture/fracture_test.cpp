@@ -600,20 +600,26 @@ TEST(FractureMethods, TheThresholdOfTheThesisMergesCells) {
   }
 }
 
+/// A box with faces across the axes.
+FloatHermite straight_box() {
+  const auto beyond = [](const Vector3d& p) { return Vector3d(p.cwiseAbs() - Vector3d(8.3, 6.4, 6.4)); };
+  return sampled({.value = [=](const Vector3d& p) { return beyond(p).maxCoeff(); },
+                  .gradient =
+                      [=](const Vector3d& p) {
+                        Vector3d n = Vector3d::Zero();
+                        int axis;
+                        beyond(p).maxCoeff(&axis);
+                        n[axis] = p[axis];
+                        return n;
+                      }},
+                 {20, 20, 20});
+}
+
 // Eq. 7.1 by hand (trap T11). The face x = 8.3 of a box and the plane x = 8.1 cross the same edges, from 8 to 9. Beyond
 // the plane lie 0.2 voxel of the box and no sample. At a sample x = 8 the box has the component −0.3, and what is beyond
 // the plane 0.1: the intersection takes the greater one, with its data, although both ends of the edge are outside of it.
 TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
-  const AnalyticSurface box{[](const Vector3d& p) { return (p.cwiseAbs() - Vector3d(8.3, 6.4, 6.4)).maxCoeff(); },
-                            [](const Vector3d& p) -> Vector3d {
-                              Vector3d n = Vector3d::Zero();
-                              int axis;
-                              (p.cwiseAbs() - Vector3d(8.3, 6.4, 6.4)).maxCoeff(&axis);
-                              n[axis] = p[axis];
-                              return n;
-                            }};
-  const FloatHermite object = sampled(box, {20, 20, 20});
-  RunContext context;
+  const FloatHermite object = straight_box();
   const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 8.1}}, object.placement);
   ThesisPieces printed, repaired;
   break_by_thesis(printed, object, *cutters, {Rule::printed, 0.0});
@@ -626,6 +632,24 @@ TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
   EXPECT_EQ(printed.meshes[1].quads.size(), 169u);
   // The first one is the box up to the plane, but for the rounding of offsets.
   EXPECT_NEAR(mass_properties(printed.meshes[0]).volume, repaired.volume, 0.005 * repaired.volume);
+}
+
+// A plane x = 0.3 has two sides, each a cutter. Once both are taken nothing is left but their wall: behind it rest's
+// samples are outside with the component 0.7 or 0.3, and the complement of the last cutter has the same there.
+TEST(FractureMethods, TheEquationLeavesTheWallThatTwoCuttersShare) {
+  const FloatHermite object = straight_box();
+  const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 0.3}}, object.placement);
+  ThesisPieces printed, repaired;
+  break_by_thesis(printed, object, *cutters, {Rule::printed, 0.0});
+  break_by_thesis(repaired, object, *cutters, {Rule::repaired, 0.0});
+  EXPECT_EQ(repaired.meshes.size(), 2u);
+  ASSERT_EQ(printed.meshes.size(), 3u);
+  EXPECT_EQ(printed.figure("needless_crossings"), 169.0);
+  EXPECT_EQ(printed.meshes[2].quads.size(), 169u);
+  for (std::size_t i = 0; i < printed.meshes[2].points.size(); ++i)
+    EXPECT_NEAR(printed.meshes[2].world(i).x(), 0.3, 0.01);
+  for (int piece : {0, 1})
+    EXPECT_NEAR(mass_properties(printed.meshes[piece]).volume, mass_properties(repaired.meshes[piece]).volume, 5.0);
 }
 
 TEST(FractureMethods, TheThesisMakesTheSameBytesAtAnyNumberOfThreads) {

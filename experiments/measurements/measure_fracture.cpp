@@ -102,7 +102,7 @@ class FractureBooks {
 
   FractureObject sampled(const PolygonMesh& mesh, double longest) {
     RunContext child = child_context(input_.context, false);
-    SampledSubject made = sample_subject(mesh, longest, input_);
+    SampledSubject made = sample_subject(mesh, longest, input_, input_.parameters.text("voxelizer"));
     conversion_ = made.hermite_seconds;
     FractureObject object = std::move(made.object);
     uncut_volume_ = uncut_volume(object, child);
@@ -289,6 +289,7 @@ Measurement fracture_measurement() {
                {"pieces", "20", "numbers of cells", {"2", "20", "50", "200", "2 20", "2 20 200"}},
                {"tolerances", "0", "of the method labelled, voxels", {"0", "0.2", "1", "0 0.2", "0 0.2 1"}},
                {"thesis_tolerances", "0 0.3", "of the method thesis: roots of its threshold, voxels", {"0", "0.3", "0 0.3"}},
+               {"voxelizer", "hermesh", "that the object's signs are from; thesis is chapter 5", {"hermesh", "thesis"}},
                {"cutters", "voronoi", "cells with plane or rough walls", {"voronoi", "chunks"}},
                {"scale", "1", "of the resolutions", {}, 0.05, 4.0},
                {"order", "yes", "whether the order of the volume's difference is measured", {"yes", "no"}}},

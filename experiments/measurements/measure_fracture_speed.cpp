@@ -64,7 +64,7 @@ std::vector<MeasuredColumn> columns() {
   return {{"labelled", "labelled [s]",
            "median; the object's Hermite data and writing left out, as everywhere here"},
           {"labelled_least", "least", "of the rounds"},
-          {"thesis", "thesis [s]", "median, cutters' Hermite data included"},
+          {"thesis", "thesis [s]", "median, by the printed rule, cutters' Hermite data included"},
           {"thesis_least", "least", "of the rounds"},
           {"openvdb", "OpenVDB [s]", "median, cutters' level sets included, their polygons left out"},
           {"openvdb_least", "least", "of the rounds"},
