@@ -45,8 +45,8 @@ std::vector<Claim> read_claims(const std::filesystem::path& path);
 /// `missing` without. @throws Error for a query that is no SQL, or names what there is not.
 Judged judge(const Claim& claim, const RowDatabase& rows);
 
-/// Of each statement in claim.doctored: what went wrong, if it changes no row or does not change the verdict; nothing if
-/// all do. The rows are as before afterwards.
+/// Tries each statement in claim.doctored, and for each test a failure of it; returns a sentence for each that changes no
+/// row or does not change the verdict. The rows are as before afterwards.
 std::vector<std::string> rules_that_cannot_fail(const Claim& claim, RowDatabase& rows);
 
 /// "md" or "json": every claim with its verdict, the printed figure beside ours, and how many there are of each verdict.

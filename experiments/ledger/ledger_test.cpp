@@ -122,8 +122,8 @@ class Ledger : public testing::Test {
     write("paper/claims.toml", claim("one", kRule));
     write("paper/numbers.toml", "pages = [\"page.md\"]\n[numbers]\nspeed = \"SELECT max(seconds) / min(seconds) FROM race\"\n"
                                 "range = { query = \"SELECT min(points), max(points) FROM count\", format = \"%.1f\" }\n"
-                                "[plain]\nall = [\"Debian 12\"]\n");
-    write("page.md", "It is <!--=speed-->?<!--/--> times as fast on Debian 12, see table 9.2 of 2011.\n");
+                                "[plain]\nall = [\"Debian 12\"]\n\"page.md\" = [\"no 7\"]\n");
+    write("page.md", "It is <!--=speed-->?<!--/--> times as fast on Debian 12, see table 9.2 of 2011, no 7.\n");
   }
   void TearDown() override { fs::remove_all(root_); }
 
@@ -232,9 +232,13 @@ TEST_F(Ledger, PagesAreFilledAndStayAsTheyAre) {
   EXPECT_FALSE(Pages(root_).problems().empty());
   const auto changed = Pages(root_).fill();
   EXPECT_NE(std::find(changed.begin(), changed.end(), "page.md"), changed.end());
-  EXPECT_EQ(read("page.md"), "It is <!--=speed-->4<!--/--> times as fast on Debian 12, see table 9.2 of 2011.\n");
+  EXPECT_EQ(read("page.md"), "It is <!--=speed-->4<!--/--> times as fast on Debian 12, see table 9.2 of 2011, no 7.\n");
   EXPECT_TRUE(Pages(root_).problems().empty()) << Pages(root_).problems().at(0);
   EXPECT_TRUE(Pages(root_).fill().empty());
+  write("paper/numbers.toml", read("paper/numbers.toml") + "[tables]\nall = \"SELECT label AS which, seconds AS 'time [s]' FROM race\"\n");
+  write("page.md", "<!--=all--><!--/-->\n");
+  Pages(root_).fill();
+  EXPECT_EQ(read("page.md"), "<!--=all-->\n| which | time [s] |\n| --- | --: |\n| slow | 2 |\n| fast | 0.5 |\n<!--/-->\n");
   write("page.md", "From <!--=range-->-<!--/-->, <!--=count reproduced-->-<!--/--> of <!--=count-->-<!--/-->.\n<!--=table race ball 40-->\n<!--/-->\n");
   Pages(root_).fill();
   EXPECT_TRUE(read("page.md").starts_with("From <!--=range-->240.0 to 1000.0<!--/-->, <!--=count reproduced-->0<!--/--> of <!--=count-->1<!--/-->.\n"))

@@ -183,7 +183,7 @@ std::vector<std::string> orphans(const std::string& page, const std::vector<std:
 NumbersFile read_numbers(const fs::path& path) {
   const std::string file = path.filename().string();
   const toml::table document = parse_toml(path);
-  const Section section(file, document, "the file", {"pages", "numbers", "plain"});
+  const Section section(file, document, "the file", {"pages", "numbers", "tables", "plain"});
   NumbersFile result;
   for (const toml::node& node : section.list("pages"))
     if (const auto* page = node.as_string()) result.pages.emplace_back(page->get());
@@ -200,10 +200,14 @@ NumbersFile read_numbers(const fs::path& path) {
       }
       result.numbers[std::string(key.str())] = number;
     }
+  if (const toml::table* tables = section.optional_table("tables"))
+    for (const auto& [key, node] : *tables) {
+      const auto* query = node.as_string();
+      if (!query) section.fail(node.source().begin.line, "a query should stand here");
+      result.tables[std::string(key.str())] = query->get();
+    }
   if (const toml::table* plain = section.optional_table("plain"))
     for (const auto& [key, node] : *plain) {
-      const Section entry(file, *plain, "[plain]", {std::string(key.str())});
-      (void)entry;
       const toml::array* const list = node.as_array();
       if (!list) section.fail(node.source().begin.line, "a list of phrases should stand here");
       const std::string page = key.str() == "all" ? "" : std::string(key.str());
@@ -222,6 +226,23 @@ std::string text_of(const Number& number, const RowDatabase& rows) {
     const std::string part = formatted(value, number.format);
     if (!text.empty() && part == text) continue;  // both ends of a range are alike
     text += (text.empty() ? "" : " to ") + part;
+  }
+  return text;
+}
+
+std::string table_of(const std::string& query, const RowDatabase& rows) {
+  constexpr std::size_t kMost = 1000;  // more is no table for a page
+  const std::vector<RowDatabase::Row> found = rows.rows(query, kMost);
+  if (found.empty()) throw Error("there is no row for: " + query);
+  std::string text, rule;
+  for (const auto& [column, value] : found[0]) {
+    text += "| " + column + " ";
+    rule += value.is_number() ? "| --: " : "| --- ";
+  }
+  text = "\n" + text + "|\n" + rule + "|\n";
+  for (const RowDatabase::Row& row : found) {
+    for (const auto& [column, value] : row) text += "| " + (value.is_null() ? "–" : formatted(value, "")) + " ";
+    text += "|\n";
   }
   return text;
 }
@@ -263,6 +284,7 @@ std::string Pages::content_of(const std::string& marker) const {
     write_claims(claims, verdicts, "md", out);
     return "\n" + out.str();
   }
+  if (const auto table = numbers_.tables.find(marker); table != numbers_.tables.end()) return table_of(table->second, rows_);
   const auto number = numbers_.numbers.find(marker);
   if (number == numbers_.numbers.end()) throw Error("paper/numbers.toml has no number " + marker);
   return text_of(number->second, rows_);

@@ -1,6 +1,6 @@
 // Numbers of the text that come from rows: pages hold markers, which are filled from the rows and checked against them.
 //
-//   <!--=NAME-->8.9 to 10.8<!--/-->                     the number NAME of paper/numbers.toml
+//   <!--=NAME-->8.9 to 10.8<!--/-->                     the number or the table NAME of paper/numbers.toml
 //   <!--=table FOLDER SUBJECT [RESOLUTION]-->…<!--/-->  the tables of results/FOLDER with that case (or table), as
 //                                                       `hermesh report` writes them
 //   <!--=legend FOLDER-->…<!--/-->                      what their headers mean
@@ -27,6 +27,7 @@ struct Number {
 struct NumbersFile {
   std::vector<std::filesystem::path> pages;  ///< from the project's root
   std::map<std::string, Number> numbers;
+  std::map<std::string, std::string> tables;  ///< queries, whose rows and columns are those of the table
   /// Phrases of a page whose digits are no results (versions, names, exit codes), by page; "" for all pages.
   std::map<std::string, std::vector<std::string>> plain;
 };
@@ -36,6 +37,10 @@ NumbersFile read_numbers(const std::filesystem::path& path);
 
 /// The text of a number: "8.9", or "8.9 to 10.8". @throws Error if the query gives no row, or a NULL.
 std::string text_of(const Number& number, const RowDatabase& rows);
+
+/// The rows that a query gives as a table of Markdown, its columns named as the query names them.
+/// @throws Error if there are none.
+std::string table_of(const std::string& query, const RowDatabase& rows);
 
 /// The project's pages with their sources: `root` has paper/numbers.toml, paper/claims.toml and results/.
 class Pages {

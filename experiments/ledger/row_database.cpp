@@ -26,7 +26,7 @@ const std::vector<std::pair<std::string, std::string>>& common_columns() {
       {"resolution", "/resolution"}, {"label", "/variant/label"},
       {"method", "/variant/name"},   {"options", "/variant/options"},
       {"voxelizer", "/voxelization/label"}, {"input", "/case/sha256"},
-      {"failed", "/failed"}};
+      {"input_triangles", "/case/triangles"}, {"failed", "/failed"}};
   return columns;
 }
 

@@ -17,7 +17,7 @@ namespace hermesh {
 /// `hermesh report` shows: of cells that ran several times the last run. Its columns:
 ///   - experiment, tier, run, made_at (the commit), dirty, date, cpu, cores, threads;
 ///   - subject (the case, or of a measurement its table), resolution, label, method (name of the variant), options,
-///     voxelizer, input (SHA-256 of the case), stand_in (1 for a case that is one), failed, broken (how many promises);
+///     voxelizer, input (SHA-256 of the case), input_triangles, stand_in (1 for a case that is one), failed, broken (how many promises);
 ///   - the columns of reports under their names and in their units (columns.h), and those that measurements bring along.
 ///     Where a measurement has a column of one of the names above, that is it;
 ///   - row: all of it as JSON.
