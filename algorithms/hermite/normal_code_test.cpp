@@ -235,6 +235,21 @@ TEST(ThesisNormalCode, ByHand) {
   EXPECT_EQ(octant_slots::unfold(folded).b, 94u);
 }
 
+/// §4.1: 2^13 = 8192 weights of four bytes, 32 kilobytes; each makes a unit vector of its slot's components.
+TEST(ThesisNormalCode, TheTableHasAWeightForEachSlot) {
+  const auto& weights = octant_slots::kWeights<127>;
+  EXPECT_EQ(weights.size(), 8192u);
+  EXPECT_EQ(sizeof weights, 32u * 1024u);
+  for (std::uint32_t a = 0; a <= 126; ++a) {
+    for (std::uint32_t b = 0; a + b <= 126; ++b) {
+      const double c = 127.0 - a - b;
+      EXPECT_NEAR(weights[octant_slots::fold(a, b)] * std::sqrt(double(a) * a + double(b) * b + c * c), 1.0,
+                  1e-6)
+          << a << ' ' << b;
+    }
+  }
+}
+
 /// Trap: the thesis takes the code 0 on x- and y-edges for "no crossing" (§4.2). x + y must stay below 1/126
 /// of the sum, so the cone's half angle is between atan(1/125)/√2 and atan(1/125) = 0.458°.
 TEST(ThesisNormalCode, IsZeroForNormalsOfThePositiveOctantNearZ) {

@@ -160,6 +160,20 @@ TEST(ThesisVoxel, OffsetsAreRoundedDownToBelowOne) {
   EXPECT_EQ(ThesisVoxel::quantize(-1.0f), 0);
 }
 
+// §4.2 counts one multiplication and shifts for packing a distance.
+TEST(ThesisVoxel, ADistanceIsPackedByOneProductAndAShift) {
+  for (int i = 0; i < 4096; ++i) {
+    const float offset = static_cast<float>(i) / 4096;
+    const auto code = static_cast<std::uint32_t>(offset * 1023.0f);
+    ThesisVoxel voxel;
+    for (int axis = 0; axis < 3; ++axis) voxel.set(axis, {offset, {1, 0, 0}});
+    const auto words = std::bit_cast<std::array<std::uint16_t, 5>>(voxel);
+    const std::uint32_t word = words[3] | (std::uint32_t{words[4]} << 16);
+    EXPECT_EQ(word & ((1u << 30) - 1), code << 20 | code << 10 | code) << offset;
+    EXPECT_EQ(voxel.get(1).offset, static_cast<float>(code) / 1023.0f) << offset;
+  }
+}
+
 /// Mean and greatest error of offsets, in steps of the code, over a million of them at equal distances.
 template <class Voxel>
 std::array<double, 3> offset_errors(double step) {

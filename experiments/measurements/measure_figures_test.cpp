@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "experiments/harness/experiment_file.h"
 #include "experiments/harness/run_cells.h"
@@ -48,6 +50,15 @@ TEST(ArithmeticMeasurement, AllStoragesFindTheSameNeighbours) {
       rows_of("arithmetic", {{"case", "torus"}, {"resolution", "24"}, {"repetitions", "3"}}, "blocks/");
   ASSERT_EQ(rows.size(), 6u);
   expect_unbroken(rows);  // a sum that is not that of the first row breaks it
+}
+
+/// §2.4 indexes a grid of 200 × 400 samples by x + 200 y, and says that it has 160 000 elements.
+TEST(UniformGrid, TwoHundredTimesFourHundredSamplesAreEightyThousand) {
+  std::vector<int> used(160'000, 0);
+  for (int y = 0; y < 400; ++y)
+    for (int x = 0; x < 200; ++x) ++used.at(std::size_t(x + y * 200));
+  EXPECT_TRUE(std::all_of(used.begin(), used.begin() + 80'000, [](int times) { return times == 1; }));
+  EXPECT_TRUE(std::all_of(used.begin() + 80'000, used.end(), [](int times) { return times == 0; }));
 }
 
 /// The spectrum that the heights were made with is the one that is found in them.
