@@ -33,6 +33,7 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
                                     [](const OptionSpec& option) { return option.name == "tolerance"; });
     GivenOptions given;
     if (proves) given["tolerance"] = "0";
+    if (may_lose_crossings()) given["representation"] = "sparse-float";
     const Options options(GetParam().name, declared, given);
     const LevelSet volume = make_level_set(grid);
     return hermesh::extract(volume, nullptr, {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context)
@@ -44,12 +45,18 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
     const PolygonMesh mesh = extract(grid, isovalue);
     const MeshFile file = to_mesh_file(mesh);
     if (file.triangle_count() == 0) return 0;
-    const Promises& promises = GetParam().promises;
+    Promises promises = GetParam().promises;
+    // As printed it promises nothing, since its ten bytes lose crossings; of data that lose none its meshes are closed.
+    if (may_lose_crossings()) promises.closed = promises.oriented = true;
     EXPECT_TRUE(promises.closed && promises.oriented);
     const Judgement judgement = judge(file, promises, kCounts, context);
     EXPECT_TRUE(judgement.promises.broken.empty()) << promise_verdict(promises, judgement.promises);
     for (std::size_t i = 0; i < mesh.points.size(); ++i) EXPECT_TRUE(mesh.points[i].allFinite());
     return file.triangle_count();
+  }
+  static bool may_lose_crossings() {
+    return std::ranges::any_of(GetParam().options,
+                               [](const OptionSpec& option) { return option.name == "lost_crossings"; });
   }
   RunContext context;
 };
