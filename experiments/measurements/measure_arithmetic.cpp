@@ -9,13 +9,13 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
-#include <random>
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/normal_codes/thesis.h"
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
+#include "experiments/cases/random_normals.h"
 #include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
@@ -163,18 +163,6 @@ Normal unpack_counted(std::uint16_t code, bool table) {
   return {octant_slots::with_sign(x.value, (bits & 0x8000u) << 16),
           octant_slots::with_sign(y.value, (bits & 0x4000u) << 17),
           octant_slots::with_sign(z.value, (bits & 0x2000u) << 18)};
-}
-
-std::vector<Normal> random_normals(std::size_t count, std::uint64_t seed) {
-  std::mt19937_64 generator(seed);
-  std::normal_distribution<double> coordinate;
-  std::vector<Normal> normals(count);
-  for (Normal& n : normals) {
-    const double x = coordinate(generator), y = coordinate(generator), z = coordinate(generator);
-    const double length = std::hypot(x, y, z);
-    n = {float(x / length), float(y / length), float(z / length)};
-  }
-  return normals;
 }
 
 constexpr const char* kOperations[] = {"pack, quotients as printed", "pack, one division", "unpack, table",

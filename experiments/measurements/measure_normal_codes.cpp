@@ -6,11 +6,11 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <random>
 #include <vector>
 
 #include "algorithms/hermite/normal_code.h"
 #include "algorithms/hermite/with_normal_code.h"
+#include "experiments/cases/random_normals.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
 
@@ -211,18 +211,6 @@ Loops loops_of(Code) {
           [](const std::uint16_t* from, std::uint16_t* to, std::size_t n) {
             for (std::size_t i = 0; i < n; ++i) to[i] = Code::negate(from[i]);
           }};
-}
-
-std::vector<Normal> random_normals(std::size_t count, std::uint64_t seed) {
-  std::mt19937_64 generator(seed);
-  std::normal_distribution<double> coordinate;
-  std::vector<Normal> normals(count);
-  for (Normal& n : normals) {
-    const double x = coordinate(generator), y = coordinate(generator), z = coordinate(generator);
-    const double length = std::hypot(x, y, z);
-    n = {float(x / length), float(y / length), float(z / length)};
-  }
-  return normals;
 }
 
 /// CPU seconds of this thread, which other programs on the machine do not add to.
