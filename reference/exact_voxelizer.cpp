@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "reference/distance_oracle.h"
 #include "reference/winding_oracle.h"
@@ -132,10 +133,7 @@ LevelSet exact_voxelizer(const VoxelizationInput& input) {
   // From level 1 on: the leaves know the signs of their inactive voxels already.
   openvdb::tools::signedFloodFillWithValues(grid->tree(), outside, within, true, 1, 1);
 
-  const auto transform = openvdb::math::Transform::createLinearTransform(input.voxel_size);
-  const Eigen::Vector3d& origin = input.mesh.origin;
-  transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
-  grid->setTransform(transform);
+  grid->setTransform(transform_at(input.mesh.origin, input.voxel_size));
   grid->setName("sdf");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return make_level_set(grid);

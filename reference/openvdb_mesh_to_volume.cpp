@@ -3,6 +3,7 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/memory_estimate.h"
 
 namespace hermesh {
@@ -54,9 +55,7 @@ LevelSet openvdb_mesh_to_volume(const VoxelizationInput& input) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);
   const Stage stage(input.context, "voxelization");
   initialize_openvdb();
-  const auto transform = openvdb::math::Transform::createLinearTransform(input.voxel_size);
-  const Eigen::Vector3d& origin = input.mesh.origin;
-  transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
+  const auto transform = transform_at(input.mesh.origin, input.voxel_size);
 
   Interrupter interrupter{input.context};
   const bool raw = input.options.is("renormalize", "no");

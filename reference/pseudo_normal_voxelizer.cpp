@@ -9,6 +9,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/search/triangle_tree.h"
 
@@ -242,10 +243,7 @@ LevelSet pseudo_normal_voxelizer(const VoxelizationInput& input) {
     if (leaf) grid->tree().addLeaf(leaf.release());
   machinery.sign_tiles(grid->tree(), outside, inside);
 
-  const auto transform = openvdb::math::Transform::createLinearTransform(input.voxel_size);
-  const Vector3d& origin = input.mesh.origin;
-  transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
-  grid->setTransform(transform);
+  grid->setTransform(transform_at(input.mesh.origin, input.voxel_size));
   grid->setName("sdf");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return make_level_set(grid);

@@ -93,4 +93,10 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   return result;
 }
 
+openvdb::math::Transform::Ptr transform_at(const Eigen::Vector3d& origin, double voxel_size) {
+  const auto transform = openvdb::math::Transform::createLinearTransform(voxel_size);
+  transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
+  return transform;
+}
+
 }  // namespace hermesh

@@ -15,4 +15,7 @@ openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
 /// @throws Error for a grid with perspective.
 IndexToWorld placement_of(const openvdb::FloatGrid& grid);
 
+/// The map of a grid of cubic voxels of `voxel_size` whose sample (0, 0, 0) is at `origin`, both in world units.
+openvdb::math::Transform::Ptr transform_at(const Eigen::Vector3d& origin, double voxel_size);
+
 }  // namespace hermesh

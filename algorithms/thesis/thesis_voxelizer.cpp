@@ -12,6 +12,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/thesis/thesis_stages.h"
 #include "algorithms/thesis/thesis_volumes.h"
 
@@ -90,10 +91,7 @@ Leaves make_leaves(const thesis::BandBlock& block, const Widths& widths, double 
 
 /// Names the grid and puts voxel (0, 0, 0) at the mesh's origin, as in the local copy of the points.
 void place(openvdb::GridBase& grid, const char* name, const VoxelizationInput& input) {
-  const auto transform = openvdb::math::Transform::createLinearTransform(input.voxel_size);
-  const Eigen::Vector3d& origin = input.mesh.origin;
-  transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
-  grid.setTransform(transform);
+  grid.setTransform(transform_at(input.mesh.origin, input.voxel_size));
   grid.setName(name);
 }
 

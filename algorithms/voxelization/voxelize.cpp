@@ -5,6 +5,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/distance/band.h"
 #include "algorithms/voxelization/inside/interior_faces.h"
@@ -144,13 +145,6 @@ InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins
   return sheets;
 }
 
-/// From voxels to world units: sample (0, 0, 0) is at the mesh's origin.
-openvdb::math::Transform::Ptr placement(const PolygonMesh& mesh, double voxel_size) {
-  const auto transform = openvdb::math::Transform::createLinearTransform(voxel_size);
-  transform->postTranslate(openvdb::Vec3d(mesh.origin.x(), mesh.origin.y(), mesh.origin.z()));
-  return transform;
-}
-
 /// The grid of the nearest triangles; its active voxels are those of the band's leaves.
 openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   using IntLeaf = openvdb::Int32Tree::LeafNodeType;
@@ -272,8 +266,8 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
     widen_band(boundary_triangles(soup, boundary), options.voxel_size, near, wide, *result.distance,
                result.nearest.get(), context);
   }
-  result.distance->setTransform(placement(mesh, options.voxel_size));
-  if (result.nearest) result.nearest->setTransform(placement(mesh, options.voxel_size));
+  result.distance->setTransform(transform_at(mesh.origin, options.voxel_size));
+  if (result.nearest) result.nearest->setTransform(transform_at(mesh.origin, options.voxel_size));
   return result;
 }
 
