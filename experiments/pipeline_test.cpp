@@ -83,6 +83,11 @@ TEST(PromiseCheck, ABoundIsInVoxelsAndBothWays) {
   report.certified_to_reference = {.lower = 0.0, .upper = 0.19};
   const Circumstances circumstances{.bound = Circumstances::Bound{0.1, 2.0, &uniform}};
   EXPECT_TRUE(check_promises({}, report, circumstances).broken.empty());
+  // 0.005 voxel of the proof and 0.001 of the judge come on top, and no more.
+  report.certified_to_reference->upper = 2.0 * (0.1 + 0.006);
+  EXPECT_TRUE(check_promises({}, report, circumstances).broken.empty());
+  report.certified_to_reference->upper = 2.0 * (0.1 + 0.0065);
+  EXPECT_EQ(check_promises({}, report, circumstances).broken.size(), 1u);
   report.certified_to_reference->upper = 0.3;
   EXPECT_EQ(check_promises({}, report, circumstances).broken,
             Sentences{"tolerance (up to 0.150000 voxels to the uniform mesh)"});
