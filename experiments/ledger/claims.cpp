@@ -123,9 +123,15 @@ bool holds(const std::string& condition, const Claim& claim, const RowDatabase& 
 Judged judge_by_rows(const Claim& claim, const RowDatabase& rows) {
   Judged judged;
   judged.figures = rows.first_row(claim.ours);
-  if (judged.figures.empty()) judged.reason = "there is no such row";
+  if (judged.figures.empty()) {
+    judged.reason = "there is no such row of";
+    for (const std::string& table : rows.tables_in(claim.ours)) judged.reason += " " + table;
+  }
   for (const auto& [name, value] : judged.figures)
-    if (value.is_null() && judged.reason.empty()) judged.reason = "the rows do not have " + name;
+    if (value.is_null() && judged.reason.empty()) {
+      judged.reason = "the rows do not have " + name + ":";
+      for (const std::string& table : rows.tables_in(claim.ours)) judged.reason += " " + table;
+    }
   if (!judged.reason.empty() || !tests_passed(claim, rows, judged)) return judged;
   judged.verdict = holds(claim.reproduced, claim, rows) ? Verdict::reproduced
                    : holds(claim.shape, claim, rows)    ? Verdict::shape

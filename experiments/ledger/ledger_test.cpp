@@ -181,9 +181,9 @@ TEST_F(Ledger, AVerdictFollowsFromTheRows) {
 }
 
 TEST_F(Ledger, WhatIsNotThereIsMissing) {
-  EXPECT_NE(judged(replaced(kRule, "b.label = '50'", "b.label = '60'")).reason.find("no such row"), std::string::npos);
+  EXPECT_NE(judged(replaced(kRule, "b.label = '50'", "b.label = '60'")).reason.find("no such row of count"), std::string::npos);
   EXPECT_EQ(judged(replaced(kRule, "count b", "nowhere b")).reason, "there are no rows of nowhere");
-  EXPECT_NE(judged(replaced(kRule, "a.points * 1.0 / b.points", "nullif(1, 1)")).reason.find("do not have reduction"),
+  EXPECT_NE(judged(replaced(kRule, "a.points * 1.0 / b.points", "nullif(1, 1)")).reason.find("do not have reduction: count"),
             std::string::npos);
   EXPECT_NE(error_in([&] { judged(replaced(kRule, "b.points", "b.pints")); }).find("claim one: no such column"),
             std::string::npos);
