@@ -3,7 +3,6 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "algorithms/voxelization/distance/quad_diagonals.h"
 #include "experiments/cases/case_file.h"
 #include "experiments/harness/sha256.h"
+#include "experiments/harness/shell.h"
 #include "reference/agreed_faces.h"
 
 namespace hermesh {
@@ -36,12 +36,6 @@ fs::path cache_folder() {
   return fs::temp_directory_path() / "hermesh";
 }
 
-std::string shell_quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result += "'";
-}
-
 /// Runs fetch_data.sh. Returns why there is no file now; empty if there is one.
 std::string fetch(const CaseFile& file, RunContext& context) {
   if (file.from.empty()) return "no package registry has it";
@@ -53,15 +47,10 @@ std::string fetch(const CaseFile& file, RunContext& context) {
   const std::string command = "bash " + shell_quoted((experiments_folder() / "fetch_data.sh").string()) +
                               " " + shell_quoted(file.name) + " " + shell_quoted(cache_folder().string()) +
                               " 2>&1 </dev/null";
-  std::string output;
-  FILE* const pipe = popen(command.c_str(), "r");
-  if (!pipe) return "no shell could be started";
-  char buffer[512];
-  while (const std::size_t size = std::fread(buffer, 1, sizeof buffer, pipe)) output.append(buffer, size);
-  const int status = pclose(pipe);
+  const auto [status, output] = shell_output(command);
   context.check();
+  if (status == -1) return "no shell could be started";
   if (status == 0) return "";
-  while (output.ends_with('\n')) output.pop_back();
   const std::string reason = output.substr(output.rfind('\n') + 1);
   return failures[file.name] = reason.empty() ? "it could not be fetched" : reason;
 }

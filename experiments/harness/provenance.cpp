@@ -11,7 +11,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -21,6 +20,7 @@
 
 #include "algorithms/core/error.h"
 #include "algorithms/lattice/simd/simd_level.h"
+#include "experiments/harness/shell.h"
 
 #ifndef HERMESH_BUILD_TYPE
 #define HERMESH_BUILD_TYPE "unknown"
@@ -39,25 +39,11 @@ SourceState& mutable_source_state() {
   return state;
 }
 
-/// A path as one word of a shell command, whatever characters it has.
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? "'\\''" : std::string(1, c);
-  return result + "'";
-}
-
-/// What git prints, without the last line break; nothing when it fails.
+/// What git prints; nothing when it fails.
 std::optional<std::string> git(const std::filesystem::path& folder, const std::string& arguments) {
-  const std::string command = "git -C " + quoted(folder.string()) + " " + arguments + " 2>/dev/null";
-  FILE* pipe = popen(command.c_str(), "r");
-  if (!pipe) return std::nullopt;
-  std::string output;
-  std::array<char, 4096> buffer;
-  while (const std::size_t count = fread(buffer.data(), 1, buffer.size(), pipe))
-    output.append(buffer.data(), count);
-  if (pclose(pipe) != 0) return std::nullopt;
-  while (!output.empty() && output.back() == '\n') output.pop_back();
-  return output;
+  const ShellOutput output = shell_output("git -C " + shell_quoted(folder.string()) + " " + arguments + " 2>/dev/null");
+  if (output.status != 0) return std::nullopt;
+  return output.text;
 }
 
 std::string cpu_model() {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algorithms/core/error.h"
+#include "experiments/harness/shell.h"
 
 namespace hermesh {
 namespace {
@@ -87,6 +88,14 @@ TEST_F(Checkout, ARowIsSignedByWhatTheProgramWasBuiltFrom) {
   const std::string flags = provenance(folder_)["build"]["flags"];
   EXPECT_NE(flags.find("-march=x86-64-v2"), std::string::npos) << flags;
   EXPECT_EQ(flags.find("-Wall"), std::string::npos) << flags;
+}
+
+TEST(Shell, TakesAnyTextAsOneWordAndSaysHowACommandEnded) {
+  for (const std::string text : {"plain", "two words", "it's", "$HOME `id` \\ \"x\"", "a\nb", "*"})
+    EXPECT_EQ(shell_output("printf %s " + shell_quoted(text)).text, text);
+  EXPECT_EQ(shell_output("true").status, 0);
+  EXPECT_NE(shell_output("false").status, 0);
+  EXPECT_EQ(shell_output("printf 'a\n\n'").text, "a");
 }
 
 }  // namespace

@@ -138,8 +138,9 @@ bool is_stand_in(const Json& row) {
          });
 }
 
-Json value_in(const Json& row, const std::string& name) {
-  for (const Column& column : own_columns(row))
+/// The value of the column `name`; `own` are the columns that the row brings along.
+Json value_in(const Json& row, const std::vector<Column>& own, const std::string& name) {
+  for (const Column& column : own)
     if (sqlite3_stricmp(column.name.c_str(), name.c_str()) == 0)
       if (Json value = value_of(column, row); !value.is_null()) return value;
   if (name == "row") return row.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -183,7 +184,8 @@ void RowDatabase::add(const std::string& name, const std::vector<Json>& rows) {
   Statement(connection_.get(), "CREATE TABLE " + quoted(name) + " (" + columns + ")").step();
   Statement insert(connection_.get(), "INSERT INTO " + quoted(name) + " VALUES (" + marks + ")");
   for (const Json& row : shown) {
-    for (std::size_t i = 0; i < names.size(); ++i) insert.bind(static_cast<int>(i) + 1, value_in(row, names[i]));
+    const std::vector<Column> own = own_columns(row);
+    for (std::size_t i = 0; i < names.size(); ++i) insert.bind(static_cast<int>(i) + 1, value_in(row, own, names[i]));
     insert.step();
     insert.reset();
   }

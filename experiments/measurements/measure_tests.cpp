@@ -2,13 +2,13 @@
 #include <fnmatch.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
 
 #include "experiments/cases/cases.h"
+#include "experiments/harness/shell.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/measurements/measurements.h"
 
@@ -30,26 +30,11 @@ std::vector<fs::path> test_programs() {
   return programs;
 }
 
-std::string shell_word(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
-
-/// What a command prints. @throws Error if it fails.
-std::string output_of(const std::string& command) {
-  FILE* const pipe = popen(command.c_str(), "r");
-  if (!pipe) throw Error("no shell could be started");
-  std::string output;
-  char buffer[4096];
-  while (const std::size_t size = std::fread(buffer, 1, sizeof buffer, pipe)) output.append(buffer, size);
-  if (pclose(pipe) != 0) throw Error("this failed: " + command);
-  return output;
-}
-
 /// All tests of a program as "Suite.Test".
 std::vector<std::string> tests_of(const fs::path& program) {
-  std::istringstream lines(output_of(shell_word(program.string()) + " --gtest_list_tests 2>/dev/null"));
+  const ShellOutput list = shell_output(shell_quoted(program.string()) + " --gtest_list_tests 2>/dev/null");
+  if (list.status != 0) throw Error(program.string() + " does not list its tests; build all targets again");
+  std::istringstream lines(list.text);
   std::vector<std::string> tests;
   std::string suite;
   for (std::string line; std::getline(lines, line);) {
@@ -64,9 +49,9 @@ bool matches(const std::string& pattern, const std::string& test) { return fnmat
 
 /// How many of the tests ran, and how many of these failed; a skipped one did not run.
 std::pair<int, int> run_tests(const fs::path& program, const std::string& pattern, const fs::path& report) {
-  const std::string command = shell_word(program.string()) + " --gtest_filter=" + shell_word(pattern) +
-                              " --gtest_output=json:" + shell_word(report.string()) + " >/dev/null 2>&1";
-  const int status = std::system(command.c_str());
+  const int status = shell_output(shell_quoted(program.string()) + " --gtest_filter=" + shell_quoted(pattern) +
+                                  " --gtest_output=json:" + shell_quoted(report.string()) + " 2>&1")
+                         .status;
   std::ifstream file(report);
   const Json json = Json::parse(file, nullptr, false);
   if (json.is_discarded()) return {1, 1};  // the program ended before it could say
