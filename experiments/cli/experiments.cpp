@@ -11,10 +11,13 @@
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
 #include "experiments/harness/compare.h"
+#include "experiments/harness/experiment_file.h"
 #include "experiments/harness/harness.h"
+#include "experiments/harness/run_cells.h"
 #include "experiments/harness/rows.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/ledger/pages.h"
+#include "experiments/measurements/measurements.h"
 
 namespace hermesh::cli {
 namespace {
@@ -34,7 +37,12 @@ void add_run(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "run", "Run an experiment: validate, time, append rows, print the table");
   auto settings = std::make_shared<RunSettings>();
-  command->add_option("EXPERIMENT", settings->experiment, "Experiment file (.toml)")->required();
+  auto name = std::make_shared<std::string>();
+  command
+      ->add_option("EXPERIMENT", *name,
+                   "Experiment file (.toml), the name of one in experiments/, or a table or figure of the thesis "
+                   "that it makes (figure_9_8)")
+      ->required();
   command->add_option("--tier", settings->tier, "Sizes to run (default: quick)")
       ->check(CLI::IsMember({"quick", "full"}));
   command->add_option(
@@ -45,8 +53,9 @@ void add_run(CLI::App& app, Session& session) {
   auto with_data = std::make_shared<bool>(false);
   command->add_flag("--require-data", *with_data,
                     "Take no stand-in for a model that is not at hand: name it, and end with exit code 3");
-  command->callback([settings, with_data, &session] {
-    session.command = [settings, with_data, &session] {
+  command->callback([settings, name, with_data, &session] {
+    session.command = [settings, name, with_data, &session] {
+      settings->experiment = experiment_file(*name);
       require_data(*with_data);
       return run(*settings, session);
     };
@@ -66,6 +75,32 @@ int check_pages() {
   for (const std::string& problem : problems) std::cout << problem << '\n';
   if (problems.empty()) std::cout << "all numbers of the pages come from the rows\n";
   return problems.empty() ? kDone : kNotMet;
+}
+
+/// Makes a sample of the cells behind each folder of results/ again, and names the folders that come out otherwise.
+int print_stale(const std::string& folder, Session& session) {
+  Experiment experiment;
+  experiment.name = experiment.measurement = "stale";
+  experiment.kind = ExperimentKind::kMeasurement;
+  std::size_t folders = 0, tried = 0, differing = 0;
+  std::ostringstream found;
+  const auto tell = [&](const Json& row) {
+    if (row.contains("failed")) throw Error(text_at(row, "/failed"));
+    const std::string name = text_at(row, "/variant/label");
+    ++folders;
+    tried += row.at("values").at("tried").get<std::size_t>();
+    differing += row.at("values").at("differing").get<std::size_t>();
+    if (row.contains("broken"))
+      found << name << ": " << text_at(row, "/values/differing") << " of " << text_at(row, "/values/tried")
+            << " cells differ; first " << text_at(row, "/values/difference") << '\n';
+    if (const std::string why = text_at(row, "/values/skipped"); !why.empty()) found << name << ": not tried: " << why << '\n';
+  };
+  run_measurement(experiment, {}, all_tables(), {}, folder.empty() ? "" : "stale/folders/" + folder, Json::object(),
+                  session.context, tell);
+  erase_progress_line();
+  if (folders == 0) throw Error("results/ has no folder \"" + folder + "\" with rows");
+  std::cout << found.str() << folders << " folders, " << tried << " cells made again, " << differing << " differ\n";
+  return differing == 0 ? kDone : kNotMet;
 }
 
 int print_query(const std::string& query) {
@@ -94,7 +129,7 @@ void add_report(CLI::App& app, Session& session) {
   struct Arguments {
     std::filesystem::path folder;
     std::string format = "md";
-    bool fill = false, check = false;
+    bool fill = false, check = false, stale = false;
     std::string query;
   };
   CLI::App* command = add_command(
@@ -108,7 +143,11 @@ void add_report(CLI::App& app, Session& session) {
   auto* query = command->add_option("--query", arguments->query,
                                     "Print what SQL gives on the rows of results/: each folder is a table "
                                     "(experiments/ledger/row_database.h lists the columns)");
+  auto* stale = command->add_flag("--stale", arguments->stale,
+                                  "Make a sample of the cells behind results/*, or results/DIR alone, again with this program, "
+                                  "and name what comes out otherwise; if anything, exit code 3");
   folder->excludes(fill)->excludes(check)->excludes(query);
+  stale->excludes(fill)->excludes(check)->excludes(query);
   query->excludes(fill)->excludes(check);
   fill->excludes(check);
   command
@@ -116,9 +155,10 @@ void add_report(CLI::App& app, Session& session) {
                    "md, csv, tex, or plots to draw those of the rows into DIR (default: md)")
       ->check(CLI::IsMember({"md", "csv", "tex", "plots"}));
   command->callback([arguments, &session] {
-    if (arguments->folder.empty() && !arguments->fill && !arguments->check && arguments->query.empty())
-      throw CLI::RequiredError("DIR, --query, --fill or --check");
-    session.command = [arguments] {
+    if (arguments->folder.empty() && !arguments->fill && !arguments->check && !arguments->stale && arguments->query.empty())
+      throw CLI::RequiredError("DIR, --query, --fill, --check or --stale");
+    session.command = [arguments, &session] {
+      if (arguments->stale) return print_stale(arguments->folder.filename().string(), session);
       if (arguments->fill) return fill_pages();
       if (arguments->check) return check_pages();
       if (!arguments->query.empty()) return print_query(arguments->query);
@@ -131,7 +171,7 @@ void add_report(CLI::App& app, Session& session) {
 void add_claims(CLI::App& app, Session& session) {
   struct Arguments {
     std::filesystem::path file, results;
-    std::string id, format = "md";
+    std::string id, of, format = "md";
     bool doctor = false;
   };
   CLI::App* command = add_command(app, session, "claims",
@@ -140,6 +180,7 @@ void add_claims(CLI::App& app, Session& session) {
   command->add_option("--file", arguments->file, "Claims and their rules (default: paper/claims.toml)");
   command->add_option("--results", arguments->results, "Folder of folders with rows.jsonl (default: results)");
   command->add_option("--id", arguments->id, "Only claims whose id contains this text");
+  command->add_option("--of", arguments->of, "Only claims on this table or figure of the thesis, such as table_9_2");
   command->add_option("--format", arguments->format, "md or json (default: md)")->check(CLI::IsMember({"md", "json"}));
   command->add_flag("--doctor", arguments->doctor,
                     "Try each rule on doctored rows instead, and name those that cannot fail; if any, exit code 3");
@@ -148,8 +189,13 @@ void add_claims(CLI::App& app, Session& session) {
       if (arguments->file.empty()) arguments->file = project_root() / "paper" / "claims.toml";
       if (arguments->results.empty()) arguments->results = project_root() / "results";
       std::vector<Claim> claims = read_claims(arguments->file);
-      std::erase_if(claims, [&](const Claim& claim) { return claim.id.find(arguments->id) == std::string::npos; });
-      if (claims.empty()) throw Error("no claim's id contains \"" + arguments->id + "\"");
+      std::erase_if(claims, [&](const Claim& claim) {
+        return claim.id.find(arguments->id) == std::string::npos ||
+               (!arguments->of.empty() && !is_of(claim, arguments->of));
+      });
+      if (claims.empty())
+        throw Error(arguments->of.empty() ? "no claim's id contains \"" + arguments->id + "\""
+                                          : "there is no claim on " + arguments->of + "; names are like figure_9_8");
       RowDatabase rows;
       rows.add_folders(arguments->results);
       bool fine = true;

@@ -67,7 +67,8 @@ void print_json() {
                                  {"options", to_json(voxelizer.options)}});
   for (const ExperimentInfo& experiment : list_experiments())
     all["experiments"].push_back(
-        {{"name", experiment.name}, {"question", experiment.question}, {"file", experiment.file.string()}});
+        {{"name", experiment.name}, {"question", experiment.question}, {"file", experiment.file.string()},
+         {"shows", experiment.shows}});
   for (const CaseInfo& item : list_cases())
     all["cases"].push_back({{"name", item.name}, {"summary", item.summary}, {"kind", item.kind}});
   std::cout << all.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
@@ -123,10 +124,12 @@ void print_text() {
   for (const Extractor& extractor : all_extractors()) print_extractor(extractor);
   std::cout << "\nvoxelizers (hermesh voxelize, remesh --voxelizer NAME)\n";
   for (const Voxelizer& voxelizer : all_voxelizers()) print_voxelizer(voxelizer);
-  std::cout << "\nexperiments (hermesh run FILE)\n";
+  std::cout << "\nexperiments (hermesh run NAME), and the tables and figures of the thesis that they make\n";
   for (const ExperimentInfo& experiment : list_experiments()) {
     print_line(experiment.name, experiment.question);
-    print_line("", experiment.file.string());
+    std::string numbers;
+    for (const std::string& number : experiment.shows) numbers += (numbers.empty() ? "also called " : ", ") + number;
+    if (!numbers.empty()) print_line("", numbers);
   }
   std::cout << "\ncases (inputs that experiments name)\n";
   for (const CaseInfo& item : list_cases()) print_line(item.name, item.summary + " [" + item.kind + "]");

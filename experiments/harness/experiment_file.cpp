@@ -1,6 +1,7 @@
 #include "experiments/harness/experiment_file.h"
 
 #include <algorithm>
+#include <regex>
 #include <set>
 
 #include "experiments/harness/toml_section.h"
@@ -309,18 +310,34 @@ void read_voxelization(const Section& file, Experiment& experiment) {
   experiment.interior_band = file.number_or("interior_band", 3.0, 1.0, 1e4);
 }
 
+const std::vector<std::string> kKeys = {"kind",          "question",      "shows", "voxelizers",  "columns",
+                                        "variants",      "features",      "plots", "measurement", "seed",
+                                        "exterior_band", "interior_band", "quick", "full"};
+
+std::vector<std::string> read_shows(const Section& file) {
+  std::vector<std::string> shows;
+  if (!file.has("shows")) return shows;
+  static const std::regex kNumber("(table|figure)_[0-9]+_[0-9]+");
+  for (const toml::node& node : file.list("shows")) {
+    const auto* value = node.as_string();
+    if (!value || !std::regex_match(value->get(), kNumber))
+      file.fail(node.source().begin.line, "\"shows\" must be a list of tables and figures such as \"figure_9_8\"");
+    shows.push_back(value->get());
+  }
+  return shows;
+}
+
 }  // namespace
 
 Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& vocabulary) {
   const toml::table table = parse_toml(path);
-  const Section file(path.filename().string(), table, "an experiment",
-                     {"kind", "question", "voxelizers", "columns", "variants", "features", "exterior_band",
-                      "interior_band", "plots", "measurement", "seed", "quick", "full"});
+  const Section file(path.filename().string(), table, "an experiment", kKeys);
   Experiment experiment;
   experiment.name = path.stem().string();
   if (file.has("kind"))
     experiment.kind = ExperimentKind(file.choice("kind", {"extraction", "voxelization", "measurement"}));
   experiment.question = file.text("question");
+  experiment.shows = read_shows(file);
   if (experiment.kind == ExperimentKind::kMeasurement) return read_measurement(file, vocabulary, experiment);
   for (const char* key : {"measurement", "seed"})
     if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" needs kind = \"measurement\"");
@@ -341,11 +358,11 @@ Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& 
   return experiment;
 }
 
-std::string read_question(const std::filesystem::path& path) {
+ExperimentHead read_head(const std::filesystem::path& path) {
   const toml::table table = parse_toml(path);
   const auto question = table["question"].value<std::string>();
   if (!question) throw Error(path.filename().string() + ":1: an experiment needs the key \"question\"");
-  return *question;
+  return {*question, read_shows(Section(path.filename().string(), table, "an experiment", kKeys))};
 }
 
 }  // namespace hermesh

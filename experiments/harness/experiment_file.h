@@ -81,6 +81,7 @@ struct Experiment {
   std::string name;  ///< the file's name without extension
   ExperimentKind kind = ExperimentKind::kExtraction;
   std::string question;
+  std::vector<std::string> shows;  ///< tables and figures of the thesis that it makes, "table_9_2" or "figure_9_8"
   std::vector<VariantEntry> voxelizers;
   std::vector<std::string> columns;
   std::vector<VariantEntry> variants;               ///< extractors; none in an experiment on voxelization
@@ -110,7 +111,12 @@ struct Vocabulary {
 /// out of range, a name or option that the vocabulary does not have, or a label that is used twice.
 Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& vocabulary);
 
-/// The question alone, for lists; as strict about syntax, but not about names.
-std::string read_question(const std::filesystem::path& path);
+/// What lists say of a file.
+struct ExperimentHead {
+  std::string question;
+  std::vector<std::string> shows;  ///< as Experiment::shows
+};
+/// The head alone; as strict about syntax, but not about names.
+ExperimentHead read_head(const std::filesystem::path& path);
 
 }  // namespace hermesh

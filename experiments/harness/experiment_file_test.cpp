@@ -290,12 +290,12 @@ TEST_F(ExperimentFile, LabelsAreUnique) {
 
 TEST_F(ExperimentFile, MissingFileIsAnError) {
   EXPECT_THROW(read_experiment(folder_ / "none.toml", {extractors_, voxelizers_, {}, {}}), Error);
-  EXPECT_THROW(read_question(folder_ / "none.toml"), Error);
+  EXPECT_THROW(read_head(folder_ / "none.toml"), Error);
 }
 
 TEST_F(ExperimentFile, QuestionAlone) {
   read(valid());
-  EXPECT_EQ(read_question(folder_ / "toy.toml"), "why?");
+  EXPECT_EQ(read_head(folder_ / "toy.toml").question, "why?");
 }
 
 }  // namespace

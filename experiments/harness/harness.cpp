@@ -14,6 +14,7 @@
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/run_voxelizers.h"
 #include "experiments/harness/table.h"
+#include "experiments/harness/toml_section.h"
 
 namespace hermesh {
 namespace {
@@ -256,8 +257,23 @@ std::vector<ExperimentInfo> list_experiments() {
       files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<ExperimentInfo> experiments;
-  for (const auto& file : files) experiments.push_back({file.stem().string(), read_question(file), file});
+  for (const auto& file : files) {
+    ExperimentHead head = read_head(file);
+    experiments.push_back({file.stem().string(), std::move(head.question), file, std::move(head.shows)});
+  }
   return experiments;
+}
+
+std::filesystem::path experiment_file(const std::string& name) {
+  if (const std::filesystem::path path = name; path.extension() == ".toml" || path.has_parent_path()) return path;
+  std::vector<std::string> known;
+  for (const ExperimentInfo& experiment : list_experiments()) {
+    if (experiment.name == name || std::ranges::find(experiment.shows, name) != experiment.shows.end())
+      return experiment.file;
+    known.push_back(experiment.name);
+    known.insert(known.end(), experiment.shows.begin(), experiment.shows.end());
+  }
+  throw Error("there is no experiment \"" + shown(name) + "\"; there are " + joined(likest_first(known, name)));
 }
 
 int run_experiment(const RunSettings& settings, const Tables& tables, RunContext& context,

@@ -18,9 +18,14 @@ std::vector<Voxelizer> all_voxelizers();
 struct ExperimentInfo {
   std::string name, question;
   std::filesystem::path file;
+  std::vector<std::string> shows;  ///< tables and figures of the thesis that it makes, "table_9_2" or "figure_9_8"
 };
 /// The experiments/*.toml that come with the project.
 std::vector<ExperimentInfo> list_experiments();
+
+/// The file of an experiment: `name` is its path, its name, or a table or figure of the thesis that it makes.
+/// @throws Error for a name that is none of these, with those most like it.
+std::filesystem::path experiment_file(const std::string& name);
 
 struct RunSettings {
   std::filesystem::path experiment;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
@@ -245,6 +246,28 @@ TEST(ListExperiments, AllCanBeRead) {
     EXPECT_NO_THROW(read_experiment(
         info.file, {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements}))
         << info.name;
+}
+
+/// Tables 9.1 to 9.4 and figures 9.1 to 9.16 of the thesis are names of experiments, each of one.
+TEST(ListExperiments, MakeEachTableAndFigureOfChapter9) {
+  std::map<std::string, int> made;
+  for (const ExperimentInfo& info : list_experiments())
+    for (const std::string& number : info.shows) ++made[number];
+  for (int i = 1; i <= 4; ++i) EXPECT_EQ(made["table_9_" + std::to_string(i)], 1) << i;
+  for (int i = 1; i <= 16; ++i) EXPECT_EQ(made["figure_9_" + std::to_string(i)], 1) << i;
+}
+
+TEST(ListExperiments, AreFoundByPathNameAndNumber) {
+  EXPECT_EQ(experiment_file("anywhere/mine.toml"), "anywhere/mine.toml");
+  EXPECT_EQ(experiment_file("mine.toml"), "mine.toml");
+  EXPECT_EQ(experiment_file("headline").filename(), "headline.toml");
+  EXPECT_EQ(experiment_file("figure_9_9").filename(), "table_9_2.toml");
+  try {
+    experiment_file("figure_9_99");
+    ADD_FAILURE() << "a figure that is not there was found";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()).find("there is no experiment \"figure_9_99\"; there are figure_9_9, "), 0U);
+  }
 }
 
 TEST(ListExperiments, KnowsTheHeadlineAndItsQuestion) {

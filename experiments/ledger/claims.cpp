@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ostream>
+#include <regex>
 #include <set>
 
 #include "algorithms/core/error.h"
@@ -98,6 +99,9 @@ void warn_of_rows(const std::string& query, const RowDatabase& rows, std::vector
     };
     if (count("dirty IS NOT 0") > 0) warnings.push_back(table + " has rows of a tree with changes");
     if (count("stand_in = 1") > 0) warnings.push_back(table + " has rows of stand-ins");
+    if (std::ranges::find(rows.tables(), "stale") != rows.tables().end() &&
+        !rows.first_row("SELECT 1 FROM stale WHERE label = :table AND differing > 0", {{"table", table}}).empty())
+      warnings.push_back(table + " has rows that the program no longer makes");
   }
 }
 
@@ -236,6 +240,18 @@ std::vector<Claim> read_claims(const std::filesystem::path& path) {
       section.fail(claims.back().line, "there are two claims " + claims.back().id);
   }
   return claims;
+}
+
+bool is_of(const Claim& claim, const std::string& number) {
+  static const std::regex kNamed("(table|figure)s? ([0-9]+)\\.([0-9]+)(?: (to|and) ([0-9]+)\\.([0-9]+))?");
+  for (std::sregex_iterator found(claim.place.begin(), claim.place.end(), kNamed), end; found != end; ++found) {
+    const auto text = [&](int group) { return (*found)[group].str(); };
+    const int first = std::stoi(text(3)), last = text(6).empty() ? first : std::stoi(text(6));
+    for (int i = first; i <= last; ++i)
+      if (number == text(1) + "_" + text(2) + "_" + std::to_string(i) && (text(4) != "and" || i == first || i == last))
+        return true;
+  }
+  return false;
 }
 
 Judged judge(const Claim& claim, const RowDatabase& rows) {

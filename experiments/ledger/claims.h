@@ -41,6 +41,9 @@ struct Judged {
 /// one without a doctored row.
 std::vector<Claim> read_claims(const std::filesystem::path& path);
 
+/// Whether the claim's place names a table or figure: "figure_9_9" is in "figures 9.8 to 9.10".
+bool is_of(const Claim& claim, const std::string& number);
+
 /// Evaluates one claim on the rows. A claim of the verdict `contradicted` needs two sentences that explain it, and is
 /// `missing` without. @throws Error for a query that is no SQL, or names what there is not.
 Judged judge(const Claim& claim, const RowDatabase& rows);

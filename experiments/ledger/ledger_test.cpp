@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <functional>
 #include <sstream>
 
 #include "algorithms/core/error.h"
@@ -10,6 +11,9 @@
 #include "experiments/harness/sha256.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/ledger/pages.h"
+#include "experiments/ledger/stale.h"
+#include "experiments/measurements/measurements.h"
+#include "reference/variants.h"
 
 namespace hermesh {
 namespace {
@@ -63,6 +67,22 @@ std::string error_in(const std::function<void()>& work) {
 }
 
 Json value(const RowDatabase& rows, const std::string& query) { return rows.first_row(query).at(0).second; }
+
+TEST(Claims, APlaceNamesTablesAndFigures) {
+  const auto is = [](const std::string& place, const std::string& number) {
+    Claim claim;
+    claim.place = place;
+    return is_of(claim, number);
+  };
+  EXPECT_TRUE(is("figures 9.8 to 9.10", "figure_9_9"));
+  EXPECT_FALSE(is("figures 9.8 to 9.10", "figure_9_11"));
+  EXPECT_FALSE(is("figures 9.8 to 9.10", "table_9_9"));
+  EXPECT_TRUE(is("tables 9.1 and 9.4", "table_9_4"));
+  EXPECT_FALSE(is("tables 9.1 and 9.4", "table_9_3"));
+  EXPECT_TRUE(is("table 9.1, implied", "table_9_1"));
+  EXPECT_FALSE(is("figure 9.15", "figure_9_1"));
+  EXPECT_FALSE(is("section 9.1", "table_9_1"));
+}
 
 TEST(RowDatabase, HasTheColumnsOfReportsInTheirUnits) {
   RowDatabase rows;
@@ -218,6 +238,19 @@ TEST_F(Ledger, MistakesInTheFileAreNamed) {
   EXPECT_NE(error_in([&] { read_claims(root_ / "paper" / "claims.toml"); }).find("two claims one"), std::string::npos);
 }
 
+TEST_F(Ledger, RowsThatAreNoLongerMadeAreAWarning) {
+  Json stale = measured_row("race", 1), fresh = measured_row("count", 1);
+  for (Json* row : {&stale, &fresh})
+    (*row)["table"]["columns"].push_back({{"name", "differing"}, {"header", "d"}, {"meaning", "m"}});
+  stale["values"]["differing"] = 2;
+  fresh["values"]["differing"] = 0;
+  fs::create_directories(root_ / "results/stale");
+  write("results/stale/rows.jsonl", stale.dump() + "\n" + fresh.dump() + "\n");
+  const Judged warned = judged("ours = \"SELECT seconds FROM race\"\nreproduced = \"seconds = 2\"\ndoctored = \"UPDATE race SET seconds = 1\"");
+  EXPECT_EQ(warned.warnings, std::vector<std::string>{"race has rows that the program no longer makes"});
+  EXPECT_TRUE(judged(kRule).warnings.empty());
+}
+
 TEST_F(Ledger, RowsOfAChangedTreeAreAWarning) {
   Json dirty = extraction_row("slow", 2.0, 0.25);
   dirty["dirty"] = true;
@@ -274,6 +307,115 @@ TEST_F(Ledger, WhatIsChangedByHandIsFound) {
     }
     write(file, good);
   }
+}
+
+// ---- Rows that the program no longer makes.
+
+/// Voxelizes a ball with two toy variants, and keeps their rows.
+class Stale : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("hermesh-stale-test-" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+    const auto voxelizers = reference_voxelizers();
+    tables_.voxelizers = {voxelizers.begin(), voxelizers.end()};
+    tables_.extractors = {{"copier", "", {}, {{"size", "1", "", {}, 0, 9}}, [](const ExtractionInput& input) { return *input.source; }},
+                          {"openvdb", "", {}, {}, [](const ExtractionInput& input) { return *input.source; }}};
+    tables_.cases = {"box"};
+    tables_.load = [this](const std::string& name, RunContext&) {
+      return LoadedCase{name, make_box(), "generated", sha256_};
+    };
+    tables_.measurements = {{"count", "", {{"up", "3", "", {}, 0, 9}}, {{"numbers", "numbers", "number", {{"value", "value", ""}, {"seconds", "time [s]", ""}}}},
+                             [this](const MeasurementInput& input) {
+                               std::vector<MeasuredRow> rows;
+                               for (int i = 0; i < 3; ++i)
+                                 rows.push_back({"numbers", std::to_string(i), {{"value", i + factor_ * int(input.parameters.number("up"))}, {"seconds", ++calls_}}});
+                               return rows;
+                             }}};
+    write("cells.toml", "question = \"why?\"\nvoxelizers = [\"openvdb\"]\ncolumns = [\"points\"]\n"
+                        "variants = [{ name = \"copier\", options = { size = 2 } }, { name = \"openvdb\" }]\n"
+                        "[quick]\nrepetitions = 1\nsamples = 500\npixels = 0\ncases = [{ name = \"box\", resolutions = [12, 16] }]\n");
+    write("numbers.toml", "kind = \"measurement\"\nmeasurement = \"count\"\nquestion = \"why?\"\n[quick]\nup = 5\n");
+    for (const char* name : {"cells", "numbers"})
+      run_experiment({folder_ / (std::string(name) + ".toml"), "quick", folder_ / name, ""}, tables_, context_, said_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  static PolygonMesh make_box() {
+    PolygonMesh mesh;
+    for (int i = 0; i < 8; ++i) mesh.points.emplace_back(float(i & 1), float(i >> 1 & 1), float(i >> 2));
+    mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+    return mesh;
+  }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
+  FolderCheck check(const std::string& name, const std::function<void(Json&)>& change = {}) {
+    std::vector<Json> rows = read_rows(folder_ / name / "rows.jsonl");
+    if (change) std::ranges::for_each(rows, change);
+    return check_folder(rows, 1, tables_, folder_ / "scratch", context_);
+  }
+
+  fs::path folder_;
+  Tables tables_;
+  RunContext context_;
+  std::ostringstream said_;
+  std::string sha256_ = "abc";
+  int factor_ = 1, calls_ = 0;
+};
+
+TEST_F(Stale, WhatComesOutAsBeforeIsNot) {
+  const FolderCheck cells = check("cells");
+  EXPECT_EQ(cells.rows, 4U);
+  EXPECT_EQ(cells.tried, 2U);  // of the cheaper resolution
+  EXPECT_EQ(cells.by_digest, 2U);
+  EXPECT_EQ(cells.differing, 0U) << cells.difference;
+  EXPECT_EQ(cells.skipped, "");
+  const FolderCheck numbers = check("numbers");
+  EXPECT_EQ(numbers.tried, 1U);
+  EXPECT_EQ(numbers.differing, 0U) << numbers.difference;  // though the time is another
+}
+
+TEST_F(Stale, WhatComesOutOtherwiseIsNamed) {
+  tables_.extractors[0].extract = [](const ExtractionInput& input) {
+    PolygonMesh mesh = *input.source;
+    mesh.points[0].x() += 0.25f;
+    return mesh;
+  };
+  const FolderCheck cells = check("cells");
+  EXPECT_EQ(cells.differing, 1U);
+  EXPECT_NE(cells.difference.find("/copier: digest was "), std::string::npos) << cells.difference;
+  factor_ = 2;
+  const FolderCheck numbers = check("numbers");
+  EXPECT_EQ(numbers.differing, 1U);
+  EXPECT_EQ(numbers.difference, "numbers/0: values/value was 5, now 10");
+}
+
+TEST_F(Stale, WhatCanNoLongerBeMadeIsStale) {
+  tables_.extractors[0].options.clear();
+  const FolderCheck cells = check("cells");
+  EXPECT_EQ(cells.differing, 2U);
+  EXPECT_NE(cells.difference.find("size"), std::string::npos) << cells.difference;
+  tables_.measurements.clear();
+  EXPECT_EQ(check("numbers").differing, 1U);
+}
+
+TEST_F(Stale, RowsWithoutDigestsAreComparedByCounts) {
+  const auto forget = [](Json& row) { row.erase("digest"); };
+  EXPECT_EQ(check("cells", forget).differing, 0U);
+  EXPECT_EQ(check("cells", forget).by_digest, 0U);
+  const auto miscount = [](Json& row) {
+    row.erase("digest");
+    row["triangle_count"] = 11;
+  };
+  EXPECT_EQ(check("cells", miscount).differing, 2U);
+}
+
+TEST_F(Stale, OtherInputsAndStandInsProveNothing) {
+  sha256_ = "def";
+  const FolderCheck other = check("cells");
+  EXPECT_EQ(other.tried, 0U);
+  EXPECT_EQ(other.skipped, "box is not at hand as the rows have it");
+  sha256_ = "abc";
+  EXPECT_EQ(check("cells", [](Json& row) { row["case"]["origin"] = "stand-in: no network"; }).tried, 0U);
 }
 
 TEST(Orphans, AreNumbersOutsideOfMarkersCodeAndPlaces) {

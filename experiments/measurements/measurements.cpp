@@ -82,7 +82,9 @@ std::span<const Measurement> all_measurements() {
                                                  sampling_measurement(),
                                                  surface_noise_measurement(),
                                                  arithmetic_measurement(),
-                                                 tests_measurement()};
+                                                 tests_measurement(),
+                                                 reproductions_measurement(),
+                                                 stale_measurement()};
   return table;
 }
 

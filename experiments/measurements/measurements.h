@@ -124,5 +124,7 @@ Measurement threads_measurement();
 Measurement sampling_measurement();
 Measurement arithmetic_measurement();
 Measurement surface_noise_measurement();
+Measurement reproductions_measurement();
+Measurement stale_measurement();  // experiments/ledger/stale.cpp
 
 }  // namespace hermesh

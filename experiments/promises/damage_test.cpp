@@ -281,7 +281,7 @@ void Damage::toml(int count) {
   const Vocabulary words{extractors, voxelizers, cases, column_names(), all_measurements()};
   expect_answers(count, [&](int i) {
     const fs::path path = put("a.toml", Mutator(std::uint64_t(i))(whole, /*text=*/true));
-    read_question(path);
+    read_head(path);
     read_experiment(path, words);
   });
 }
