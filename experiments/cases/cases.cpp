@@ -136,6 +136,7 @@ std::string names_of(const std::vector<CaseRecipe>& recipes) {
 }  // namespace
 
 void require_data(bool required) { data_required = required; }
+bool data_are_required() { return data_required; }
 
 void check_stand_in_allowed(const std::string& name, const std::string& reason) {
   if (data_required)

@@ -50,6 +50,7 @@ class DataMissing : public Error {
 };
 /// Makes stand-ins an error from now on, in the whole process: loading one throws DataMissing.
 void require_data(bool required);
+bool data_are_required();
 /// @throws DataMissing naming the case and `reason`, why none of its files is to be had, if data are required.
 void check_stand_in_allowed(const std::string& name, const std::string& reason);
 

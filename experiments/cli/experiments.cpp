@@ -1,5 +1,7 @@
 // hermesh run, report, compare and claims: experiments, the tables made of them, two runs beside each other, and what the
 // rows say of the thesis.
+#include <unistd.h>
+
 #include <iostream>
 #include <limits>
 #include <memory>
@@ -50,12 +52,44 @@ void add_run(CLI::App& app, Session& session) {
       "Folder for rows.jsonl, meshes and pictures (default: results/local/ and the file's name)");
   command->add_option("--filter", settings->filter,
                       "Only cells whose case/resolution/variant contains this text");
+  command->add_option("--variant", settings->overrides.variants,
+                      "Only these variants (labels or names in the file, else names from `hermesh list`)");
+  command->add_option("--case", settings->overrides.cases,
+                      "Only these cases (of the file, else from `hermesh list`, or mesh files)");
+  command->add_option("--resolution", settings->overrides.resolutions, "These resolutions for all cases")
+      ->check(CLI::Range(2, 100'000));
+  command->add_option("--repetitions", settings->overrides.repetitions, "At most so many timed runs of each variant")
+      ->check(CLI::Range(1, 1000));
+  auto again = std::make_shared<bool>(false);
+  command->add_flag("--again", *again,
+                    "Make cells anew of which the folder has rows by this program, of the same data (default: take up where "
+                    "an earlier run stopped)");
+  struct Limits {
+    double seconds = 0.0, mib = 0.0;
+    bool in_process = false;
+  };
+  auto limits = std::make_shared<Limits>();
+  command->add_option("--timeout", limits->seconds,
+                      "Seconds that a step of a cell may take, or a measurement from row to row (default: the file's, else "
+                      "3600, and none for a measurement)")
+      ->check(CLI::Range(0.01, 1e7));
+  command->add_option("--memory", limits->mib,
+                      "MiB of memory that a cell may take (default: the file's, else 80 % of the machine's)")
+      ->check(CLI::Range(16.0, 1e9));
+  command->add_flag("--in-process", limits->in_process,
+                    "Work in this process instead of one of its own, for a debugger: a crash then ends the run");
   auto with_data = std::make_shared<bool>(false);
   command->add_flag("--require-data", *with_data,
                     "Take no stand-in for a model that is not at hand: name it, and end with exit code 3");
-  command->callback([settings, name, with_data, &session] {
-    session.command = [settings, name, with_data, &session] {
+  command->callback([=, &session] {
+    if (limits->in_process) refuse_idle(*command, {"--timeout", "--memory"}, "--in-process cannot end what takes too much");
+    session.command = [=, &session] {
       settings->experiment = experiment_file(*name);
+      settings->resume = !*again;
+      if (!limits->in_process)
+        settings->apart = {"/proc/self/exe", {"cell"}, {limits->seconds, static_cast<std::int64_t>(limits->mib * (1 << 20))}};
+      if (!session.quiet && !isatty(STDERR_FILENO))
+        settings->log = [](const std::string& line) { std::cerr << line << std::endl; };
       require_data(*with_data);
       return run(*settings, session);
     };
@@ -83,23 +117,24 @@ int print_stale(const std::string& folder, Session& session) {
   experiment.name = experiment.measurement = "stale";
   experiment.kind = ExperimentKind::kMeasurement;
   std::size_t folders = 0, tried = 0, differing = 0;
-  std::ostringstream found;
   const auto tell = [&](const Json& row) {
     if (row.contains("failed")) throw Error(text_at(row, "/failed"));
     const std::string name = text_at(row, "/variant/label");
     ++folders;
     tried += row.at("values").at("tried").get<std::size_t>();
     differing += row.at("values").at("differing").get<std::size_t>();
+    erase_progress_line();
     if (row.contains("broken"))
-      found << name << ": " << text_at(row, "/values/differing") << " of " << text_at(row, "/values/tried")
-            << " cells differ; first " << text_at(row, "/values/difference") << '\n';
-    if (const std::string why = text_at(row, "/values/skipped"); !why.empty()) found << name << ": not tried: " << why << '\n';
+      std::cout << name << ": " << text_at(row, "/values/differing") << " of " << text_at(row, "/values/tried")
+            << " cells differ; first " << text_at(row, "/values/difference") << std::endl;
+    if (const std::string why = text_at(row, "/values/skipped"); !why.empty())
+      std::cout << name << ": not tried: " << why << std::endl;
   };
   run_measurement(experiment, {}, all_tables(), {}, folder.empty() ? "" : "stale/folders/" + folder, Json::object(),
                   session.context, tell);
   erase_progress_line();
   if (folders == 0) throw Error("results/ has no folder \"" + folder + "\" with rows");
-  std::cout << found.str() << folders << " folders, " << tried << " cells made again, " << differing << " differ\n";
+  std::cout << folders << " folders, " << tried << " cells made again, " << differing << " differ\n";
   return differing == 0 ? kDone : kNotMet;
 }
 
@@ -235,7 +270,15 @@ void add_compare(CLI::App& app, Session& session) {
 
 }  // namespace
 
+/// What `hermesh run` starts for its cells; not for users.
+void add_cell(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "cell", "What `hermesh run` starts for its cells");
+  command->group("");
+  command->callback([&session] { session.command = [&session] { return serve_cells(session.context); }; });
+}
+
 void add_experiments(CLI::App& app, Session& session) {
+  add_cell(app, session);
   add_run(app, session);
   add_report(app, session);
   add_compare(app, session);

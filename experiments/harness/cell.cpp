@@ -30,6 +30,12 @@ std::optional<std::string> attempt(const std::function<void()>& work) {
   }
 }
 
+void mark_failed(Json& row, const std::string& sentence) {
+  row["failed"] = sentence;
+  row["promise_letters"] = "FAILED";
+  row["promise_verdict"] = "FAILED: " + sentence;
+}
+
 Timing::Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
   contender.budget_seconds = tier.seconds_per_variant;
   contender.repetitions = tier.repetitions;

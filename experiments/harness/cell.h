@@ -22,6 +22,22 @@ RunContext child_context(const RunContext& context, bool with_progress);
 /// variant. @throws Cancelled; DataMissing.
 std::optional<std::string> attempt(const std::function<void()>& work);
 
+/// Somebody who wants to know which cell is worked on, since the process may not live to tell the end.
+struct CellWatch {
+  std::function<void(const Json& row)> planned = {};         ///< gets each cell's row as far as it is known beforehand
+  std::function<void(const std::string& label)> at = {};     ///< is called before each step of a cell's work
+
+  void plan(const Json& row) const {
+    if (planned) planned(row);
+  }
+  void step(const Json& row) const {
+    if (at) at(text_at(row, "/variant/label"));
+  }
+};
+
+/// Says in the row that its cell failed, and why.
+void mark_failed(Json& row, const std::string& sentence);
+
 /// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
 /// up and does not count, unless it alone uses up the budget: then it is the only repetition there is.
 struct Timing {

@@ -4,6 +4,7 @@
 #include <regex>
 #include <set>
 
+#include "experiments/harness/command_extractor.h"
 #include "experiments/harness/toml_section.h"
 
 namespace hermesh {
@@ -43,9 +44,23 @@ template <class Entry>
 VariantEntry read_variant(const Section& file, const toml::node& node, const std::string& kind,
                           std::span<const Entry> table) {
   const Section section(file.file(), file.table(node, "a " + kind), "a " + kind,
-                        kind == "variant" ? std::vector<std::string>{"name", "label", "options", "uniform"}
+                        kind == "variant" ? std::vector<std::string>{"name", "label", "options", "uniform", "command"}
                                           : std::vector<std::string>{"name", "label", "options"});
   VariantEntry entry;
+  if (section.has("command")) {
+    for (const char* key : {"name", "options"})
+      if (section.has(key)) section.fail_at(key, "a command has a \"label\", and \"" + std::string(key) + "\" has no place beside it");
+    entry.command = section.text("command");
+    entry.label = section.text("label");
+    entry.name = "command " + entry.label;
+    entry.uniform = section.text_or("uniform", "");
+    try {
+      command_extractor(entry.name, entry.command);
+    } catch (const Error& error) {
+      section.fail_at("command", error.what());
+    }
+    return entry;
+  }
   entry.name = section.text("name");
   const auto known =
       std::find_if(table.begin(), table.end(), [&](const Entry& each) { return each.name == entry.name; });
@@ -185,8 +200,9 @@ CaseEntry read_case(const Section& file, const toml::node& node, ExperimentKind 
                                      "sweep", "distances", "signs", "sign_samples", "solid", "to_boundary"});
   CaseEntry entry;
   entry.name = section.text("name");
-  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end())
-    section.fail_at("name", "there is no case \"" + shown(entry.name) + "\"; there are " +
+  // A case may be a mesh file, too.
+  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end() && !std::filesystem::is_regular_file(entry.name))
+    section.fail_at("name", "there is no case \"" + shown(entry.name) + "\", nor such a file; there are " +
                                 joined(likest_first(cases, entry.name)));
   if (section.has("voxel_sizes")) {
     if (section.has("resolutions"))
@@ -211,8 +227,8 @@ Tier read_tier(const Section& file, const std::string& name, const toml::table& 
   const Section section(
       file.file(), table, "[" + name + "]",
       extraction ? std::vector<std::string>{"cases", "repetitions", "seconds_per_variant", "samples",
-                                            "pixels", "self_intersections"}
-                 : std::vector<std::string>{"cases", "repetitions", "seconds_per_variant", "components"});
+                                            "pixels", "self_intersections", "timeout", "memory"}
+                 : std::vector<std::string>{"cases", "repetitions", "seconds_per_variant", "components", "timeout", "memory"});
   Tier tier;
   tier.repetitions = static_cast<int>(section.integer_or("repetitions", tier.repetitions, 1, 1000));
   tier.seconds_per_variant = section.number_or("seconds_per_variant", tier.seconds_per_variant, 0.0, 1e5);
@@ -220,6 +236,8 @@ Tier read_tier(const Section& file, const std::string& name, const toml::table& 
   tier.pixels = static_cast<int>(section.integer_or("pixels", tier.pixels, 0, 4000));
   tier.self_intersections = section.flag_or("self_intersections", tier.self_intersections);
   tier.components = section.flag_or("components", tier.components);
+  if (section.has("timeout")) tier.timeout = section.number_or("timeout", 0.0, 0.01, 1e7);
+  if (section.has("memory")) tier.memory_mib = section.number_or("memory", 0.0, 16.0, 1e9);
   for (const toml::node& node : section.list("cases"))
     tier.cases.push_back(read_case(section, node, kind, cases));
   return tier;

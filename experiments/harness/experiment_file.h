@@ -62,6 +62,7 @@ struct VariantEntry {
   std::string label;                           ///< unique in the file; the name when the file gives none
   std::map<std::string, std::string> options;  ///< as given
   std::string uniform = {};  ///< label of an extractor above, whose mesh this one's is compared with; or empty
+  std::string command = {};  ///< of an outside program (command_extractor.h), which `name` then stands for; or empty
 };
 
 /// How much work a run is.
@@ -74,6 +75,8 @@ struct Tier {
   int pixels = 400;                ///< width of one picture on the sheet; 0 draws none
   bool self_intersections = true;  ///< false leaves them uncounted, and a promise about them unchecked
   bool components = false;         ///< count those of the surface in each voxelizer's level set
+  std::optional<double> timeout = {};    ///< seconds that a step of a cell may take
+  std::optional<double> memory_mib = {};  ///< resident memory that a cell may take
   std::map<std::string, std::string> parameters;  ///< of a measurement, as given
 };
 

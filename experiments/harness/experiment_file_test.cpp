@@ -128,7 +128,7 @@ TEST_F(ExperimentFile, EveryMistakeNamesFileAndLine) {
       {9, "seconds_per_variant = -1", "seconds_per_variant"},
       {9, "samples = \"many\"", "samples"},
       {9, "self_intersections = 1", "self_intersections"},
-      {10, "cases = [{ name = \"bell\", resolutions = [10] }]", "no case \"bell\"; there are ball, cube"},
+      {10, "cases = [{ name = \"bell\", resolutions = [10] }]", "no case \"bell\", nor such a file; there are ball, cube"},
       {10, "cases = [{ name = \"ball\", resolutions = [1] }]", "resolutions"},
       {10, "cases = [{ name = \"ball\", resolutions = [] }]", "resolutions"},
       {10, "cases = [{ name = \"ball\", resolution = [10] }]", "unknown key \"resolution\""},

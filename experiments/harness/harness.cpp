@@ -1,18 +1,25 @@
 #include "experiments/harness/harness.h"
 
+#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <iostream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <ostream>
+#include <set>
 
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/command_extractor.h"
+#include "experiments/harness/digest.h"
 #include "experiments/harness/provenance.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/run_voxelizers.h"
+#include "experiments/harness/sha256.h"
 #include "experiments/harness/table.h"
 #include "experiments/harness/toml_section.h"
 
@@ -98,129 +105,215 @@ std::filesystem::path kept_folder(const std::filesystem::path& out) {
   return out;
 }
 
-/// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one
-/// starts.
-class Run {
- public:
-  Run(const RunSettings& settings, const Tables& tables, RunContext& context, std::ostream& table)
-      : settings_(settings),
-        tables_(tables),
-        context_(context),
-        table_(table),
-        experiment_(read_experiment(settings.experiment, {tables.extractors, tables.voxelizers, tables.cases,
-                                                          column_names(), tables.measurements})),
-        tier_(find_tier(experiment_, settings.tier)),
-        folder_(kept_folder(settings.out)),
-        out_(folder_.path()),
-        head_(run_head(experiment_, settings)) {}
+/// The variants that the overrides name, those of the file first; @throws Error for a name that is nowhere.
+template <class Table>
+std::vector<VariantEntry> chosen(const std::vector<VariantEntry>& variants, const std::vector<std::string>& names,
+                                 const Table& table) {
+  if (names.empty()) return variants;
+  std::vector<VariantEntry> left;
+  for (const std::string& name : names) {
+    const std::size_t before = left.size();
+    for (const VariantEntry& variant : variants)
+      if (variant.label == name || variant.name == name) left.push_back(variant);
+    if (left.size() > before) continue;
+    std::vector<std::string> known;
+    for (const auto& each : table) known.push_back(each.name);
+    if (std::ranges::find(known, name) == known.end()) {
+      for (const VariantEntry& variant : variants) known.push_back(variant.label);
+      throw Error("there is no variant \"" + shown(name) + "\"; there are " + joined(likest_first(known, name)));
+    }
+    left.push_back({name, name, {}});
+  }
+  return left;
+}
 
-  int run() {
-    table_ << "## " << experiment_.name << " (" << settings_.tier << "): " << experiment_.question << "\n\n";
-    const bool extraction = experiment_.kind == ExperimentKind::kExtraction;
-    for (const CaseEntry& entry : tier_.cases) extraction ? run_case(entry) : voxelize_case(entry);
-    if (experiment_.kind == ExperimentKind::kMeasurement) measure();
-    if (rows_.empty())
-      throw Error("no cell of " + experiment_.name + " contains \"" + settings_.filter +
-                  "\" in its case/resolution/variant");
-    if (experiment_.kind != ExperimentKind::kMeasurement) write_legend(rows_, table_);
-    table_ << "\nRows: " << (out_ / "rows.jsonl").string() << "; pictures: " << (out_ / "*.png").string()
-           << "\n";
-    // Of all rows in the folder: earlier runs with another filter belong to the same picture.
-    write_plots(read_rows(out_), out_, table_);
-    return exit_code(rows_);
+void override_cases(Tier& tier, const Overrides& overrides, const std::vector<std::string>& known) {
+  if (!overrides.cases.empty() && !tier.cases.empty()) {
+    std::vector<CaseEntry> left;
+    for (const std::string& name : overrides.cases) {
+      const std::size_t before = left.size();
+      for (const CaseEntry& entry : tier.cases)
+        if (entry.name == name) left.push_back(entry);
+      if (left.size() > before) continue;
+      if (std::ranges::find(known, name) == known.end() && !std::filesystem::is_regular_file(name))
+        throw Error("there is no case \"" + shown(name) + "\", nor such a file; there are " + joined(likest_first(known, name)));
+      CaseEntry entry;
+      entry.name = name;
+      entry.resolutions = tier.cases.front().resolutions;
+      if (entry.resolutions.empty()) entry.resolutions = {100};
+      left.push_back(std::move(entry));
+    }
+    tier.cases = std::move(left);
+  }
+  if (!overrides.resolutions.empty())
+    for (CaseEntry& entry : tier.cases) {
+      entry.resolutions = overrides.resolutions;
+      entry.voxel_sizes.clear();
+      entry.published_seconds.clear();
+    }
+  if (overrides.repetitions) tier.repetitions = *overrides.repetitions;
+}
+
+/// The experiment as it is to be run: that of the file, with the overrides, and commands in the tables.
+struct Plan {
+  Experiment experiment;
+  Tier tier;
+  Tables tables;
+
+  Plan(const RunSettings& settings, const Tables& given) : tables(given) {
+    experiment = read_experiment(settings.experiment,
+                                 {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements});
+    tier = find_tier(experiment, settings.tier);
+    const Overrides& overrides = settings.overrides;
+    if (experiment.kind == ExperimentKind::kMeasurement) {
+      if (!overrides.variants.empty() || !overrides.cases.empty() || !overrides.resolutions.empty() || overrides.repetitions)
+        throw Error(experiment.name + " is a measurement, which --variant, --case, --resolution and --repetitions do not change; "
+                    "--filter chooses among its rows");
+      return;
+    }
+    if (experiment.kind == ExperimentKind::kVoxelization)
+      experiment.voxelizers = chosen(experiment.voxelizers, overrides.variants, tables.voxelizers);
+    else
+      experiment.variants = chosen(experiment.variants, overrides.variants, tables.extractors);
+    override_cases(tier, overrides, tables.cases);
+    for (const VariantEntry& variant : experiment.variants)
+      if (!variant.command.empty()) tables.extractors.push_back(command_extractor(variant.name, variant.command));
+  }
+};
+
+/// What is worked on together: an input at one voxel size, through one voxelizer where extractors compete. Of a
+/// measurement there is one group.
+struct GroupId {
+  std::size_t entry = 0, sweep = 0, size = 0, voxelizer = 0;
+};
+Json to_json(const GroupId& id) { return {id.entry, id.sweep, id.size, id.voxelizer}; }
+GroupId group_id(const Json& json) {
+  const auto at = [&](std::size_t i) { return json.at(i).get<std::size_t>(); };
+  return {at(0), at(1), at(2), at(3)};
+}
+
+/// Puts something before the stages that are announced, until it goes.
+class ProgressPrefix {
+ public:
+  ProgressPrefix(RunContext& context, std::string prefix) : context_(context), shown_(context.on_progress) {
+    if (shown_)
+      context.on_progress = [this, prefix = std::move(prefix)](std::string_view stage, double fraction) {
+        shown_(prefix + std::string(stage), fraction);
+      };
+  }
+  ~ProgressPrefix() { context_.on_progress = shown_; }
+  ProgressPrefix(const ProgressPrefix&) = delete;
+  ProgressPrefix& operator=(const ProgressPrefix&) = delete;
+
+ private:
+  RunContext& context_;
+  std::function<void(std::string_view, double)> shown_;
+};
+
+/// Works on groups in this process.
+class Worker {
+ public:
+  Worker(const Plan& plan, std::filesystem::path out, std::string filter, RunContext& context)
+      : plan_(plan), out_(std::move(out)), filter_(std::move(filter)), context_(context) {}
+
+  std::vector<GroupId> groups() const {
+    if (plan_.experiment.kind == ExperimentKind::kMeasurement) return {GroupId()};
+    const bool extraction = plan_.experiment.kind == ExperimentKind::kExtraction;
+    std::vector<GroupId> ids;
+    for (std::size_t entry = 0; entry < plan_.tier.cases.size(); ++entry) {
+      const CaseEntry& item = plan_.tier.cases[entry];
+      for (std::size_t sweep = 0; sweep < (item.sweep ? item.sweep->values.size() : 1); ++sweep)
+        for (std::size_t size = 0; size < item.resolutions.size() + item.voxel_sizes.size(); ++size)
+          for (std::size_t voxelizer = 0; voxelizer < (extraction ? plan_.experiment.voxelizers.size() : 1); ++voxelizer)
+            if (const GroupId id{entry, sweep, size, voxelizer}; !contenders(id).empty()) ids.push_back(id);
+    }
+    return ids;
+  }
+
+  /// Who competes in a group, as far as the filter leaves them.
+  std::vector<VariantEntry> contenders(const GroupId& id) const {
+    return filtered(plan_.experiment.contenders(), name_of(id), filter_);
+  }
+
+  /// "dragon/400/".
+  std::string name_of(const GroupId& id) const {
+    if (plan_.tier.cases.empty()) return plan_.experiment.name + "/";
+    const CaseEntry& entry = plan_.tier.cases[id.entry];
+    return entry.name + "/" + (entry.sweep ? readable(entry.sweep->values[id.sweep]) + "/" : "") +
+           (entry.voxel_sizes.empty() ? std::to_string(entry.resolutions[id.size]) : readable(entry.voxel_sizes[id.size])) + "/";
+  }
+
+  /// The input of a group; the last one is kept, since the next group mostly has it, too.
+  const LoadedCase& input(const GroupId& id) { return loaded(plan_.tier.cases[id.entry].name, id, input_); }
+
+  /// The rows of a group, without the contenders whose labels are `left_out`.
+  std::vector<Json> rows(const GroupId& id, const std::set<std::string>& left_out, const Json& head, const CellWatch& watch) {
+    std::vector<VariantEntry> variants = contenders(id);
+    std::erase_if(variants, [&](const VariantEntry& variant) { return left_out.contains(variant.label); });
+    const CaseEntry& entry = plan_.tier.cases[id.entry];
+    const LoadedCase& made = input(id);
+    if (plan_.experiment.kind == ExperimentKind::kExtraction)
+      return run_group({.experiment = plan_.experiment,
+                        .tier = plan_.tier,
+                        .entry = entry,
+                        .input = made,
+                        .resolution = entry.resolutions[id.size],
+                        .voxelizer = plan_.experiment.voxelizers[id.voxelizer],
+                        .variants = std::move(variants),
+                        .tables = plan_.tables,
+                        .out = out_,
+                        .head = head,
+                        .watch = watch},
+                       context_);
+    const bool by_size = !entry.voxel_sizes.empty();
+    const double longest = bounds(made.mesh).size().maxCoeff();
+    const double voxel_size = by_size ? entry.voxel_sizes[id.size] * (entry.length ? longest / *entry.length : 1.0)
+                                      : longest / entry.resolutions[id.size];
+    const LoadedCase& solid = entry.judged.solid.empty() ? made : loaded(entry.judged.solid, id, solid_);
+    return run_voxelizers({.experiment = plan_.experiment,
+                           .tier = plan_.tier,
+                           .entry = entry,
+                           .input = made,
+                           .solid = solid,
+                           .voxel_size = voxel_size,
+                           .voxelizers = std::move(variants),
+                           .tables = plan_.tables,
+                           .head = cell_head(id, made, voxel_size, head),
+                           .watch = watch},
+                          context_);
+  }
+
+  /// The rows of a measurement that are not `done`, each as soon as it is ready.
+  void measure(const std::set<std::string>& done, const Json& head, const std::function<void(const Json&)>& keep) {
+    run_measurement(plan_.experiment, plan_.tier, plan_.tables, out_, filter_, head, context_, keep, done);
   }
 
  private:
-  /// Every table of a measurement has columns of its own.
-  void measure() {
-    rows_ = run_measurement(experiment_, tier_, tables_, out_, settings_.filter, head_, context_,
-                            [&](const Json& row) { append_row(out_ / "rows.jsonl", row); });
-    for (const RowGroup& group : latest_groups(rows_)) {
-      write_markdown(group, table_);
-      write_legend(group.rows, table_);
-      table_ << '\n';
-    }
-  }
-
-  void run_case(const CaseEntry& entry) {
+  struct Loaded {
+    std::string name;
     std::optional<LoadedCase> input;
-    for (const int resolution : entry.resolutions) {
-      const std::string cell = entry.name + "/" + std::to_string(resolution) + "/";
-      const std::vector<VariantEntry> variants = filtered(experiment_.variants, cell, settings_.filter);
-      if (variants.empty()) continue;
-      if (!input) input = tables_.load(entry.name, context_);
-      for (const VariantEntry& voxelizer : experiment_.voxelizers)
-        finish_group(run_group({.experiment = experiment_,
-                                .tier = tier_,
-                                .entry = entry,
-                                .input = *input,
-                                .resolution = resolution,
-                                .voxelizer = voxelizer,
-                                .variants = variants,
-                                .tables = tables_,
-                                .out = out_,
-                                .head = head_},
-                               context_));
-    }
+  };
+  const LoadedCase& loaded(const std::string& name, const GroupId& id, Loaded& kept) {
+    const CaseEntry& entry = plan_.tier.cases[id.entry];
+    const std::string key = name + (entry.sweep ? "/" + entry.sweep->parameter + "/" + std::to_string(id.sweep) : "");
+    if (kept.input && kept.name == key) return *kept.input;
+    kept = {};
+    kept.input = entry.sweep ? plan_.tables.load_changed(name, {{entry.sweep->parameter, entry.sweep->values[id.sweep]}}, context_)
+                             : plan_.tables.load(name, context_);
+    kept.name = key;
+    return *kept.input;
   }
 
-  /// The rows of a sweep, and those of several voxel sizes, make one table.
-  void voxelize_case(const CaseEntry& entry) {
-    std::vector<Json> rows;
-    const Sweep none{"", {0.0}};
-    const Sweep& sweep = entry.sweep ? *entry.sweep : none;
-    for (const double value : sweep.values) {
-      const std::string cell = entry.name + "/" + (entry.sweep ? readable(value) + "/" : "");
-      std::optional<LoadedCase> input, solid;
-      const std::size_t sizes = entry.resolutions.size() + entry.voxel_sizes.size();
-      for (std::size_t i = 0; i < sizes; ++i) {
-        const bool by_size = !entry.voxel_sizes.empty();
-        const std::vector<VariantEntry> left = filtered(
-            experiment_.voxelizers,
-            cell + (by_size ? readable(entry.voxel_sizes[i]) : std::to_string(entry.resolutions[i])) + "/",
-            settings_.filter);
-        if (left.empty()) continue;
-        if (!input) input = load(entry.name, sweep, value);
-        if (!solid && !entry.judged.solid.empty()) solid = load(entry.judged.solid, sweep, value);
-        const double longest = bounds(input->mesh).size().maxCoeff();
-        const double voxel_size = by_size
-                                      ? entry.voxel_sizes[i] * (entry.length ? longest / *entry.length : 1.0)
-                                      : longest / entry.resolutions[i];
-        const Json head = cell_head(entry, *input, voxel_size, i, value);
-        std::vector<Json> cells = run_voxelizers({.experiment = experiment_,
-                                                  .tier = tier_,
-                                                  .entry = entry,
-                                                  .input = *input,
-                                                  .solid = solid ? *solid : *input,
-                                                  .voxel_size = voxel_size,
-                                                  .voxelizers = left,
-                                                  .tables = tables_,
-                                                  .head = head},
-                                                 context_);
-        for (const Json& row : cells) append_row(out_ / "rows.jsonl", row);
-        std::move(cells.begin(), cells.end(), std::back_inserter(rows));
-      }
-    }
-    for (const RowGroup& group : latest_groups(rows)) write_markdown(group, table_);
-    std::move(rows.begin(), rows.end(), std::back_inserter(rows_));
-  }
-
-  LoadedCase load(const std::string& name, const Sweep& sweep, double value) {
-    return sweep.parameter.empty() ? tables_.load(name, context_)
-                                   : tables_.load_changed(name, {{sweep.parameter, value}}, context_);
-  }
-
-  Json cell_head(const CaseEntry& entry, const LoadedCase& input, double voxel_size, std::size_t i,
-                 double value) const {
-    Json head = head_;
-    head["case"] = case_json(input);
+  Json cell_head(const GroupId& id, const LoadedCase& made, double voxel_size, Json head) const {
+    const CaseEntry& entry = plan_.tier.cases[id.entry];
+    head["case"] = case_json(made);
     if (entry.voxel_sizes.empty())
-      head["resolution"] = entry.resolutions[i];
+      head["resolution"] = entry.resolutions[id.size];
     else
-      head["nominal_voxel_size"] = entry.voxel_sizes[i];
+      head["nominal_voxel_size"] = entry.voxel_sizes[id.size];
     head["voxel_size"] = voxel_size;
-    if (!entry.published_seconds.empty()) head["published_seconds"] = entry.published_seconds[i];
-    if (entry.sweep) head["sweep"] = {{"parameter", entry.sweep->parameter}, {"value", value}};
+    if (!entry.published_seconds.empty()) head["published_seconds"] = entry.published_seconds[id.size];
+    if (entry.sweep) head["sweep"] = {{"parameter", entry.sweep->parameter}, {"value", entry.sweep->values[id.sweep]}};
     const JudgedBy& judged = entry.judged;
     if (judged.signs != JudgedBy::Signs::kNone)
       head["judged_by"] = {{"signs", std::array{"none", "parity", "unanimous parity",
@@ -229,23 +322,322 @@ class Run {
     return head;
   }
 
-  void finish_group(std::vector<Json> rows) {
-    for (const Json& row : rows) append_row(out_ / "rows.jsonl", row);
-    write_markdown({rows, 0}, table_);
+  const Plan& plan_;
+  std::filesystem::path out_;
+  std::string filter_;
+  RunContext& context_;
+  Loaded input_, solid_;
+};
+
+/// The hash of this program's file, 16 digits of it.
+const std::string& program_hash() {
+  static const std::string hash = sha256_of_file("/proc/self/exe").substr(0, 16);
+  return hash;
+}
+
+/// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one starts.
+class Run {
+ public:
+  Run(const RunSettings& settings, const Tables& tables, RunContext& context, std::ostream& table)
+      : settings_(settings),
+        context_(context),
+        table_(table),
+        plan_(settings, tables),
+        folder_(kept_folder(settings.out)),
+        file_(folder_.path() / "rows.jsonl"),
+        head_(run_head(plan_.experiment, settings)),
+        quiet_(child_context(context, false)),
+        worker_(plan_, folder_.path(), settings.filter, settings.apart ? quiet_ : context),
+        start_(std::chrono::steady_clock::now()) {
+    head_["binary"] = program_hash();
+    own_run_ = text_at(head_, "/run");
+    if (settings.apart) apart_ = *settings.apart;
+    if (apart_.limits.seconds == 0) apart_.limits.seconds = plan_.tier.timeout.value_or(0.0);
+    if (apart_.limits.bytes == 0) apart_.limits.bytes = std::int64_t(plan_.tier.memory_mib.value_or(0.0) * (1 << 20));
+    constexpr double kTimeout = 3600, kShareOfMemory = 0.8;
+    // A measurement may take hours for a row, as long as nobody asks for less.
+    if (apart_.limits.seconds == 0 && !is_measurement()) apart_.limits.seconds = kTimeout;
+    if (apart_.limits.bytes == 0)
+      apart_.limits.bytes = std::int64_t(kShareOfMemory * double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE)));
+  }
+
+  int run() {
+    read_what_is_there();
+    table_ << "## " << plan_.experiment.name << " (" << settings_.tier << "): " << plan_.experiment.question << "\n\n";
+    const std::vector<GroupId> groups = worker_.groups();
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      const ProgressPrefix prefix(context_, overall(i, groups.size()));
+      is_measurement() ? measure() : run_group(groups[i]);
+      if (is_measurement() || i + 1 == groups.size() || !share_a_table(groups[i], groups[i + 1])) print_tables();
+      say_done(i, groups);
+    }
+    if (rows_.empty())
+      throw Error("no cell of " + plan_.experiment.name + " contains \"" + settings_.filter +
+                  "\" in its case/resolution/variant");
+    if (there_ > 0)
+      context_.note(std::to_string(there_) + " of " + std::to_string(rows_.size()) + " cells were in " + file_.string() +
+                    " already, made by this program of the same data; --again makes them anew");
+    if (!is_measurement()) write_legend(rows_, table_);
+    table_ << "\nRows: " << file_.string() << "; pictures: " << (folder_.path() / "*.png").string() << "\n";
+    // Of all rows in the folder: earlier runs with another filter belong to the same picture.
+    write_plots(read_rows(file_), folder_.path(), table_);
+    return exit_code(rows_);
+  }
+
+ private:
+  bool is_measurement() const { return plan_.experiment.kind == ExperimentKind::kMeasurement; }
+  bool is_extraction() const { return plan_.experiment.kind == ExperimentKind::kExtraction; }
+
+  // ---- What is there already.
+
+  /// What decides whether a row is of this cell: all that the file says about it.
+  std::string fingerprint(const GroupId& id, const VariantEntry& variant) const {
+    const Tier& tier = plan_.tier;
+    const CaseEntry& entry = tier.cases[id.entry];
+    const auto named = [](const VariantEntry& each) { return Json{each.name, each.label, each.options, each.uniform, each.command}; };
+    Json cell = {int(plan_.experiment.kind), worker_.name_of(id), named(variant), tier.repetitions, tier.seconds_per_variant,
+                 tier.samples, tier.pixels, tier.self_intersections, tier.components, plan_.experiment.exterior_band,
+                 plan_.experiment.interior_band, head_.at("threads")};
+    if (is_extraction()) cell.push_back(named(plan_.experiment.voxelizers[id.voxelizer]));
+    if (plan_.experiment.features) cell.push_back(*plan_.experiment.features);
+    const JudgedBy& judged = entry.judged;
+    cell.push_back({judged.distances.value_or(-1), judged.to_boundary, int(judged.signs), judged.sign_samples, judged.solid,
+                    entry.length.value_or(0.0), entry.sweep ? entry.sweep->parameter : ""});
+    return digest_of_text(cell.dump());
+  }
+  std::string fingerprint_of_measurement() const {
+    return digest_of_text(Json{plan_.experiment.measurement, plan_.experiment.seed, plan_.tier.parameters, head_.at("threads")}.dump());
+  }
+
+  void read_what_is_there() {
+    if (!std::filesystem::exists(file_)) return;
+    if (drop_torn_row(file_)) context_.note("the last line of " + file_.string() + " was half a row, and is gone");
+    if (!settings_.resume || std::filesystem::file_size(file_) == 0) return;
+    for (const Json& row : read_rows(file_))
+      if (text_at(row, "/binary") == program_hash() && text_at(row, "/tier") == settings_.tier &&
+          text_at(row, "/experiment") == plan_.experiment.name && row.contains("cell")) {
+        there_by_cell_[text_at(row, "/cell") + (is_measurement() ? key_of(row) : "")] = row;
+        earlier_run_ = text_at(row, "/run");
+      }
+  }
+  static std::string key_of(const Json& row) { return text_at(row, "/case/name") + "/" + text_at(row, "/variant/label"); }
+
+  /// The rows of the group, if all of them are there and of the data at hand.
+  std::vector<Json> rows_there(const GroupId& id) {
+    std::vector<Json> rows;
+    for (const VariantEntry& variant : worker_.contenders(id)) {
+      const auto found = there_by_cell_.find(fingerprint(id, variant));
+      if (found == there_by_cell_.end()) return {};  // of a group that is there in part none counts: its cells race each other
+      rows.push_back(found->second);
+    }
+    const std::string hash = worker_.input(id).sha256;
+    if (std::ranges::any_of(rows, [&](const Json& row) { return text_at(row, "/case/sha256") != hash; })) return {};
+    return rows;
+  }
+
+  /// Whether the inputs of a measured row are at hand as it has them. Generated ones are the program's.
+  bool has_inputs_of(const Json& row) {
+    const Json* const inputs = find(row, "/inputs");
+    if (!inputs) return true;
+    return std::ranges::all_of(*inputs, [&](const Json& input) {
+      const std::string name = input.value("name", ""), hash = input.value("sha256", "");
+      if (input.value("origin", "") == "generated") return true;
+      if (!hashes_.contains(name)) hashes_[name] = plan_.tables.load(name, quiet_).sha256;
+      return hashes_[name] == hash;
+    });
+  }
+
+  // ---- Groups.
+
+  void run_group(const GroupId& id) {
+    std::vector<Json> rows = rows_there(id);
+    if (!rows.empty()) {
+      there_ += rows.size();
+    } else {
+      // What joins an interrupted run is of that run, for tables are of one; what replaces rows of other data is not.
+      const std::vector<VariantEntry> variants = worker_.contenders(id);
+      const bool joins = !earlier_run_.empty() && std::ranges::none_of(variants, [&](const VariantEntry& variant) {
+        return there_by_cell_.contains(fingerprint(id, variant));
+      });
+      head_["run"] = joins ? earlier_run_ : own_run_;
+      rows = settings_.apart ? rows_apart(id) : worker_.rows(id, {}, head_, {});
+      for (Json& row : rows)
+        for (const VariantEntry& variant : variants)
+          if (variant.label == text_at(row, "/variant/label")) row["cell"] = fingerprint(id, variant);
+      append_rows(file_, rows);
+    }
+    keep(std::move(rows));
+  }
+
+  void keep(std::vector<Json> rows) {
+    std::ranges::copy(rows, std::back_inserter(rows_));
+    std::ranges::move(rows, std::back_inserter(unprinted_));
+  }
+
+  Json job(const GroupId& id, const std::set<std::string>& left_out) const {
+    const Overrides& overrides = settings_.overrides;
+    Json json = {{"experiment", std::filesystem::absolute(settings_.experiment).string()},
+                 {"tier", settings_.tier},
+                 {"out", std::filesystem::absolute(settings_.out).string()},
+                 {"filter", settings_.filter},
+                 {"variants", overrides.variants},
+                 {"cases", overrides.cases},
+                 {"resolutions", overrides.resolutions},
+                 {"repetitions", overrides.repetitions.value_or(0)},
+                 {"require_data", data_are_required()},
+                 {"threads", head_.at("threads")},
+                 {"head", head_},
+                 {"group", to_json(id)},
+                 {"left_out", left_out}};
+    return json;
+  }
+
+  /// A row of a cell of which nothing more is known.
+  Json bare_row(const GroupId& id, const VariantEntry& variant) const {
+    Json row = head_;
+    row["case"] = {{"name", plan_.tier.cases[id.entry].name}};
+    if (plan_.tier.cases[id.entry].voxel_sizes.empty()) row["resolution"] = plan_.tier.cases[id.entry].resolutions[id.size];
+    row["variant"] = {{"name", variant.name}, {"label", variant.label}, {"options", ""}};
+    if (is_extraction()) row["voxelization"] = {{"label", plan_.experiment.voxelizers[id.voxelizer].label}};
+    return row;
+  }
+
+  std::vector<Json> rows_apart(const GroupId& id) {
+    const std::vector<VariantEntry> variants = worker_.contenders(id);
+    std::map<std::string, Json> found;
+    std::set<std::string> left_out, crashed;
+    const auto fail = [&](const VariantEntry& variant, const std::vector<Json>& planned, const std::string& reason) {
+      Json row = bare_row(id, variant);
+      for (const Json& each : planned)
+        if (text_at(each, "/variant/label") == variant.label) {
+          row = each;
+          if (is_extraction()) row["voxelization"] = {{"label", plan_.experiment.voxelizers[id.voxelizer].label}};
+        }
+      is_extraction() ? mark_failed(row, reason) : void(row["failed"] = reason);
+      found[variant.label] = std::move(row);
+      left_out.insert(variant.label);
+    };
+    while (left_out.size() < variants.size()) {
+      const ApartOutcome outcome = run_apart(apart_, job(id, left_out), {}, context_);
+      if (outcome.reason.empty()) {
+        for (const Json& row : outcome.rows) found[text_at(row, "/variant/label")] = row;
+        break;
+      }
+      for (const VariantEntry& variant : variants)
+        if (!left_out.contains(variant.label) && (outcome.culprit.empty() || outcome.culprit == variant.label)) {
+          fail(variant, outcome.planned, outcome.culprit.empty() ? outcome.reason + " before a variant was at work" : outcome.reason);
+          if (outcome.crashed && !outcome.culprit.empty()) crashed.insert(variant.label);
+        }
+    }
+    // A crash may have its cause in a cell before it: whoever crashed gets a process for itself.
+    if (variants.size() > 1)
+      for (const std::string& label : crashed) {
+        std::set<std::string> others;
+        for (const VariantEntry& variant : variants)
+          if (variant.label != label) others.insert(variant.label);
+        const ApartOutcome alone = run_apart(apart_, job(id, others), {}, context_);
+        if (!alone.reason.empty() || alone.rows.size() != 1) continue;
+        found[label] = alone.rows[0];
+        found[label]["notes"].push_back("this cell crashed beside others and not alone: its time is not interleaved with theirs");
+      }
+    std::vector<Json> rows;
+    for (const VariantEntry& variant : variants)
+      if (found.contains(variant.label)) rows.push_back(std::move(found.at(variant.label)));
+    return rows;
+  }
+
+  /// Every table of a measurement has columns of its own.
+  void measure() {
+    std::set<std::string> done;
+    std::vector<Json> rows;
+    for (const auto& [key, row] : there_by_cell_)
+      if (text_at(row, "/cell") == fingerprint_of_measurement() && !row.contains("failed") && has_inputs_of(row)) {
+        done.insert(key_of(row));
+        rows.push_back(row);
+        ++there_;
+      }
+    if (!done.empty()) head_["run"] = earlier_run_;
+    const auto take = [&](const Json& given) {
+      Json row = given;
+      row["cell"] = fingerprint_of_measurement();
+      append_row(file_, row);
+      rows.push_back(std::move(row));
+    };
+    if (!settings_.apart) {
+      worker_.measure(done, head_, take);
+    } else {
+      const ApartOutcome outcome = run_apart(apart_, job({}, done), take, context_);
+      if (!outcome.reason.empty()) {
+        Json row = head_;
+        row["measurement"] = {{"name", plan_.experiment.measurement}};
+        row["case"] = {{"name", plan_.experiment.measurement}};
+        row["variant"] = {{"name", plan_.experiment.measurement}, {"label", plan_.experiment.measurement}};
+        row["failed"] = outcome.reason;
+        take(row);
+      }
+    }
+    keep(std::move(rows));
+  }
+
+  // ---- What is said.
+
+  /// The values of a sweep, and voxel sizes, share a table.
+  bool share_a_table(const GroupId& a, const GroupId& b) const {
+    return !is_extraction() && a.entry == b.entry;
+  }
+
+  void print_tables() {
+    // Rows that were there keep the run that made them, and so may stand in a table of their own.
+    for (const RowGroup& group : latest_groups(unprinted_)) {
+      write_markdown(group, table_);
+      if (is_measurement()) {
+        write_legend(group.rows, table_);
+        table_ << '\n';
+      }
+    }
     table_.flush();
-    rows_.insert(rows_.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
+    unprinted_.clear();
+  }
+
+  double seconds_left(std::size_t done, std::size_t all) const {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    return done == 0 ? 0.0 : elapsed.count() / double(done) * double(all - done);
+  }
+  std::string overall(std::size_t done, std::size_t all) const {
+    if (all == 1) return "";
+    std::string text = "[" + std::to_string(done + 1) + "/" + std::to_string(all);
+    if (const double left = seconds_left(done, all); left >= 60)
+      text += ", " + std::to_string(int(left / 60 + 0.5)) + " min left";
+    return text + "] ";
+  }
+  void say_done(std::size_t i, const std::vector<GroupId>& groups) const {
+    if (!settings_.log) return;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    std::string line = "[" + std::to_string(i + 1) + "/" + std::to_string(groups.size()) + "] " + worker_.name_of(groups[i]);
+    line.pop_back();
+    if (is_extraction() && plan_.experiment.voxelizers.size() > 1)
+      line += " by " + plan_.experiment.voxelizers[groups[i].voxelizer].label;
+    line += ", " + readable(elapsed.count()) + " s since the start";
+    if (i + 1 < groups.size()) line += ", about " + readable(seconds_left(i + 1, groups.size())) + " s left";
+    settings_.log(line);
   }
 
   const RunSettings& settings_;
-  const Tables& tables_;
   RunContext& context_;
   std::ostream& table_;
-  Experiment experiment_;
-  const Tier& tier_;
+  Plan plan_;
   ResultFolder folder_;
-  const std::filesystem::path& out_;
+  std::filesystem::path file_;
   Json head_;
-  std::vector<Json> rows_;
+  RunContext quiet_;  ///< of loading a case to compare its hash, which the child does once more
+  Worker worker_;
+  Apart apart_;
+  std::chrono::steady_clock::time_point start_;
+  std::map<std::string, Json> there_by_cell_;
+  std::map<std::string, std::string> hashes_;
+  std::string own_run_, earlier_run_;
+  std::size_t there_ = 0;
+  std::vector<Json> rows_, unprinted_;
 };
 
 }  // namespace
@@ -292,5 +684,52 @@ Tables all_tables() {
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
   return run_experiment(settings, all_tables(), context, table);
 }
+
+int serve_cells(const Tables& tables, RunContext& context) {
+  std::string line;
+  std::getline(std::cin, line);
+  const Json job = Json::parse(line, nullptr, false);
+  if (!job.is_object()) throw Error("this is what `hermesh run` starts for its cells; it takes a job on the standard input");
+  const Answers answers(ChildProcess::kAnswers);
+  auto next = std::chrono::steady_clock::now();
+  context.on_progress = [&](std::string_view stage, double fraction) {
+    using namespace std::chrono_literals;
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next) return;
+    next = now + 100ms;
+    answers.send({{"stage", stage}, {"fraction", fraction}});
+  };
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, job.at("threads").get<std::size_t>());
+  try {
+    require_data(job.at("require_data").get<bool>());
+    RunSettings settings{job.at("experiment").get<std::string>(), job.at("tier").get<std::string>(),
+                         job.at("out").get<std::string>(), job.at("filter").get<std::string>()};
+    settings.overrides = {job.at("variants").get<std::vector<std::string>>(), job.at("cases").get<std::vector<std::string>>(),
+                          job.at("resolutions").get<std::vector<int>>()};
+    if (const int repetitions = job.at("repetitions").get<int>(); repetitions > 0) settings.overrides.repetitions = repetitions;
+    const Plan plan(settings, tables);
+    Worker worker(plan, settings.out, settings.filter, context);
+    const auto left_out = job.at("left_out").get<std::set<std::string>>();
+    const auto send = [&](const Json& row) { answers.send({{"row", row}}); };
+    if (plan.experiment.kind == ExperimentKind::kMeasurement)
+      worker.measure(left_out, job.at("head"), send);
+    else
+      for (const Json& row : worker.rows(group_id(job.at("group")), left_out, job.at("head"), answers.watch())) send(row);
+    for (const std::string& note : context.notes) answers.send({{"note", note}});
+    context.notes.clear();
+    answers.send({{"done", true}});
+  } catch (const DataMissing& error) {
+    answers.send({{"error", error.what()}, {"missing", true}});
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    answers.send({{"error", "there is not enough memory"}});
+  } catch (const std::exception& error) {
+    answers.send({{"error", error.what()}});
+  }
+  return 0;
+}
+
+int serve_cells(RunContext& context) { return serve_cells(all_tables(), context); }
 
 }  // namespace hermesh

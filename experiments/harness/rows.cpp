@@ -41,16 +41,29 @@ void add_voxelizer_ratios(std::vector<Json>& rows) {
   }
 }
 
-void append_row(const std::filesystem::path& file, const Json& row) {
+void append_row(const std::filesystem::path& file, const Json& row) { append_rows(file, {row}); }
+
+void append_rows(const std::filesystem::path& file, const std::vector<Json>& rows) {
   // A row may hold text from outside (a CPU's name, a library's message); what is no UTF-8 in it must not
   // lose the row.
-  const std::string line = row.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  std::string line;
+  for (const Json& row : rows) line += row.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
   const int descriptor = open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
   const bool written =
       descriptor >= 0 && write(descriptor, line.data(), line.size()) == static_cast<ssize_t>(line.size());
   const std::string reason = std::strerror(errno);
   if (descriptor >= 0) close(descriptor);
   if (!written) throw Error("cannot append a row to " + file.string() + ": " + reason);
+}
+
+bool drop_torn_row(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  if (text.empty() || text.back() == '\n') return false;
+  std::error_code error;
+  std::filesystem::resize_file(file, text.rfind('\n') + 1, error);
+  if (error) throw Error("cannot cut the last line off " + file.string() + ": " + error.message());
+  return true;
 }
 
 namespace {

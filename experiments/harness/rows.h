@@ -22,6 +22,14 @@ void add_voxelizer_ratios(std::vector<Json>& rows);
 /// @throws Error if the file cannot be written.
 void append_row(const std::filesystem::path& file, const Json& row);
 
+/// Appends the rows in a single write, so that all of them are there or none.
+/// @throws Error if the file cannot be written.
+void append_rows(const std::filesystem::path& file, const std::vector<Json>& rows);
+
+/// Cuts off a last line without an end, as a program that was killed while it wrote leaves it; returns whether there was one.
+/// @throws Error if the file cannot be written.
+bool drop_torn_row(const std::filesystem::path& file);
+
 /// All rows of the .jsonl files under a folder (or of the one file given), files in the order of their names.
 /// @throws Error if there are none, or naming file and line of one that is no JSON object.
 std::vector<Json> read_rows(const std::filesystem::path& folder);

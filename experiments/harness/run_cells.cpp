@@ -7,6 +7,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/voxelization/outputs/lost_surface.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/command_extractor.h"
 #include "experiments/harness/digest.h"
 #include "experiments/harness/provenance.h"
 #include "experiments/pipeline.h"
@@ -24,6 +25,18 @@ struct Cell {
   std::optional<Timing> timing;  ///< absent when the variant failed
 };
 
+std::optional<double> figure(const RunContext& child, std::string_view name) {
+  for (const auto& [key, value] : child.figures)
+    if (key == name) return value;
+  return std::nullopt;
+}
+/// An outside program's own time; writing its input and reading its mesh is ours.
+double own_seconds(double seconds, const RunContext& child) { return figure(child, kCommandSeconds).value_or(seconds); }
+std::optional<std::int64_t> peak_of_command(const RunContext& child) {
+  const auto bytes = figure(child, kCommandPeakBytes);
+  return bytes ? std::optional(static_cast<std::int64_t>(*bytes)) : std::nullopt;
+}
+
 class Group {
  public:
   Group(const GroupInput& group, RunContext& context)
@@ -37,11 +50,15 @@ class Group {
   }
 
   std::vector<Json> run() {
-    for (const VariantEntry& variant : in_.variants) cells_.push_back(make_cell(variant));
+    for (const VariantEntry& variant : in_.variants) {
+      cells_.push_back(make_cell(variant));
+      in_.watch.plan(cells_.back().row);
+    }
     const auto failed = attempt([&] { voxelize(); });
     source_ = to_mesh_file(in_.input.mesh);
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       cells_[i].row["voxelization"] = voxelization_;
+      in_.watch.step(cells_[i].row);
       const auto sentence = failed ? failed : attempt([&] { extract_and_judge(cells_[i], i); });
       if (sentence) fail(cells_[i], *sentence);
     }
@@ -69,9 +86,7 @@ class Group {
   }
 
   static void fail(Cell& cell, const std::string& sentence) {
-    cell.row["failed"] = sentence;
-    cell.row["promise_letters"] = "FAILED";
-    cell.row["promise_verdict"] = "FAILED: " + sentence;
+    mark_failed(cell.row, sentence);
     cell.timing.reset();
   }
 
@@ -116,8 +131,8 @@ class Group {
     PolygonMesh mesh;
     {
       const PeakMemory memory;
-      const double seconds = timed([&] { mesh = extract(cell, child); });
-      const auto peak = memory.bytes();
+      const double seconds = own_seconds(timed([&] { mesh = extract(cell, child); }), child);
+      const auto peak = peak_of_command(child) ? peak_of_command(child) : memory.bytes();
       cell.row["peak_bytes"] = optional_json(peak);
       if (peak) cell.row["bytes_per_active_voxel"] = static_cast<double>(*peak) / level_set_.active_voxels();
       cell.timing.emplace(in_.tier, seconds, child.stage_seconds);
@@ -186,9 +201,10 @@ class Group {
 
   double repeat(Cell& cell) {
     context_.check();
+    in_.watch.step(cell.row);
     RunContext child = child_context(context_, false);
     std::optional<PolygonMesh> mesh;
-    const double seconds = timed([&] { mesh.emplace(extract(cell, child)); });
+    const double seconds = own_seconds(timed([&] { mesh.emplace(extract(cell, child)); }), child);
     cell.timing->stages.push_back(child.stage_seconds);
     if (digest(*mesh) != cell.row["digest"]) cell.row["repetitions_differ"] = true;
     return seconds;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "experiments/cases/cases.h"
+#include "experiments/harness/cell.h"
 #include "experiments/harness/experiment_file.h"
 #include "experiments/harness/harness.h"
 #include "experiments/measurements/measurements.h"
@@ -46,6 +47,7 @@ struct GroupInput {
   const Tables& tables;
   std::filesystem::path out;
   const Json& head;  ///< what all rows of the run begin with
+  CellWatch watch = {};
 };
 
 /// The rows, one for each variant, failed ones included; writes the meshes under out/meshes and the picture

@@ -122,12 +122,16 @@ class Group {
   Group(const VoxelizerGroupInput& group, RunContext& context) : in_(group), context_(context) {}
 
   std::vector<Json> run() {
-    for (const VariantEntry& variant : in_.voxelizers) cells_.push_back(make_cell(variant));
+    for (const VariantEntry& variant : in_.voxelizers) {
+      cells_.push_back(make_cell(variant));
+      in_.watch.plan(cells_.back().row);
+    }
     std::optional<Truths> truths;
     // A mesh without any area has no truth; how the voxelizers take it is still worth a row.
     const auto no_truth = attempt([&] { truths.emplace(in_, context_); });
     for (Cell& cell : cells_) {
       if (no_truth) cell.row["not_judged"] = *no_truth;
+      in_.watch.step(cell.row);
       const auto failed = attempt([&] { first_run(cell, truths ? &*truths : nullptr); });
       if (!failed) continue;
       cell.row["failed"] = *failed;
@@ -215,6 +219,7 @@ class Group {
   }
 
   double repeat(Cell& cell) const {
+    in_.watch.step(cell.row);
     const Once again = once(cell, false);
     cell.timing->stages.push_back(again.stages);
     cell.timing->cpu_seconds.push_back(again.cpu_seconds);

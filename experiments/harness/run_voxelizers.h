@@ -19,6 +19,7 @@ struct VoxelizerGroupInput {
   std::vector<VariantEntry> voxelizers;  ///< those that the filter leaves
   const Tables& tables;
   const Json& head;  ///< what all rows of the group begin with
+  CellWatch watch = {};
 };
 
 /// The rows, one for each voxelizer, failed ones included. @throws Cancelled.

@@ -91,7 +91,7 @@ std::span<const Measurement> all_measurements() {
 std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
                                   const std::filesystem::path& out, const std::string& filter,
                                   const Json& head, RunContext& context,
-                                  const std::function<void(const Json&)>& keep) {
+                                  const std::function<void(const Json&)>& keep, const std::set<std::string>& done) {
   const Measurement& measurement = find_measurement(tables.measurements, experiment.measurement);
   const Options parameters(measurement.name, measurement.parameters, tier.parameters);
   Json full_head = head;
@@ -117,7 +117,7 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
   recorded.load_changed = [&](const std::string& name, const RecipeParameters& changes, RunContext& loading) {
     return record(tables.load_changed(name, changes, loading));
   };
-  MeasurementInput input{parameters, experiment.seed, recorded, out, context, filter, {}, measurement.name};
+  MeasurementInput input{parameters, experiment.seed, recorded, out, context, filter, {}, measurement.name, done};
   const auto start = std::chrono::steady_clock::now();
   const auto take = [&](const std::vector<MeasuredRow>& measured) {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;

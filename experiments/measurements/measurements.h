@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,10 +44,11 @@ struct MeasurementInput {
   /// loses nothing; from one thread at a time.
   std::function<void(std::vector<struct MeasuredRow>)> emit = {};
   std::string name = {};  ///< of the measurement
+  std::set<std::string> done = {};  ///< "table/label" of rows that there are already
 
   /// Whether the filter leaves a row of that label. A measurement asks before it does what the row needs.
   bool wants(const std::string& table, const std::string& label) const {
-    return (name + "/" + table + "/" + label).find(filter) != std::string::npos;
+    return !done.contains(table + "/" + label) && (name + "/" + table + "/" + label).find(filter) != std::string::npos;
   }
   bool wants_any(const std::string& table, std::span<const char* const> labels) const {
     return std::ranges::any_of(labels, [&](const char* label) { return wants(table, label); });
@@ -93,12 +95,14 @@ std::vector<std::string> case_choices();
 std::span<const Measurement> all_measurements();
 
 /// The measurement that the experiment names, as rows for rows.jsonl that begin with `head`; only those whose
-/// "measurement/table/label" contains the filter. A failure is a row, too. `keep` gets each as soon as it is ready.
+/// "measurement/table/label" contains the filter and that are not among `done` ("table/label"). A failure is a row, too.
+/// `keep` gets each as soon as it is ready.
 /// @throws Cancelled; Error for a row of a table or a value of a column that the measurement did not declare.
 std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier, const Tables& tables,
                                   const std::filesystem::path& out, const std::string& filter,
                                   const Json& head, RunContext& context,
-                                  const std::function<void(const Json&)>& keep = {});
+                                  const std::function<void(const Json&)>& keep = {},
+                                  const std::set<std::string>& done = {});
 
 // Those that there are, each in its measure_….cpp.
 

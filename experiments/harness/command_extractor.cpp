@@ -1,0 +1,169 @@
+#include "experiments/harness/command_extractor.h"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <regex>
+
+#include "algorithms/core/shown.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/vdb_file.h"
+#include "experiments/harness/measure.h"
+#include "experiments/harness/shell.h"
+
+namespace hermesh {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each run, which is removed with all that is in it.
+class Scratch {
+ public:
+  Scratch() {
+    static std::atomic<int> count{0};
+    path_ = fs::temp_directory_path() / ("hermesh-command-" + std::to_string(getpid()) + "-" + std::to_string(++count));
+    fs::create_directories(path_);
+  }
+  ~Scratch() {
+    std::error_code gone;
+    fs::remove_all(path_, gone);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  fs::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+const std::regex kPlaceholder("\\{([a-z.]*)\\}");
+const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?");
+
+/// Calls `replace` for each word in braces, and puts what it returns in its place.
+std::string replaced(const std::string& command, const std::function<std::string(const std::string&)>& replace) {
+  std::string text;
+  std::size_t done = 0;
+  for (std::sregex_iterator word(command.begin(), command.end(), kPlaceholder), end; word != end; ++word) {
+    text += command.substr(done, static_cast<std::size_t>(word->position()) - done) + replace((*word)[1].str());
+    done = static_cast<std::size_t>(word->position() + word->length());
+  }
+  return text + command.substr(done);
+}
+
+std::string last_line(const fs::path& file) {
+  std::ifstream stream(file);
+  std::string last;
+  for (std::string line; std::getline(stream, line);)
+    if (!line.empty()) last = line;
+  return shown(last, 200);
+}
+
+std::string plain_number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+/// Runs the command with its output in a file, and waits. @throws Cancelled; Error if it does not end with 0.
+void run_shell(const std::string& command, const fs::path& log, RunContext& context) {
+  const std::string name = log.string();
+  const pid_t parent = getpid();
+  rusage used{};
+  int status = 0;
+  const double seconds = timed([&] {
+    const pid_t pid = fork();
+    if (pid < 0) throw Error(std::string("cannot start a shell: ") + std::strerror(errno));
+    if (pid == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
+      if (getppid() != parent) _exit(127);
+      const int out = open(name.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), in = open("/dev/null", O_RDONLY);
+      dup2(in, STDIN_FILENO);
+      dup2(out, STDOUT_FILENO);
+      dup2(out, STDERR_FILENO);
+      execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+      _exit(127);
+    }
+    while (true) {
+      const pid_t ended = wait4(pid, &status, WNOHANG, &used);
+      if (ended == pid || (ended < 0 && errno != EINTR)) break;
+      if (context.cancelled()) {
+        kill(pid, SIGKILL);
+        wait4(pid, &status, 0, nullptr);
+        throw Cancelled();
+      }
+      usleep(300);
+    }
+  });
+  const std::string said = last_line(log), more = said.empty() ? "" : ": " + said;
+  if (WIFSIGNALED(status)) throw Error(std::string("the command crashed (") + strsignal(WTERMSIG(status)) + ")" + more);
+  if (WEXITSTATUS(status) > 128)  // the shell's word for it
+    throw Error(std::string("the command crashed (") + strsignal(WEXITSTATUS(status) - 128) + ")" + more);
+  if (WEXITSTATUS(status) != 0)
+    throw Error("the command ended with exit code " + std::to_string(WEXITSTATUS(status)) + more);
+  context.figure(std::string(kCommandSeconds), seconds);
+  context.figure(std::string(kCommandPeakBytes), double(used.ru_maxrss) * 1024);
+}
+
+PolygonMesh run_command(const ExtractionInput& input) {
+  const Scratch scratch;
+  fs::path made;
+  RunContext quiet;  // what the writers note about precision is about a file that is gone afterwards
+  quiet.cancel = input.context.cancel;
+  const std::string command = replaced(input.options.text("run"), [&](const std::string& word) {
+    if (std::regex_match(word, kIn)) {
+      if (!input.source) throw Error("the command wants polygons ({in}), and the volume was not made from any");
+      const fs::path file = scratch / (word == "in" ? "in.ply" : word);
+      if (!fs::exists(file)) write_mesh(file, *input.source, quiet);
+      return shell_quoted(file.string());
+    }
+    if (std::regex_match(word, kOut)) {
+      made = scratch / (word == "out" ? "out.ply" : word);
+      return shell_quoted(made.string());
+    }
+    if (word == "volume") {
+      const fs::path file = scratch / "volume.vdb";
+      if (!fs::exists(file)) write_level_set(file, input.level_set, quiet);
+      return shell_quoted(file.string());
+    }
+    if (word == "voxel") return plain_number(input.level_set.voxel_size());
+    return std::to_string(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  });
+  run_shell(command, scratch / "log", input.context);
+  if (!fs::exists(made)) {
+    const std::string said = last_line(scratch / "log");
+    throw Error("the command ended well and wrote no mesh" + (said.empty() ? "" : ": " + said));
+  }
+  return read_mesh(made, quiet);
+}
+
+}  // namespace
+
+Extractor command_extractor(const std::string& name, const std::string& command) {
+  bool writes = false;
+  replaced(command, [&](const std::string& word) {
+    writes = writes || std::regex_match(word, kOut);
+    if (!std::regex_match(word, kIn) && !std::regex_match(word, kOut) && word != "volume" && word != "voxel" && word != "threads")
+      throw Error("a command knows {in}, {volume}, {out}, {voxel} and {threads}, and not {" + word + "}");
+    return std::string();
+  });
+  if (!writes) throw Error("a command needs {out}, the file that it has to write");
+  return {.name = name,
+          .summary = "an outside program",
+          .promises = {},
+          .options = {{.name = "run", .fallback = command, .help = "the command", .choices = {command}}},
+          .extract = run_command};
+}
+
+}  // namespace hermesh
