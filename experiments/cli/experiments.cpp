@@ -1,5 +1,6 @@
 // hermesh run, report, compare and claims: experiments, the tables made of them, two runs beside each other, and what the
 // rows say of the thesis.
+#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <iostream>
@@ -270,6 +271,52 @@ void add_compare(CLI::App& app, Session& session) {
 
 }  // namespace
 
+/// One variant on the shapes of experiments/conform.toml, with one thread and with all.
+int conform(const std::string& variant, std::filesystem::path out, Session& session) {
+  if (out.empty()) out = std::filesystem::path("results/local") / ("conform-" + variant);
+  RunSettings settings{experiment_file("conform"), "quick", out, ""};
+  settings.overrides.variants = {variant};
+  settings.apart = Apart{"/proc/self/exe", {"cell"}, {}};
+  std::ostringstream table;
+  std::vector<std::vector<Json>> runs;
+  int worst = kDone;
+  for (const std::size_t threads : {std::size_t(1), std::size_t(2), std::size_t(7)}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    settings.out = out / (std::to_string(threads) + "-threads");
+    std::filesystem::remove_all(settings.out);
+    std::ostringstream another;
+    worst = std::max(worst, run_experiment(settings, session.context, runs.empty() ? table : another));
+    runs.push_back(read_rows(settings.out));
+  }
+  erase_progress_line();
+  std::cout << table.str() << '\n';
+  for (std::size_t i = 1; i < runs.size(); ++i) {
+    const RunComparison comparison = compare_runs(runs[0], runs[i]);
+    if (comparison.same()) continue;
+    worst = kNotMet;
+    std::cout << "Not the same bytes with one thread and with " << (i == 1 ? 2 : 7) << ":\n" << text(comparison);
+  }
+  std::cout << (worst == kDone ? variant + " conforms: its promises hold on all shapes, and its bytes do not depend on the number of threads\n"
+                               : variant + " does not conform: see what is in capitals, or differs, above\n");
+  return worst;
+}
+
+void add_conform(CLI::App& app, Session& session) {
+  struct Arguments {
+    std::string variant;
+    std::filesystem::path out;
+  };
+  CLI::App* command = add_command(app, session, "conform",
+                                  "Whether a variant keeps its promises on awkward shapes, with the same bytes at any number "
+                                  "of threads; if not, exit code 3");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("NAME", arguments->variant, "Extractor from `hermesh list`")->required();
+  command->add_option("--out", arguments->out, "Folder for rows and meshes (default: results/local/conform-NAME)");
+  command->callback([arguments, &session] {
+    session.command = [arguments, &session] { return conform(arguments->variant, arguments->out, session); };
+  });
+}
+
 /// What `hermesh run` starts for its cells; not for users.
 void add_cell(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "cell", "What `hermesh run` starts for its cells");
@@ -279,6 +326,7 @@ void add_cell(CLI::App& app, Session& session) {
 
 void add_experiments(CLI::App& app, Session& session) {
   add_cell(app, session);
+  add_conform(app, session);
   add_run(app, session);
   add_report(app, session);
   add_compare(app, session);

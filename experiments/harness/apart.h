@@ -1,6 +1,6 @@
 // Cells in a process of their own: what a harness that survives its variants says to that process, and hears from it.
 //
-// The parent sends one job, a line of JSON that names a group of cells (harness.cpp makes and understands it). The child
+// The parent sends one job, a line of JSON that names a group of cells (Run::job() of harness.cpp makes it, serve_cells() of group_worker.cpp understands it). The child
 // answers with lines of JSON, each an object with one of these keys:
 //   planned   the row of a cell as far as it is known before the work on it begins
 //   at        the label of the cell that it works on from now on

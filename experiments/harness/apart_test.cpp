@@ -111,7 +111,7 @@ class ApartRun : public testing::Test {
     return run_experiment(settings, toys(), context_, table);
   }
   std::vector<Json> rows() const { return read_rows(folder_ / "out"); }
-  /// By "case/variant": the sentence of a failure, or the digest.
+  /// The sentence of a failure, or the digest, by "case/variant".
   std::map<std::string, std::string> outcomes() const {
     std::map<std::string, std::string> found;
     for (const Json& row : rows())

@@ -30,8 +30,17 @@ std::map<std::string, std::string> options_of(const std::string& canonical) {
   return options;
 }
 
-VariantEntry variant_of(const Json& json) {
-  return {json.value("name", ""), json.value("label", ""), options_of(json.value("options", ""))};
+/// The variant of a row. A row names all options; those that have their default now are left out, for to give an option that
+/// has no effect beside the others is an error.
+template <class Entry>
+VariantEntry variant_of(const Json& json, const std::vector<Entry>& table) {
+  VariantEntry variant{json.value("name", ""), json.value("label", ""), options_of(json.value("options", ""))};
+  const auto known = std::ranges::find(table, variant.name, &Entry::name);
+  if (known == table.end()) return variant;
+  for (const OptionSpec& option : known->options)
+    if (const auto given = variant.options.find(option.name); given != variant.options.end() && given->second == option.fallback)
+      variant.options.erase(given);
+  return variant;
 }
 
 bool is_measurement(const Json& row) { return row.contains("measurement"); }
@@ -111,6 +120,7 @@ struct CellGroup {
 std::vector<CellGroup> groups_of(const std::vector<Json>& rows) {
   std::map<std::string, CellGroup> groups;
   for (const Json& row : rows) {
+    if (text_at(row, "/variant/name").starts_with("command ")) continue;  // an outside program is not ours to make again
     std::string key = text_at(row, "/tier");
     const bool voxelization = is_voxelization(row);
     for (const char* part : {"/case/name", "/resolution", "/voxel_size", "/sweep/value"}) key += "/" + text_at(row, part);
@@ -157,11 +167,14 @@ std::vector<Json> made_again(const CellGroup& group, const LoadedCase& input, co
   CaseEntry entry;
   entry.name = input.name;
   std::vector<VariantEntry> variants;
-  for (const Json& row : group.rows) variants.push_back(variant_of(row.at("variant")));
+  const bool voxelization = is_voxelization(first);
+  for (const Json& row : group.rows)
+    variants.push_back(voxelization ? variant_of(row.at("variant"), tables.voxelizers)
+                                    : variant_of(row.at("variant"), tables.extractors));
   Json head = Json::object();
-  if (!is_voxelization(first)) {
+  if (!voxelization) {
     const auto resolution = static_cast<int>(number_at(first, "/resolution"));
-    const VariantEntry voxelizer = variant_of(first.at("voxelization"));
+    const VariantEntry voxelizer = variant_of(first.at("voxelization"), tables.voxelizers);
     return run_group({experiment, tier, entry, input, resolution, voxelizer, variants, tables, scratch, head}, context);
   }
   experiment.kind = ExperimentKind::kVoxelization;
