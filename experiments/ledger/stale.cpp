@@ -30,16 +30,43 @@ std::map<std::string, std::string> options_of(const std::string& canonical) {
   return options;
 }
 
-/// The variant of a row. A row names all options; those that have their default now are left out, for to give an option that
-/// has no effect beside the others is an error.
+/// Without what the declarations refuse. A row names all options, also those that have no effect beside the others, and those
+/// that there were once; whether it mattered shows in what comes out.
+std::map<std::string, std::string> accepted(const std::string& name, const std::vector<OptionSpec>& declared,
+                                            std::map<std::string, std::string> options) {
+  for (std::size_t tries = options.size(); tries > 0; --tries) {
+    try {
+      Options(name, declared, options);
+      break;
+    } catch (const Error& error) {
+      const std::string sentence = error.what();
+      const auto refused = std::ranges::find_if(
+          options, [&](const auto& option) { return sentence.find("option '" + option.first + "'") != std::string::npos; });
+      if (refused == options.end()) break;
+      options.erase(refused);
+    }
+  }
+  return options;
+}
+
+/// What was an option is a name now: the octree has been a variant of its own since it is not `merging=regions` any more.
+std::string renamed(const std::string& name, std::map<std::string, std::string>& options, const char* option_now) {
+  const auto merging = options.find("merging");
+  if (merging == options.end()) return name;
+  const std::string now = merging->second == "regions" ? "certified-octree" : "manifold-dual-contouring";
+  options.erase(merging);
+  if (!option_now) return now;
+  options[option_now] = now;
+  return name;
+}
+
+/// The variant of a row.
 template <class Entry>
 VariantEntry variant_of(const Json& json, const std::vector<Entry>& table) {
   VariantEntry variant{json.value("name", ""), json.value("label", ""), options_of(json.value("options", ""))};
+  variant.name = renamed(variant.name, variant.options, nullptr);
   const auto known = std::ranges::find(table, variant.name, &Entry::name);
-  if (known == table.end()) return variant;
-  for (const OptionSpec& option : known->options)
-    if (const auto given = variant.options.find(option.name); given != variant.options.end() && given->second == option.fallback)
-      variant.options.erase(given);
+  if (known != table.end()) variant.options = accepted(variant.name, known->options, std::move(variant.options));
   return variant;
 }
 
@@ -53,7 +80,7 @@ double seconds_of(const Json& row) {
 
 std::string cell_name(const Json& row) {
   std::string name = text_at(row, "/case/name");
-  for (const char* part : {"/resolution", "/nominal_voxel_size", "/sweep/value", "/voxelization/label", "/variant/label"})
+  for (const char* part : {"/resolution", "/values/resolution", "/nominal_voxel_size", "/sweep/value", "/voxelization/label", "/variant/label"})
     if (const std::string text = text_at(row, part); !text.empty()) name += "/" + text;
   return name;
 }
@@ -247,6 +274,10 @@ void check_measured(const std::vector<Json>& rows, const Tables& tables, const s
     experiment.seed = static_cast<std::uint64_t>(number_at(row, "/measurement/seed"));
     Tier tier;
     tier.parameters = options_of(text_at(row, "/measurement/parameters"));
+    renamed("", tier.parameters, "extractor");
+    if (const auto known = std::ranges::find(tables.measurements, experiment.measurement, &Measurement::name);
+        known != tables.measurements.end())
+      tier.parameters = accepted(experiment.measurement, known->parameters, std::move(tier.parameters));
     std::vector<Json> made;
     const auto failed = attempt([&] {
       made = run_measurement(experiment, tier, tables, scratch,
