@@ -116,12 +116,12 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
       return input.wants("extraction", label_of(method, count));
     });
   });
-  if (all.empty()) return {};
   const LoadedCase model = load_buddha(input);
   std::vector<MeasuredRow> rows = {
       {"input",
        std::filesystem::path(model.name).filename().string() + ", " + model.origin,
        {{"triangles", model.mesh.triangle_count()}}}};
+  if (all.empty()) return rows;
   for (const double resolution : numbers(input.parameters.text("resolutions"))) {
     input.context.progress("resolution " + readable(resolution), 0.0);
     std::ranges::move(race_at(resolution, model, input, all, counts), std::back_inserter(rows));
