@@ -1,5 +1,4 @@
-// hermesh run, report, compare and claims: experiments, the tables made of them, two runs beside each other, and what the
-// rows say of the thesis.
+// hermesh run, conform, report and claims: experiments, the tables made of them, and what the rows say of the thesis.
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -13,12 +12,12 @@
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/terminal_progress.h"
-#include "experiments/harness/compare.h"
 #include "experiments/harness/experiment_file.h"
 #include "experiments/harness/harness.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/rows.h"
 #include "experiments/ledger/claims.h"
+#include "experiments/ledger/compare.h"
 #include "experiments/ledger/pages.h"
 #include "experiments/measurements/measurements.h"
 
@@ -251,24 +250,6 @@ void add_claims(CLI::App& app, Session& session) {
   });
 }
 
-void add_compare(CLI::App& app, Session& session) {
-  struct Arguments {
-    std::filesystem::path before, after;
-  };
-  CLI::App* command = add_command(
-      app, session, "compare", "Whether the cells of two runs made the same, by their digests; if not, exit code 3");
-  auto arguments = std::make_shared<Arguments>();
-  command->add_option("BEFORE", arguments->before, "Folder with rows.jsonl")->required();
-  command->add_option("AFTER", arguments->after, "Folder with rows.jsonl")->required();
-  command->callback([arguments, &session] {
-    session.command = [arguments] {
-      const RunComparison comparison = compare_runs(read_rows(arguments->before), read_rows(arguments->after));
-      std::cout << text(comparison);
-      return comparison.same() ? kDone : kNotMet;
-    };
-  });
-}
-
 }  // namespace
 
 /// One variant on the shapes of experiments/conform.toml, with one thread and with all.
@@ -291,10 +272,10 @@ int conform(const std::string& variant, std::filesystem::path out, Session& sess
   erase_progress_line();
   std::cout << table.str() << '\n';
   for (std::size_t i = 1; i < runs.size(); ++i) {
-    const RunComparison comparison = compare_runs(runs[0], runs[i]);
-    if (comparison.same()) continue;
+    const Comparison comparison = compare_rows(runs[0], runs[i], {.costs = false});
+    if (comparison.fine()) continue;
     worst = kNotMet;
-    std::cout << "Not the same bytes with one thread and with " << (i == 1 ? 2 : 7) << ":\n" << text(comparison);
+    std::cout << "Not the same bytes with one thread and with " << (i == 1 ? 2 : 7) << ":\n" << text(comparison, "md");
   }
   std::cout << (worst == kDone ? variant + " conforms: its promises hold on all shapes, and its bytes do not depend on the number of threads\n"
                                : variant + " does not conform: see what is in capitals, or differs, above\n");
@@ -329,7 +310,6 @@ void add_experiments(CLI::App& app, Session& session) {
   add_conform(app, session);
   add_run(app, session);
   add_report(app, session);
-  add_compare(app, session);
   add_claims(app, session);
 }
 

@@ -112,6 +112,7 @@ int run_program(int argc, char** argv) {
   add_validate(app, session);
   add_info(app, session);
   add_experiments(app, session);
+  add_compare(app, session);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "algorithms/core/error.h"
 
@@ -39,6 +40,18 @@ void add_voxelizer_ratios(std::vector<Json>& rows) {
     if (find(row, "/peak_bytes") && peak > 0.0)
       row["peak_over_openvdb"] = number_at(row, "/peak_bytes") / peak;
   }
+}
+
+std::map<std::string, std::string> options_in(const std::string& canonical) {
+  std::map<std::string, std::string> options;
+  std::istringstream words(canonical);
+  std::string key;
+  for (std::string word; words >> word;)
+    if (const std::size_t equals = word.find('='); equals != std::string::npos)
+      options[key = word.substr(0, equals)] = word.substr(equals + 1);
+    else if (!key.empty())
+      options[key] += " " + word;
+  return options;
 }
 
 void append_row(const std::filesystem::path& file, const Json& row) { append_rows(file, {row}); }

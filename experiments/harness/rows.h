@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,9 @@ void add_time_ratios(std::vector<Json>& rows);
 /// Compares voxelizers, the other way round: sets `openvdb_over_time` (above 1 is faster) and
 /// `peak_over_openvdb` in every timed row, relative to the row of variant "openvdb" with its default options.
 void add_voxelizer_ratios(std::vector<Json>& rows);
+
+/// The options of a row by name, from the text that Options::canonical() wrote; a value may have spaces.
+std::map<std::string, std::string> options_in(const std::string& canonical);
 
 /// Appends one line in a single write, so that two runs at once do not tear each other's rows.
 /// @throws Error if the file cannot be written.

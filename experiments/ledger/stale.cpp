@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "experiments/harness/cell.h"
+#include "experiments/harness/rows.h"
 #include "experiments/harness/run_voxelizers.h"
 #include "experiments/harness/table.h"
 #include "experiments/ledger/row_database.h"
@@ -16,19 +17,6 @@
 
 namespace hermesh {
 namespace {
-
-/// Options as Options::canonical() writes them; a value may have spaces.
-std::map<std::string, std::string> options_of(const std::string& canonical) {
-  std::map<std::string, std::string> options;
-  std::istringstream words(canonical);
-  std::string key;
-  for (std::string word; words >> word;)
-    if (const std::size_t equals = word.find('='); equals != std::string::npos)
-      options[key = word.substr(0, equals)] = word.substr(equals + 1);
-    else if (!key.empty())
-      options[key] += " " + word;
-  return options;
-}
 
 /// Without what the declarations refuse. A row names all options, also those that have no effect beside the others, and those
 /// that there were once; whether it mattered shows in what comes out.
@@ -63,7 +51,7 @@ std::string renamed(const std::string& name, std::map<std::string, std::string>&
 /// The variant of a row.
 template <class Entry>
 VariantEntry variant_of(const Json& json, const std::vector<Entry>& table) {
-  VariantEntry variant{json.value("name", ""), json.value("label", ""), options_of(json.value("options", ""))};
+  VariantEntry variant{json.value("name", ""), json.value("label", ""), options_in(json.value("options", ""))};
   variant.name = renamed(variant.name, variant.options, nullptr);
   const auto known = std::ranges::find(table, variant.name, &Entry::name);
   if (known != table.end()) variant.options = accepted(variant.name, known->options, std::move(variant.options));
@@ -273,7 +261,7 @@ void check_measured(const std::vector<Json>& rows, const Tables& tables, const s
     experiment.measurement = text_at(row, "/measurement/name");
     experiment.seed = static_cast<std::uint64_t>(number_at(row, "/measurement/seed"));
     Tier tier;
-    tier.parameters = options_of(text_at(row, "/measurement/parameters"));
+    tier.parameters = options_in(text_at(row, "/measurement/parameters"));
     renamed("", tier.parameters, "extractor");
     if (const auto known = std::ranges::find(tables.measurements, experiment.measurement, &Measurement::name);
         known != tables.measurements.end())
