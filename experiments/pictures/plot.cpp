@@ -5,64 +5,15 @@
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <ostream>
 #include <sstream>
 
 #include "algorithms/core/error.h"
-#include "experiments/harness/table.h"
+#include "experiments/pictures/curves.h"
 
 namespace hermesh {
 namespace {
-
-struct Curve {
-  std::string label;
-  std::vector<std::pair<double, double>> points;
-};
-
-Column column_of(const Json& row, const std::string& name) {
-  for (const Column& column : own_columns(row))
-    if (column.name == name) return column;
-  for (const Column& column : all_columns())
-    if (column.name == name) return column;
-  throw Error("there is no column \"" + name + "\"");
-}
-
-std::optional<double> number_in(const std::string& column, const Json& row) {
-  const Json value = value_of(column_of(row, column), row);
-  return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
-}
-
-/// The curves of a plot. The first column gives a curve for every label or variant. The others do not depend on who
-/// competes: they are taken from the rows of the first label alone, and are called by their column's header.
-std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows) {
-  std::vector<Curve> curves;
-  const char* const who = plot.by_variant ? "/variant/name" : "/variant/label";
-  const std::string first_label = rows.empty() ? "" : text_at(rows.front(), who);
-  const auto curve = [&](const std::string& label) -> Curve& {
-    const auto known =
-        std::find_if(curves.begin(), curves.end(), [&](const Curve& c) { return c.label == label; });
-    return known != curves.end() ? *known : curves.emplace_back(Curve{label, {}});
-  };
-  for (const Json& row : rows) {
-    if (!plot.case_name.empty() && text_at(row, "/case/name") != plot.case_name) continue;
-    if (plot.resolution != 0 && row.value("resolution", 0) != plot.resolution) continue;
-    const auto x = number_in(plot.x, row);
-    if (!x || (plot.log_x && *x <= 0.0)) continue;
-    for (std::size_t i = 0; i < plot.y.size(); ++i) {
-      const auto y = number_in(plot.y[i], row);
-      if (!y || (plot.log_y && *y <= 0.0)) continue;
-      const std::string label = text_at(row, who);
-      if (i > 0 && label != first_label) continue;
-      auto& points = curve(i == 0 ? label : column_of(row, plot.y[i]).header).points;
-      points.emplace_back(*x, plot.percent ? 100.0 * *y : *y);
-    }
-  }
-  for (Curve& c : curves) std::sort(c.points.begin(), c.points.end());
-  return curves;
-}
 
 std::string quoted(const std::string& text) {
   std::string result = "'";
@@ -109,7 +60,7 @@ void write_data(const std::filesystem::path& file, const std::vector<Curve>& cur
   out << std::setprecision(10);
   for (const Curve& curve : curves) {
     out << "# " << curve.label << "\n";
-    for (const auto& [x, y] : curve.points) out << x << ' ' << y << "\n";
+    for (const CurvePoint& point : curve.points) out << point.x << ' ' << point.y << "\n";
     out << "\n\n";
   }
   if (!out.flush()) throw Error("cannot write " + file.string());
@@ -166,18 +117,11 @@ Plot plot_from_json(const Json& json) {
 }
 
 void write_plots(const std::vector<Json>& rows, const std::filesystem::path& folder, std::ostream& out) {
-  // By experiment: its latest rows, and the plots that the last of them name.
-  std::map<std::string, std::vector<Json>> latest;
-  for (const RowGroup& group : latest_groups(rows))
-    for (const Json& row : group.rows) latest[text_at(row, "/experiment")].push_back(row);
-  for (const auto& [experiment, own_rows] : latest) {
-    const Json* plots = find(own_rows.back(), "/plots");
-    if (!plots) continue;
-    for (const Json& json : *plots) {
-      const Plot plot = plot_from_json(json);
-      const std::vector<Curve> curves = curves_of(plot, own_rows);
+  for (const PlottedRows& own : plotted_rows(rows)) {
+    for (const Plot& plot : own.plots) {
+      const std::vector<Curve> curves = curves_of(plot, own.rows);
       if (curves.empty()) continue;
-      const std::filesystem::path stem = folder / (experiment + "-" + plot.name);
+      const std::filesystem::path stem = folder / (own.experiment + "-" + plot.name);
       write_data(stem.string() + ".dat", curves);
       write_script(stem.string() + ".gp", plot, curves);
       const bool drawn = run_gnuplot(stem.string() + ".gp");
