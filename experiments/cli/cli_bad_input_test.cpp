@@ -202,7 +202,9 @@ TEST_F(BadInputTest, Usage) {
   expect_refusal(2, {"validate", "cube.off", "--reference", ""}, {"--reference", "empty"});
   expect_refusal(2, {"import", "x.raw", "x.vdb", "--dims", "2,2,2", "--type", "uint8", "--offset", "99999999999999999999"},
                  {"--offset"});
-  expect_refusal(2, {"report", ".", "--format", "html"}, {"--format", "md"});
+  expect_refusal(2, {"report", ".", "--format", "pdf"}, {"--format", "md"});
+  expect_refusal(2, {"report", ".", "--meshes", "all"}, {"--meshes", "--format html"});
+  expect_refusal(2, {"report", ".", "--format", "html", "--meshes", "some"}, {"--meshes", "all, none"});
 }
 
 TEST_F(BadInputTest, GridThatIsNotThere) {

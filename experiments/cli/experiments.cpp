@@ -20,6 +20,7 @@
 #include "experiments/ledger/compare.h"
 #include "experiments/ledger/pages.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/page/page.h"
 
 namespace hermesh::cli {
 namespace {
@@ -163,7 +164,7 @@ int print_query(const std::string& query) {
 void add_report(CLI::App& app, Session& session) {
   struct Arguments {
     std::filesystem::path folder;
-    std::string format = "md";
+    std::string format = "md", meshes;
     bool fill = false, check = false, stale = false;
     std::string query;
   };
@@ -187,16 +188,37 @@ void add_report(CLI::App& app, Session& session) {
   fill->excludes(check);
   command
       ->add_option("--format", arguments->format,
-                   "md, csv, tex, or plots to draw those of the rows into DIR (default: md)")
-      ->check(CLI::IsMember({"md", "csv", "tex", "plots"}));
+                   "md, csv, tex, plots to draw those of the rows into DIR, or html for DIR/report.html, a page with "
+                   "tables, figures and meshes that needs no network (default: md)")
+      ->check(CLI::IsMember({"md", "csv", "tex", "plots", "html"}));
+  command->add_option("--meshes", arguments->meshes,
+                      "Which of DIR/meshes the page of html holds: all, none, or a number, of the largest (default: 10)")
+      ->check([](const std::string& text) {
+        try {
+          mesh_choice(text);
+          return std::string();
+        } catch (const Error& error) {
+          return std::string(error.what());
+        }
+      });
   command->callback([arguments, &session] {
     if (arguments->folder.empty() && !arguments->fill && !arguments->check && !arguments->stale && arguments->query.empty())
       throw CLI::RequiredError("DIR, --query, --fill, --check or --stale");
+    if (!arguments->meshes.empty() && arguments->format != "html")
+      throw CLI::ValidationError("--meshes", "has no effect without --format html");
     session.command = [arguments, &session] {
       if (arguments->stale) return print_stale(arguments->folder.filename().string(), session);
       if (arguments->fill) return fill_pages();
       if (arguments->check) return check_pages();
       if (!arguments->query.empty()) return print_query(arguments->query);
+      if (arguments->format == "html") {
+        const MeshChoice choice = arguments->meshes.empty() ? MeshChoice{} : mesh_choice(arguments->meshes);
+        std::ostringstream said;
+        write_page(arguments->folder, choice, session.context, said);
+        erase_progress_line();
+        std::cout << said.str();
+        return static_cast<int>(kDone);
+      }
       write_report(arguments->folder, arguments->format, std::cout);
       return static_cast<int>(kDone);
     };
