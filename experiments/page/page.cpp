@@ -65,21 +65,24 @@ std::string filled(std::string_view text,
   return result;
 }
 
-/// Rows of baselines/ beside the folder, of experiments that the rows are of, without those that the folder
-/// holds itself.
+/// Rows of the folders `baselines` beside the folder and above it, of experiments that the rows are of,
+/// without those that the folder holds itself.
 std::vector<Json> baseline_rows(const std::filesystem::path& folder, const std::vector<Json>& rows) {
-  const std::filesystem::path baselines =
-      std::filesystem::absolute(folder / "..").lexically_normal() / "baselines";
-  if (!std::filesystem::is_directory(baselines)) return {};
   std::set<std::string> experiments, known;
   for (const Json& row : rows) {
     experiments.insert(text_at(row, "/experiment"));
     known.insert(row.dump());
   }
   std::vector<Json> result;
-  for (Json& row : read_rows(baselines))
-    if (experiments.contains(text_at(row, "/experiment")) && !known.contains(row.dump()))
-      result.push_back(std::move(row));
+  for (const char* way : {"..", "../.."}) {
+    const std::filesystem::path baselines =
+        std::filesystem::absolute(folder / way).lexically_normal() / "baselines";
+    // Of an empty folder read_rows() makes an error.
+    if (!std::filesystem::is_directory(baselines) || std::filesystem::is_empty(baselines)) continue;
+    for (Json& row : read_rows(baselines))
+      if (experiments.contains(text_at(row, "/experiment")) && known.insert(row.dump()).second)
+        result.push_back(std::move(row));
+  }
   return result;
 }
 

@@ -26,8 +26,9 @@ extern const std::string_view kPageScript;  ///< figures.js, viewer.js and page.
 std::string html_page(const std::string& title, const std::vector<Json>& rows,
                       const std::vector<PageMesh>& meshes);
 
-/// Writes report.html into the folder (beside a file of rows), and says so. Rows of a folder `baselines`
-/// beside it that are of the same experiments count as earlier runs. What the context notes is said, too.
+/// Writes report.html into the folder (beside a file of rows), and says so. Rows of a folder `baselines` beside
+/// it or one level up (results/baselines, for results/local/NAME) that are of the same experiments count as
+/// earlier runs. What the context notes is said, too.
 /// @throws Error if there are no rows, or the file cannot be written; Cancelled.
 void write_page(const std::filesystem::path& folder, const MeshChoice& choice, RunContext& context,
                 std::ostream& out);

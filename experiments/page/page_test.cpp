@@ -357,6 +357,12 @@ TEST_F(PageFolder, BaselinesBesideItAreEarlierRuns) {
   EXPECT_EQ(data["tables"][0]["rows"][0]["row"], 1);  // the folder's own run is the one that is shown
   EXPECT_EQ(data["tables"][0]["earlier"], 1);
   EXPECT_EQ(data["histories"].size(), 1u);
+  // As results/baselines is for results/local/toy.
+  const std::filesystem::path local = folder_.parent_path() / "local" / "toy";
+  std::filesystem::create_directories(local);
+  append_row(local / "rows.jsonl", row_of("3", "a", 10, 0.1));
+  write_page(local, {}, context_, said);
+  EXPECT_NE(said.str().find("report.html (3 rows, 0 meshes"), std::string::npos) << said.str();
 }
 
 }  // namespace
