@@ -28,7 +28,7 @@ bool contains(const std::vector<std::string>& all, const std::string& name) {
 TEST_F(CliTest, EveryCommandHasHelp) {
   const Outcome overview = run({"--help"});
   EXPECT_EQ(overview.exit_code, 0);
-  for (const char* command : {"list", "voxelize", "import", "extract", "remesh", "combine", "validate", "info", "run", "report"}) {
+  for (const char* command : {"list", "voxelize", "import", "extract", "remesh", "combine", "validate", "info", "run", "report", "compare", "accept"}) {
     SCOPED_TRACE(command);
     EXPECT_NE(overview.out.find(command), std::string::npos);
     const Outcome help = run({command, "--help"});

@@ -8,8 +8,8 @@
 #include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
-#include "experiments/ledger/baseline.h"
 #include "experiments/harness/rows.h"
+#include "experiments/ledger/baseline.h"
 
 namespace hermesh::cli {
 namespace {
