@@ -48,15 +48,16 @@ struct Comparison {
 /// new are one that was renamed if all but the label agrees, and variant and options do, or else the digest.
 ///
 /// Values are compared by their class (value_class.h):
-///   - exact: digests, whole numbers of reports and measurements, texts, options, promises, failures. Options and
-///     columns that one side alone has are noted. Of failures and broken promises, new ones are regressions, and
-///     cured ones better;
-///   - error: a change for the worse beyond the tolerance and 1e-6 of the column's unit (voxels, degrees) is a
-///     regression;
+///   - exact: digests, whole numbers of reports and measurements, texts, options, promises, failures. Options
+///     and columns that one side alone has are noted. Of failures and broken promises, new ones are
+///     regressions, and cured ones better;
+///   - error: a change for the worse beyond the tolerance and 1e-6 of the column's unit (voxels, degrees)
+///     is a regression;
 ///   - slope: a regression where the intervals do not overlap;
-///   - time: a regression where the U test (rank_test.h) over all repetitions has p < 0.01 and the medians differ by
-///     more than a tenth; only on one machine (CPU, cores, threads) with at least five repetitions a side. Of pooled
-///     runs each must be slower than all of the other side, too, for repetitions of one run share their disturbances;
+///   - time: a regression where the U test (rank_test.h) over all repetitions has p < 0.01 and the medians
+///     differ by more than a tenth; only on one machine (CPU, cores, threads) with at least five repetitions
+///     a side. Of pooled runs each must be slower than all of the other side, too, for repetitions of one run
+///     share their disturbances;
 ///   - memory: a regression where a peak is above 1.2 times what it was and by more than a MiB; only on one
 ///     machine.
 /// Where the inputs differ nothing else is compared, and that is a regression.
