@@ -42,7 +42,7 @@ Finished run(const ExperimentInfo& experiment, const std::string& tier, const fs
   });
   finished.exit_code = status < 0 || status % 256 != 0 ? -1 : status / 256;
   if (fs::exists(folder / "rows.jsonl")) finished.rows = read_rows(folder / "rows.jsonl").size();
-  for (const auto& entry : fs::directory_iterator(folder)) finished.pictures += entry.path().extension() == ".png" ? 1 : 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) finished.pictures += entry.path().extension() == ".png" ? 1 : 0;
   return finished;
 }
 
