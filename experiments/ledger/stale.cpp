@@ -98,27 +98,30 @@ std::map<std::string, Json> outcome(const Json& row) {
   return values;
 }
 
-/// Compares rows of old with those made anew, matched by the names of their cells.
+/// What differs between two rows of a cell, as a sentence; empty if nothing does.
+std::string difference_of(const Json& row, const Json& made) {
+  if (made.contains("failed") && !row.contains("failed")) return "fails: " + text_at(made, "/failed");
+  for (const auto& [place, value] : outcome(row)) {
+    const Json* const now = find(made, place);
+    if (!now || *now != value) return place.substr(1) + " was " + value.dump() + ", now " + (now ? now->dump() : "nothing");
+  }
+  return {};
+}
+
+/// Compares rows of old with those made anew, matched by the names of their cells. Where several rows of a measurement have
+/// one name (of one model at several angles, say), one that is the same is enough.
 void compare(const std::vector<Json>& old, const std::vector<Json>& made, FolderCheck& check) {
-  std::map<std::string, const Json*> anew;
-  for (const Json& row : made) anew[cell_name(row)] = &row;
   for (const Json& row : old) {
-    const std::map<std::string, Json> before = outcome(row);
     ++check.tried;
     if (find(row, "/digest") || find(row, "/values/digest")) ++check.by_digest;
-    const auto found = anew.find(cell_name(row));
-    std::string difference;
-    if (found == anew.end()) {
-      difference = "is no longer made";
-    } else if (found->second->contains("failed") && !row.contains("failed")) {
-      difference = "fails: " + text_at(*found->second, "/failed");
-    } else {
-      for (const auto& [place, value] : before) {
-        const Json* const now = find(*found->second, place);
-        if (now && *now == value) continue;
-        difference = place.substr(1) + " was " + value.dump() + ", now " + (now ? now->dump() : "nothing");
-        break;
-      }
+    std::string difference = "is no longer made";
+    bool first = true;
+    for (const Json& other : made) {
+      if (cell_name(other) != cell_name(row)) continue;
+      const std::string found = difference_of(row, other);
+      if (first || found.empty()) difference = found;
+      first = false;
+      if (found.empty()) break;
     }
     if (difference.empty()) continue;
     ++check.differing;
@@ -274,6 +277,11 @@ void check_measured(const std::vector<Json>& rows, const Tables& tables, const s
     });
     if (!made.empty() && !same_inputs(row, made.front())) {
       check.skipped = cell_name(row) + ": its input is not at hand as the rows have it";
+      continue;
+    }
+    if (!failed && made.empty()) {
+      // A row that follows from others, or whose label has changed, is not made when it is asked for alone.
+      check.skipped = cell_name(row) + ": not made when asked for alone";
       continue;
     }
     check.sample += (check.sample.empty() ? "" : ", ") + cell_name(row);
