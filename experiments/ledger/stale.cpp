@@ -12,7 +12,7 @@
 #include "experiments/harness/rows.h"
 #include "experiments/harness/run_voxelizers.h"
 #include "experiments/harness/table.h"
-#include "experiments/ledger/row_database.h"
+#include "experiments/ledger/value_class.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {
@@ -86,15 +86,10 @@ std::map<std::string, Json> outcome(const Json& row) {
   for (const char* place : {"/triangle_count", "/report/points", "/report/quads", "/report/boundary_edges",
                             "/report/non_manifold_edges", "/report/non_manifold_vertices", "/voxelization/active_voxels"})
     take(place);
-  const Json* const measured = find(row, "/values");
-  if (!measured) return values;
-  std::set<std::string> costs;  // columns of times and of memory
   for (const Column& column : own_columns(row))
-    for (const char* unit : {"[s]", "[ms]", "[µs]", "[ns]", "MiB", "seconds", "peak"})
-      if (column.header.find(unit) != std::string::npos || column.name.find(unit) != std::string::npos)
-        costs.insert(column.name);
-  for (const auto& [key, value] : measured->items())
-    if ((value.is_number_integer() || value.is_boolean()) && !costs.contains(key)) values["/values/" + key] = value;
+    if (const Json* value = find(row, column.pointer);
+        value && (value->is_number_integer() || value->is_boolean()) && class_of(column, *value, row) == ValueClass::kExact)
+      values[column.pointer] = *value;
   return values;
 }
 

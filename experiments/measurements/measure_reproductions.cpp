@@ -60,9 +60,8 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
     const Finished finished = run(experiment, tier, scratch / experiment.name);
     for (const std::string& number : experiment.shows) {
       MeasuredRow row{"numbers", shown_number(number)};
-      row.values = {{"command", "./reproduce " + number}, {"experiment", experiment.name}, {"seconds", finished.seconds},
-                    {"minutes", finished.seconds / 60},   {"rows", finished.rows},         {"pictures", finished.pictures},
-                    {"exit_code", finished.exit_code}};
+      row.values = {{"command", "./reproduce " + number}, {"experiment", experiment.name}, {"minutes", finished.seconds / 60},
+                    {"rows", finished.rows},              {"pictures", finished.pictures}, {"exit_code", finished.exit_code}};
       // A broken promise is a finding of the experiment; without rows it did not run.
       if (finished.rows == 0 || (finished.exit_code != 0 && finished.exit_code != 3))
         row.broken.push_back("the experiment gave no rows, or ended with another code than 0 or 3");
@@ -85,8 +84,7 @@ Measurement reproductions_measurement() {
             {{"command", "command", "what reproduces it, once the program is built"},
              {"experiment", "experiment", "that makes it"},
              {"minutes", "minutes", "that the experiment took, all its tables and figures included"},
-             {"seconds", "seconds", "the same"},
-             {"rows", "rows", "that it gave"},
+              {"rows", "rows", "that it gave"},
              {"pictures", "pictures", "that it drew"},
              {"exit_code", "exit code", "0, or 3 where a promise was found broken"}}}},
           measure};
