@@ -1,0 +1,398 @@
+#!/usr/bin/env python3
+"""Makes the paper's numbers and tables from the rows of results/, and refuses what does not come from them.
+
+  paper_numbers.py [--root DIR] --out DIR    checks the text, and writes DIR/numbers.tex and DIR/tables/*.tex
+  paper_numbers.py [--root DIR] --verify DIR says what in DIR is not what the rows give
+
+A sentence and exit code 1 if a number has no row, or comes from a folder of rows that is dirty, stale, or not the one of
+results/SHA256SUMS; if the text has a digit that is no number of the rows; if what was written was changed by hand.
+"""
+
+import argparse
+import hashlib
+import pathlib
+import re
+import subprocess
+import sys
+import tomllib
+
+import claims as ledger
+from row_database import PaperError, RowDatabase, readable
+
+SYMBOLS = {
+    "×": r"$\times$", "÷": r"$\div$", "°": r"\textdegree{}", "–": "--", "—": "---", "−": "$-$", "→": r"$\to$",
+    "√": r"$\surd$", "²": r"\textsuperscript{2}", "³": r"\textsuperscript{3}", "Δ": r"$\Delta$", "△": r"$\triangle$",
+    "∪": r"$\cup$", "∩": r"$\cap$", "∅": r"$\emptyset$", "≤": r"$\le$", "≥": r"$\ge$", "µ": r"$\mu$", "π": r"$\pi$",
+    "₂": r"\textsubscript{2}", "é": r"\'e", "ö": r'\"o', "ä": r'\"a', "æ": r"\ae{}", "’": "'", "…": r"\dots{}",
+    "§": r"\S{}", "·": r"$\cdot$", "±": r"$\pm$", "⅓": r"$\frac13$", "½": r"$\frac12$", "ᵀ": r"\textsuperscript{T}",
+}
+SPECIAL = {"&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
+           "^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "<": r"$<$", ">": r"$>$", "|": r"$|$"}
+
+
+def escaped(text):
+    """Text of a row or a rule for LaTeX."""
+    out = []
+    for c in str(text):
+        if c not in SPECIAL and c not in SYMBOLS and ord(c) > 126:
+            raise PaperError(f"paper/paper_numbers.py does not know how to write the character {c!r} of \"{text}\"")
+        out.append(SPECIAL.get(c) or SYMBOLS.get(c) or c)
+    return "".join(out)
+
+
+def scientific(text):
+    """1.9e-06 -> $1.9\\cdot10^{-6}$, -5.8 -> $-$5.8"""
+    power = re.fullmatch(r"(-?[\d.]+)e([+-]\d+)", text)
+    if power:
+        return rf"${power[1]}\cdot10^{{{int(power[2])}}}$"
+    return re.sub(r"^-", "$-$", text)
+
+
+def formatted(value, form=""):
+    if isinstance(value, str):
+        return escaped(value)
+    return scientific(form % value if form else readable(float(value)))
+
+
+class Paper:
+    def __init__(self, root):
+        self.root = pathlib.Path(root)
+        with open(self.root / "paper/paper.toml", "rb") as file:
+            self.settings = tomllib.load(file)
+        with open(self.root / "paper/numbers.toml", "rb") as file:
+            shared = tomllib.load(file)["numbers"]
+        own = self.settings.get("numbers", {})
+        twice = sorted(set(own) & set(shared))
+        if twice:
+            raise PaperError(f"paper/paper.toml and paper/numbers.toml both have the number {twice[0]}")
+        self.numbers = {**shared, **own}
+        self.tables = self.settings.get("tables", {})
+        self.rows = RowDatabase(self.root)
+        self.claims = ledger.read_claims(self.root)
+        self.trusted = {}
+        self.verdicts = None
+
+    # ---- The text.
+
+    def sources(self):
+        """The files that the paper is made of: the frame, and each section that paper.toml lists."""
+        names = ["paper/hermesh.tex"] + [f"paper/sections/{name}.tex" for name in self.settings["sections"]]
+        for name in names:
+            if not (self.root / name).exists():
+                raise PaperError(f"paper/paper.toml lists a section that is not there: {name}")
+        return names
+
+    def asked(self):
+        """{"number": {name: where}, "table": {name: where}}: what the text asks for, and where first."""
+        found = {"N": {}, "T": {}}
+        for name in self.sources():
+            for at, line in enumerate((self.root / name).read_text().splitlines(), 1):
+                for kind, what in re.findall(r"\\([NT])\{([^{}]*)\}", re.sub(r"(?<!\\)%.*", "", line)):
+                    found[kind].setdefault(what, f"{name}:{at}")
+        return found
+
+    def orphans(self):
+        """Digits of the text that no row explains, a sentence each."""
+        found = []
+        plain = self.settings.get("plain", [])
+        for name in self.sources():
+            text = (self.root / name).read_text()
+            start = text.find(r"\begin{document}")
+            found += [f"{name}:{line}: the number {number} is typed, not taken from results/: use \\N{{...}}, or name the "
+                      "phrase in paper/paper.toml" for line, number in orphans(text, plain, max(start, 0))]
+        return found
+
+    # ---- The rows.
+
+    def check_tables(self, query, what):
+        """Raises PaperError if the query reads rows that must not be cited."""
+        for table in self.rows.tables_in(query):
+            if table not in self.trusted:
+                self.trusted[table] = self.rows.untrusted(table)
+            if self.trusted[table]:
+                raise PaperError(f"{what}: {self.trusted[table][0]}")
+
+    def judged(self):
+        """[(claim, verdict, figures)]"""
+        if self.verdicts is None:
+            self.verdicts = []
+            for claim in self.claims:
+                for table in ledger.tables_of(claim, self.rows):
+                    self.check_tables(table, f"the claim {claim['id']}")
+                verdict, figures = ledger.judge(claim, self.rows)
+                if verdict == "missing":
+                    raise PaperError(f"the claim {claim['id']} has no verdict: rows or tests are missing")
+                self.verdicts.append((claim, verdict, figures))
+        return self.verdicts
+
+    def number(self, name):
+        """The text of a number."""
+        if name.startswith("count"):
+            verdict = name[6:].replace("_", " ")
+            if name != "count" and verdict not in ledger.VERDICTS:
+                raise PaperError(f"the number {name} names no verdict")
+            return str(sum(name == "count" or each == verdict for _, each, _ in self.judged()))
+        entry = self.numbers.get(name)
+        if entry is None:
+            raise PaperError(f"there is no number {name} in paper/paper.toml or paper/numbers.toml")
+        if isinstance(entry, dict) and "constant" in entry:
+            return self.constant(name, entry)
+        query, form = (entry, "") if isinstance(entry, str) else (entry["query"], entry.get("format", ""))
+        self.check_tables(query, f"the number {name}")
+        try:
+            names, found = self.rows.query(query)
+        except PaperError as error:
+            raise PaperError(f"the number {name}: {error}") from None
+        if not found:
+            raise PaperError(f"the number {name} has no row: {query}")
+        parts = []
+        for column, value in zip(names, found[0]):
+            if value is None:
+                raise PaperError(f"the number {name}: the rows give no {column}: {query}")
+            part = formatted(value, form)
+            if part not in parts:
+                parts.append(part)
+        return " to ".join(parts)
+
+    def constant(self, name, entry):
+        """A constant of the program that the text promises, as its header has it."""
+        path = self.root / entry["source"]
+        value = re.search(rf"constexpr \w+ {entry['constant']} = ([\d.e+-]+);", path.read_text() if path.exists() else "")
+        if not value:
+            raise PaperError(f"the number {name}: {entry['source']} has no constant {entry['constant']}")
+        return formatted(float(value[1]))
+
+    def table(self, name):
+        """The tabular of a table."""
+        entry = self.tables.get(name)
+        if entry is None:
+            raise PaperError(f"there is no table {name} in paper/paper.toml")
+        if "claims" in entry:
+            return self.table_of_claims(entry["claims"], name)
+        if entry.get("by_chapter"):
+            return self.table_by_chapter()
+        self.check_tables(entry["query"], f"the table {name}")
+        try:
+            heads, found = self.rows.query(entry["query"])
+        except PaperError as error:
+            raise PaperError(f"the table {name}: {error}") from None
+        if not found:
+            raise PaperError(f"the table {name} has no row: {entry['query']}")
+        formats = entry.get("formats", {})
+        numeric = [any(isinstance(row[c], (int, float)) for row in found) for c in range(len(heads))]
+        align = "".join("r" if n else "l" for n in numeric)
+        lines = [[head_of(h, n) for h, n in zip(heads, numeric)]]
+        for row in found:
+            lines.append(["--" if v is None else formatted(v, formats.get(h, "") if not isinstance(v, str) else "")
+                          for h, v in zip(heads, row)])
+        rule = entry.get("rule_before", "")
+        return tabular(align, lines, [i for i in range(1, len(lines)) if i > 1 and lines[i][0].startswith(rule)] if rule else
+                       changes(lines) if entry.get("groups") else [])
+
+    def table_of_claims(self, ids, name):
+        by_id = {claim["id"]: (claim, verdict, figures) for claim, verdict, figures in self.judged()}
+        lines = [["place", "the thesis says", "our rows"]]
+        for each in ids:
+            if each not in by_id:
+                raise PaperError(f"the table {name}: there is no claim {each}")
+            claim, verdict, figures = by_id[each]
+            if verdict != "contradicted":
+                raise PaperError(f"the table {name}: the claim {each} is {verdict}, not contradicted")
+            place = claim["place"].split(";")[0].split(", figure")[0].split(", implied")[0]
+            ours = ledger.text_of_figures(figures) if figures else "a test shows the contrary"
+            lines.append([escaped(place[0].upper() + place[1:]), escaped(claim["says"]), escaped(ours)])
+        return tabular(r"@{}>{\raggedright}p{0.12\textwidth}>{\raggedright}p{0.46\textwidth}"
+                       r">{\raggedright\arraybackslash}p{0.36\textwidth}@{}", lines, [])
+
+    def table_by_chapter(self):
+        counts = {}
+        for claim, verdict, _ in self.judged():
+            counts.setdefault(ledger.chapter_of(claim), {}).setdefault(verdict, []).append(claim)
+        order = sorted(counts, key=lambda c: (c != "abstract", int(c) if c.isdigit() else 0))
+        lines = [["chapter", "repro-\\\\duced", "shape", "contra-\\\\dicted", "untest-\\\\able"]]
+        lines[0] = [lines[0][0]] + [rf"\shortstack[r]{{{h}}}" for h in lines[0][1:]]
+        for chapter in order:
+            lines.append([chapter] + [str(len(counts[chapter].get(v, []))) for v in ledger.VERDICTS[:4]])
+        lines.append(["all"] + [str(sum(v == verdict for _, v, _ in self.judged())) for verdict in ledger.VERDICTS[:4]])
+        return tabular("lrrrr", lines, [len(lines) - 1])
+
+    # ---- Files.
+
+    def files(self):
+        """{path below the output: its text}"""
+        asked, files = self.asked(), {}
+        lines = []
+        for name, where in asked["N"].items():
+            try:
+                lines.append(rf"\papernumber{{{name}}}{{{self.number(name)}}}")
+            except PaperError as error:
+                raise PaperError(f"{where}: {error}") from None
+        files["numbers.tex"] = sealed("\n".join(lines) + "\n")
+        for name, where in asked["T"].items():
+            try:
+                files[f"tables/{name}.tex"] = sealed(self.table(name))
+            except PaperError as error:
+                raise PaperError(f"{where}: {error}") from None
+        files["sections.tex"] = sealed("".join(rf"\input{{sections/{name}}}" + "\n" for name in self.settings["sections"]))
+        return files
+
+    def write(self, out):
+        out = pathlib.Path(out)
+        for path in sorted(out.glob("**/*.tex")):
+            if not is_sealed(path.read_text()):
+                raise PaperError(f"{path} was changed by hand: numbers come from results/ alone; remove the file")
+        found = self.orphans()
+        if found:
+            raise PaperError("\n".join(found))
+        files = self.files()
+        for path in out.glob("tables/*.tex"):
+            path.unlink()
+        for name, text in files.items():
+            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            (out / name).write_text(text)
+        return len(self.asked()["N"]), len(self.asked()["T"])
+
+    def verify(self, out):
+        """What in `out` differs from the rows, a sentence each."""
+        found = []
+        for name, right in self.files().items():
+            path = pathlib.Path(out) / name
+            if not path.exists():
+                found.append(f"{path} is missing")
+                continue
+            lines, rights = path.read_text().splitlines()[1:], right.splitlines()[1:]
+            differing = [(a, b) for a, b in zip(lines, rights) if a != b] or ([("", "")] if lines != rights else [])
+            if differing:
+                found.append(f"{path} has \"{differing[0][0]}\", by the rows it is \"{differing[0][1]}\"")
+            elif not is_sealed(path.read_text()):
+                found.append(f"{path} was changed by hand")
+        return found
+
+    def notes(self):
+        """What a reader of the build should know, but what does not stop it: experiment files that no longer name what
+        rows were made with, found by the rows' commits where git has them; and stand-ins."""
+        used = set()
+        for name in self.asked()["N"]:
+            entry = self.numbers.get(name, "")
+            used.update(self.rows.tables_in(entry if isinstance(entry, str) else entry.get("query", "")))
+        for name in self.asked()["T"]:
+            used.update(self.rows.tables_in(self.tables[name].get("query", "")))
+        notes = []
+        for table in sorted(used):
+            notes += [f"note: results/{table}: {sentence}" for sentence in changed_since(self.root, self.rows.rows_of[table])]
+        return notes
+
+
+def changed_since(root, rows):
+    """Variants of rows that the experiment's file, as it is now, describes otherwise than at the rows' commit."""
+    found = []
+    for commit, experiment in sorted({(r["commit"], r["experiment"]) for r in rows}):
+        path = root / "experiments" / f"{experiment}.toml"
+        shown = subprocess.run(["git", "-C", str(root), "show", f"{commit}:experiments/{experiment}.toml"],
+                               capture_output=True, text=True)
+        if shown.returncode != 0 or not path.exists():
+            continue
+        old, new = tomllib.loads(shown.stdout), tomllib.loads(path.read_text())
+        for key in ("variants", "voxelizers"):
+            before, after = ({v if isinstance(v, str) else v.get("label", v.get("name")): v for v in file.get(key, [])}
+                             for file in (old, new))
+            labels = {r["variant"].get("label") for r in rows if r["commit"] == commit}
+            other = sorted(l for l in labels & set(before) if before[l] != after.get(l))
+            if other:
+                found.append(f"experiments/{experiment}.toml has changed {', '.join(other)} since {commit[:12]}")
+    return found
+
+
+def head_of(text, numeric):
+    parts = [escaped(part) for part in text.split("|")]
+    side = "r" if numeric else "l"
+    # The braces keep LaTeX from taking "[s]" for a distance between the lines.
+    return parts[0] if len(parts) == 1 else rf"\shortstack[{side}]{{" + "\\\\{}".join(parts) + "}"
+
+
+def changes(lines):
+    """Numbers of the lines before which the first column changes; a repeated first entry is left out."""
+    rules, last = [], None
+    for i in range(1, len(lines)):
+        if lines[i][0] == last:
+            lines[i][0] = ""
+        else:
+            last = lines[i][0]
+            if i > 1:
+                rules.append(i)
+    return rules
+
+
+def tabular(align, lines, rules):
+    if not align.startswith("@"):
+        align = "@{}" + align + "@{}"
+    out = [rf"\begin{{tabular}}{{{align}}}", r"\toprule", " & ".join(lines[0]) + r" \\", r"\midrule"]
+    for i, line in enumerate(lines[1:], 1):
+        if i in rules:
+            out.append(r"\addlinespace")
+        out.append(" & ".join(line) + r" \\")
+    return "\n".join(out + [r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def sealed(text):
+    return f"% Made by paper/paper_numbers.py from results/; sha256 of what follows {hashlib.sha256(text.encode()).hexdigest()}\n{text}"
+
+
+def is_sealed(text):
+    head, _, rest = text.partition("\n")
+    return head.endswith(hashlib.sha256(rest.encode()).hexdigest())
+
+
+PLACES = (r"(?:chapters?|sections?|tables?|figures?|fig\.|figs\.?|eq\.|eqs\.?|equations?|algorithms?|\\S)(?:~|\s|\{\})*"
+          r"\d+(?:\.\d+)*(?:\s*(?:,|to|and|or|--)(?:~|\s)*\d+(?:\.\d+)*)*")
+
+
+def orphans(text, plain, start=0):
+    """[(line, number)] of the digits that stand in the text and are neither macros nor names of places nor years."""
+    def blank(match):
+        return re.sub(r"[^\n]", " ", match[0])
+
+    text = re.sub(r"[^\n]", " ", text[:start]) + text[start:]
+    text = re.sub(r"(?<!\\)%.*", blank, text)
+    for phrase in sorted(plain, key=len, reverse=True):
+        text = re.sub(r"\s+".join(re.escape(word) for word in phrase.split()), blank, text)
+    for pattern in [
+            r"\\(?:N|T|ref|label|eqref|pageref|cite[pt]?|input|bibliography|bibliographystyle|url|begin|end|texttt)\{[^{}]*\}",
+            r"\\(?:includegraphics|picture)(?:\[[^\]]*\])?\{[^{}]*\}", r"\\(?:vspace|hspace|setlength|addtolength)\*?\{[^{}]*\}(?:\{[^{}]*\})?",
+            r"\{[\d.]*\\(?:text|line|column)width\}", r"\\\\\[[^\]]*\]", r"[_^]\{?\d\}?"]:
+        text = re.sub(pattern, blank, text)
+    text = re.sub(PLACES, blank, text, flags=re.I)
+    found = []
+    for match in re.finditer(r"(?<![A-Za-z\d+])\d+(?:[.,]\d+)*", text):
+        if re.fullmatch(r"(?:19|20)\d\d", match[0]):
+            continue
+        found.append((text.count("\n", 0, match.start()) + 1, match[0]))
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--root", default=pathlib.Path(__file__).resolve().parent.parent, type=pathlib.Path)
+    parser.add_argument("--out", type=pathlib.Path)
+    parser.add_argument("--verify", type=pathlib.Path)
+    options = parser.parse_args()
+    if not (options.out or options.verify):
+        parser.error("--out or --verify is needed")
+    try:
+        paper = Paper(options.root)
+        if options.verify:
+            found = paper.verify(options.verify) + paper.orphans()
+            if found:
+                raise PaperError("\n".join(found))
+        if options.out:
+            numbers, tables = paper.write(options.out)
+            print(f"{numbers} numbers and {tables} tables from results/")
+            print("\n".join(paper.notes()))
+    except PaperError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
