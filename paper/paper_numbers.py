@@ -127,6 +127,8 @@ class Paper:
 
     def number(self, name):
         """The text of a number."""
+        if name.startswith("claim "):
+            return self.figure_of_claim(name)
         if name.startswith("count"):
             verdict = name[6:].replace("_", " ")
             if name != "count" and verdict not in ledger.VERDICTS:
@@ -153,6 +155,14 @@ class Paper:
             if part not in parts:
                 parts.append(part)
         return " to ".join(parts)
+
+    def figure_of_claim(self, name):
+        """ "claim ID FIGURE": a figure by which the claim was decided."""
+        words = name.split()
+        for claim, _, figures in self.judged():
+            if claim["id"] == words[1] and words[2] in dict(figures):
+                return formatted(dict(figures)[words[2]])
+        raise PaperError(f"the number {name} names no figure of a claim")
 
     def constant(self, name, entry):
         """A constant of the program that the text promises, as its header has it."""
@@ -362,6 +372,7 @@ def orphans(text, plain, start=0):
             r"\{[\d.]*\\(?:text|line|column)width\}", r"\\\\\[[^\]]*\]", r"[_^]\{?\d\}?"]:
         text = re.sub(pattern, blank, text)
     text = re.sub(PLACES, blank, text, flags=re.I)
+    text = re.sub(r"\\[A-Za-z]+", blank, text)
     found = []
     for match in re.finditer(r"(?<![A-Za-z\d+])\d+(?:[.,]\d+)*", text):
         if re.fullmatch(r"(?:19|20)\d\d", match[0]):
