@@ -9,6 +9,7 @@ results/SHA256SUMS; if the text has a digit that is no number of the rows; if wh
 """
 
 import argparse
+import fnmatch
 import hashlib
 import pathlib
 import re
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tomllib
 
+import ablations
 import claims as ledger
 from row_database import PaperError, RowDatabase, readable
 
@@ -71,6 +73,7 @@ class Paper:
         self.claims = ledger.read_claims(self.root)
         self.trusted = {}
         self.verdicts = None
+        self.judged_effects = None
 
     # ---- The text.
 
@@ -127,6 +130,8 @@ class Paper:
 
     def number(self, name):
         """The text of a number."""
+        if name == "ablations" or name.startswith("ablations_"):
+            return self.number_of_ablations(name)
         if name.startswith("claim "):
             return self.figure_of_claim(name)
         if name.startswith("count"):
@@ -156,6 +161,43 @@ class Paper:
                 parts.append(part)
         return " to ".join(parts)
 
+    def effects(self, what):
+        """[(folder, its effects)] of all folders that have rows of an ablation."""
+        if self.judged_effects is None:
+            self.judged_effects = []
+            for folder, rows in self.rows.rows_of.items():
+                if ablations.is_ablation(rows):
+                    self.check_tables(folder, what)
+                    table = self.root / "results" / folder / "table.md"
+                    self.judged_effects.append((folder, ablations.judged(
+                        rows, table.read_text() if table.exists() else "", self.rows.value, f"results/{folder}")))
+            if not self.judged_effects:
+                raise PaperError(f"{what} has no row: no folder of results/ has rows of an ablation")
+        return self.judged_effects
+
+    def number_of_ablations(self, name):
+        """ "ablations", or "ablations_holds" and so on: how many there are, or how many of their predictions have a verdict."""
+        found = self.effects(f"the number {name}")
+        if name == "ablations":
+            return str(len(found))
+        verdict = name.removeprefix("ablations_")
+        if verdict not in ablations.VERDICTS:
+            raise PaperError(f"the number {name} names no verdict on a prediction")
+        return str(sum(effect["verdict"].startswith(verdict) for _, effects in found for effect in effects))
+
+    def table_of_effects(self, entry, name):
+        lines = [["factor", "level", "against", "column", head_of("effect|(95 %)", False), "predicted", "verdict"]]
+        for _, effects in self.effects(f"the table {name}"):
+            for effect in effects[:entry["ablations"]]:
+                lines.append([escaped(effect["factor"]), escaped(effect["level"]), escaped(effect["baseline"]),
+                              escaped(effect["column"] + {"ratio": ", ÷", "count-ratio": ", ÷", "difference": ", −"}[effect["measure"]]),
+                              escaped(f"{effect['effect']} ({effect['interval']})"), escaped(effect["predicted"]),
+                              escaped(effect["verdict"])])
+        rules = changes(lines)
+        return tabular(r"@{}>{\raggedright}p{0.2\textwidth}>{\raggedright}p{0.13\textwidth}>{\raggedright}p{0.1\textwidth}"
+                       r">{\raggedright}p{0.14\textwidth}>{\raggedright}p{0.15\textwidth}>{\raggedright}p{0.09\textwidth}"
+                       r">{\raggedright\arraybackslash}p{0.08\textwidth}@{}", lines, rules)
+
     def figure_of_claim(self, name):
         """ "claim ID FIGURE": a figure by which the claim was decided."""
         words = name.split()
@@ -181,13 +223,9 @@ class Paper:
             return self.table_of_claims(entry["claims"], name)
         if entry.get("by_chapter"):
             return self.table_by_chapter()
-        self.check_tables(entry["query"], f"the table {name}")
-        try:
-            heads, found = self.rows.query(entry["query"])
-        except PaperError as error:
-            raise PaperError(f"the table {name}: {error}") from None
-        if not found:
-            raise PaperError(f"the table {name} has no row: {entry['query']}")
+        if "ablations" in entry:
+            return self.table_of_effects(entry, name)
+        heads, found = self.answer(entry, name)
         formats = entry.get("formats", {})
         numeric = [any(isinstance(row[c], (int, float)) for row in found) for c in range(len(heads))]
         align = "".join("r" if n else "l" for n in numeric)
@@ -198,6 +236,26 @@ class Paper:
         rule = entry.get("rule_before", "")
         return tabular(align, lines, [i for i in range(1, len(lines)) if i > 1 and lines[i][0].startswith(rule)] if rule else
                        changes(lines) if entry.get("groups") else [])
+
+    def answer(self, entry, name):
+        """What a table's query gives; with `folders`, one after another for each folder that the pattern meets."""
+        queries = [entry["query"]]
+        if "folders" in entry:
+            queries = [entry["query"].replace("{folder}", f'"{folder}"') for folder in sorted(self.rows.rows_of)
+                       if fnmatch.fnmatchcase(folder, entry["folders"])]
+            if not queries:
+                raise PaperError(f"the table {name} has no row: there is no results/{entry['folders']}")
+        heads, found = [], []
+        for query in queries:
+            self.check_tables(query, f"the table {name}")
+            try:
+                heads, rows = self.rows.query(query)
+            except PaperError as error:
+                raise PaperError(f"the table {name}: {error}") from None
+            if not rows:
+                raise PaperError(f"the table {name} has no row: {query}")
+            found += rows
+        return heads, found
 
     def table_of_claims(self, ids, name):
         by_id = {claim["id"]: (claim, verdict, figures) for claim, verdict, figures in self.judged()}

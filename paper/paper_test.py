@@ -54,7 +54,7 @@ def seal(folder):
     (folder / "results/SHA256SUMS").write_text("".join(sums))
 
 
-class Doctored(unittest.TestCase):
+class Case(unittest.TestCase):
     def setUp(self):
         self.scratch = tempfile.TemporaryDirectory()
         self.root = pathlib.Path(self.scratch.name) / "project"
@@ -80,6 +80,8 @@ class Doctored(unittest.TestCase):
             change(row)
         path.write_text("".join(json.dumps(row) + "\n" for row in rows))
 
+
+class Doctored(Case):
     def test_as_it_is_it_is_made_and_verified(self):
         Paper(self.root).write(self.out)
         self.assertEqual(Paper(self.root).verify(self.out), [])
@@ -169,6 +171,70 @@ class Doctored(unittest.TestCase):
         self.refused("two.tex:1", "17 is typed")
 
 
+class Waiting(Case):
+    """The sections that wait for their rows, with rows made up."""
+
+    def setUp(self):
+        super().setUp()
+        self.measured()
+        for name in ("ablations", "order", "peers"):
+            shutil.copy(ROOT / "paper/sections" / f"{name}.tex", self.root / "paper/sections")
+
+    def put(self, folder, rows, table=""):
+        (self.root / "results" / folder).mkdir()
+        (self.root / "results" / folder / "rows.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+        (self.root / "results" / folder / "table.md").write_text(table)
+
+    def measured(self):
+        head = {"commit": "c", "dirty": False, "run": "r", "date": "d", "tier": "full", "threads": 2}
+        # Two models at two resolutions: the ratios are 2 and 8, and 4 and 4, so that each model's mean is 4.
+        effect = {"level": "b", "column": "triangles", "measure": "ratio", "better": "lower", "prediction": "It grows.",
+                  "at_least": 3, "at_most": None, "falsified_if": "high < 2"}
+        ablation = {"factor": "made up", "levels": "variants", "baseline": "a", "effects": [effect]}
+        rows = [{**head, "experiment": "ablation_made_up", "case": {"name": model}, "resolution": resolution,
+                 "variant": {"name": "x", "label": level}, "triangle_count": count, "ablation": ablation}
+                for model, resolution, a, b in [("m", 50, 10, 20), ("m", 100, 10, 80), ("n", 50, 5, 20), ("n", 100, 5, 20)]
+                for level, count in (("a", a), ("b", b))]
+        self.line = "| b | a | triangles | ratio | lower | 2 | 4 | 0 | 4 | 4 to 4 | ≥ 3 | high < 2 | undecided |"
+        self.put("ablation_made_up", rows, "## ablation_made_up (full): ?\n\n| level | against | column | measure | better | models "
+                 "| pairs | left out | effect | 95 % interval | predicted | falsified if | verdict |\n| --- |\n" + self.line + "\n")
+        values = {"order": 1.97, "order_within": 1, "size": 48, "triangles": 100, "error_max": 0.1, "times_optimum": 2.2}
+        columns = [{"name": name, "header": name, "meaning": name} for name in values]
+        self.put("order", [{**head, "experiment": "order", "case": {"name": subject}, "variant": {"name": label, "label": label},
+                            "table": {"columns": columns}, "values": values}
+                           for subject, label in [("sphere", "dual optimal, level set: rms"), ("sphere", "dual optimal, level set: max"),
+                                                  ("optimum", "sphere, manifold 0.1, 48")]])
+        peers = [json.loads(line) for line in (ROOT / "results/headline/rows.jsonl").read_text().splitlines()]
+        self.put("peers", peers + [{**peers[0], "variant": {"name": "none", "label": "absent"}, "failed": "absent"}])
+        seal(self.root)
+
+    def enabled(self):
+        text = (ROOT / "paper/paper.toml").read_text()
+        text, count = re.subn(r"(?m)^sections = \[[^\]]*\]", 'sections = ["ablations", "order", "peers"]', text)
+        self.assertEqual(count, 1)
+        (self.root / "paper/paper.toml").write_text(text)
+
+    def test_they_are_made_when_they_are_listed(self):
+        self.enabled()
+        Paper(self.root).write(self.out)
+        self.assertIn("1.97", (self.out / "tables/order.tex").read_text())
+        self.assertIn("2.2", (self.out / "tables/optimum.tex").read_text())
+        self.assertNotIn("absent", (self.out / "tables/peers.tex").read_text())
+        self.assertIn("\\papernumber{ablations_undecided}{1}", (self.out / "numbers.tex").read_text())
+        self.assertIn("4 (4 to 4)", (self.out / "tables/ablations.tex").read_text())
+
+    def test_they_fail_without_their_rows(self):
+        self.enabled()
+        shutil.rmtree(self.root / "results/ablation_made_up")
+        self.refused("ablations.tex", "the number ablations has no row")
+
+    def test_an_effect_that_is_not_that_of_the_rows(self):
+        self.enabled()
+        path = self.root / "results/ablation_made_up/table.md"
+        path.write_text(path.read_text().replace(self.line, self.line.replace("| 0 | 4 |", "| 0 | 3 |")))
+        self.refused("ablation_made_up/table.md has no line for the effect of b on triangles", "(4 over 2 models)")
+
+
 class Text(unittest.TestCase):
     def numbers(self, text, plain=()):
         return [number for _, number in orphans(text, list(plain))]
@@ -229,6 +295,13 @@ class SameAsTheProgram(unittest.TestCase):
         page = (ROOT / "paper/claims.md").read_text()
         verdicts = [ledger.judge(claim, self.paper.rows)[0] for claim in self.paper.claims]
         self.assertIn(f"{len(verdicts)} claims: " + ", ".join(f"{verdicts.count(v)} {v}" for v in ledger.VERDICTS), page)
+
+    def test_nothing_in_paper_toml_is_idle(self):
+        text = "".join(path.read_text() for path in [ROOT / "paper/hermesh.tex", *(ROOT / "paper/sections").glob("*.tex")])
+        asked = set(re.findall(r"\\[NT]\{([^{}]*)\}", text))
+        self.assertEqual(set(self.paper.settings["numbers"]) - asked, set())
+        self.assertEqual(set(self.paper.tables) - asked, set())
+        self.assertEqual([phrase for phrase in self.paper.settings["plain"] if phrase not in text], [])
 
     def test_the_paper_itself(self):
         with tempfile.TemporaryDirectory() as out:

@@ -151,6 +151,11 @@ class RowDatabase:
                 return value / find(row, "/voxel_size") if unit == "Voxel" else value / 2**20 if unit == "Mebibyte" else value
         return None
 
+    def value(self, row, name):
+        """A column of one row, its own ones first; None where it has none."""
+        own = [(c["name"], "/values/" + c["name"]) for c in find(row, "/table/columns") or []]
+        return self._value(row, own, name)
+
     def _add(self, name, shown):
         names = {}
         for column, _ in self.common:
