@@ -108,8 +108,11 @@ class Paper:
     # ---- The rows.
 
     def check_tables(self, query, what):
-        """Raises PaperError if the query reads rows that must not be cited."""
-        for table in self.rows.tables_in(query):
+        """Raises PaperError if the query reads rows that must not be cited, or none."""
+        tables = self.rows.tables_in(query)
+        if not tables:
+            raise PaperError(f"{what} reads no folder of results/ that has rows: {query}")
+        for table in tables:
             if table not in self.trusted:
                 self.trusted[table] = self.rows.untrusted(table)
             if self.trusted[table]:

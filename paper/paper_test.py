@@ -153,6 +153,15 @@ class Doctored(Case):
         (self.root / "paper/sections/one.tex").write_text("A\n\\N{unheard}\n")
         self.refused("one.tex:2", "there is no number unheard")
 
+    def test_a_query_that_reads_no_rows(self):
+        path = self.root / "paper/paper.toml"
+        path.write_text(re.sub("dragon = .*", 'dragon = "SELECT 4.2"', path.read_text()))
+        self.refused("one.tex:1", "the number dragon reads no folder of results/")
+
+    def test_rows_that_are_not_there(self):
+        shutil.rmtree(self.root / "results/headline")
+        self.refused("one.tex:1", "the number dragon reads no folder of results/", "headline")
+
     def test_a_table_without_rows(self):
         path = self.root / "paper/paper.toml"
         path.write_text(path.read_text().replace("subject = 'dragon' ORDER", "subject = 'nobody' ORDER"))
