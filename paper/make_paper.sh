@@ -31,7 +31,11 @@ latex
 (cd "$out" && bibtex hermesh >bibtex.out) || { grep -v '^This is' "$out/bibtex.out" >&2; exit 1; }
 latex
 latex
-python3 paper/check_log.py "$out"
-# What was typeset must still be what the rows give.
-python3 paper/paper_numbers.py --verify "$out"
+# What was typeset must still be what the rows give. A paper that is refused keeps another name, to be looked at.
+python3 paper/check_log.py "$out" && python3 paper/paper_numbers.py --verify "$out" || {
+  mv "$out/hermesh.pdf" "$out/refused.pdf"
+  echo "The paper is refused for what is said above; $out/refused.pdf shows it." >&2
+  exit 1
+}
+rm -f "$out/refused.pdf"
 echo "The paper is $out/hermesh.pdf"

@@ -50,6 +50,12 @@ def scientific(text):
     return re.sub(r"^-", "$-$", text)
 
 
+def said(query):
+    """A query within a sentence."""
+    line = " ".join(query.split())
+    return line if len(line) < 160 else line[:157] + "..."
+
+
 def formatted(value, form=""):
     if isinstance(value, str):
         return escaped(value)
@@ -111,7 +117,7 @@ class Paper:
         """Raises PaperError if the query reads rows that must not be cited, or none."""
         tables = self.rows.tables_in(query)
         if not tables:
-            raise PaperError(f"{what} reads no folder of results/ that has rows: {query}")
+            raise PaperError(f"{what} reads no folder of results/ that has rows: {said(query)}")
         for table in tables:
             if table not in self.trusted:
                 self.trusted[table] = self.rows.untrusted(table)
@@ -154,11 +160,11 @@ class Paper:
         except PaperError as error:
             raise PaperError(f"the number {name}: {error}") from None
         if not found:
-            raise PaperError(f"the number {name} has no row: {query}")
+            raise PaperError(f"the number {name} has no row: {said(query)}")
         parts = []
         for column, value in zip(names, found[0]):
             if value is None:
-                raise PaperError(f"the number {name}: the rows give no {column}: {query}")
+                raise PaperError(f"the number {name}: the rows give no {column}: {said(query)}")
             part = formatted(value, form)
             if part not in parts:
                 parts.append(part)
@@ -256,7 +262,7 @@ class Paper:
             except PaperError as error:
                 raise PaperError(f"the table {name}: {error}") from None
             if not rows:
-                raise PaperError(f"the table {name} has no row: {query}")
+                raise PaperError(f"the table {name} has no row: {said(query)}")
             found += rows
         return heads, found
 

@@ -181,7 +181,7 @@ class RowDatabase:
         try:
             cursor = self.connection.execute(text, parameters)
         except sqlite3.Error as error:
-            raise PaperError(f"{error} in: {text}") from None
+            raise PaperError(f"{error} in: {' '.join(text.split())}") from None
         return [d[0] for d in cursor.description], cursor.fetchall()
 
     def tables_in(self, query):
