@@ -322,6 +322,7 @@ class Paper:
         if found:
             raise PaperError("\n".join(found))
         files = self.files()
+        self.check_experiments()
         for path in out.glob("tables/*.tex"):
             path.unlink()
         for name, text in files.items():
@@ -345,29 +346,40 @@ class Paper:
                 found.append(f"{path} was changed by hand")
         return found
 
-    def notes(self):
-        """What a reader of the build should know, but what does not stop it: experiment files that no longer name what
-        rows were made with, found by the rows' commits where git has them; and stand-ins."""
-        used = set()
-        for name in self.asked()["N"]:
+    def used_tables(self):
+        """The folders of results/ that the paper's numbers, tables and verdicts read."""
+        asked, queries = self.asked(), []
+        for name in asked["N"]:
             entry = self.numbers.get(name, "")
-            used.update(self.rows.tables_in(entry if isinstance(entry, str) else entry.get("query", "")))
-        for name in self.asked()["T"]:
-            used.update(self.rows.tables_in(self.tables[name].get("query", "")))
-        notes = []
-        for table in sorted(used):
-            notes += [f"note: results/{table}: {sentence}" for sentence in changed_since(self.root, self.rows.rows_of[table])]
-        return notes
+            queries.append(entry if isinstance(entry, str) else entry.get("query", ""))
+        queries += [self.tables[name].get("query", "") for name in asked["T"] if name in self.tables]
+        used = {table for query in queries for table in self.rows.tables_in(query)}
+        if self.verdicts is not None:
+            used.update(table for claim in self.claims for table in ledger.tables_of(claim, self.rows))
+        return sorted(used)
+
+    def check_experiments(self):
+        """Raises PaperError where an experiment's file describes a variant otherwise than when its rows were made, and
+        paper.toml does not say why the rows stand."""
+        for table in self.used_tables():
+            stands = self.settings.get("changed", {}).get(table, {})
+            for experiment, commit, labels in changed_since(self.root, self.rows.rows_of[table]):
+                left = [label for label in labels if label not in stands.get("labels", [])]
+                if left:
+                    raise PaperError(f"results/{table} is stale: experiments/{experiment}.toml has changed {', '.join(left)} since "
+                                     f"commit {commit[:12]} made the rows; make these anew, or say in paper/paper.toml why they stand")
 
 
 def changed_since(root, rows):
-    """Variants of rows that the experiment's file, as it is now, describes otherwise than at the rows' commit."""
+    """[(experiment, commit, labels)]: the variants of rows that the experiment's file, as it is now, describes otherwise than at
+    the rows' commit. Nothing where git does not have the commit, or the experiment has no file."""
     found = []
     for commit, experiment in sorted({(r["commit"], r["experiment"]) for r in rows}):
-        path = root / "experiments" / f"{experiment}.toml"
-        shown = subprocess.run(["git", "-C", str(root), "show", f"{commit}:experiments/{experiment}.toml"],
-                               capture_output=True, text=True)
-        if shown.returncode != 0 or not path.exists():
+        path = next(iter(sorted((root / "experiments").glob(f"**/{experiment}.toml"))), None)
+        if path is None:
+            continue
+        shown = subprocess.run(["git", "-C", str(root), "show", f"{commit}:{path.relative_to(root)}"], capture_output=True, text=True)
+        if shown.returncode != 0:
             continue
         old, new = tomllib.loads(shown.stdout), tomllib.loads(path.read_text())
         for key in ("variants", "voxelizers"):
@@ -376,7 +388,7 @@ def changed_since(root, rows):
             labels = {r["variant"].get("label") for r in rows if r["commit"] == commit}
             other = sorted(l for l in labels & set(before) if before[l] != after.get(l))
             if other:
-                found.append(f"experiments/{experiment}.toml has changed {', '.join(other)} since {commit[:12]}")
+                found.append((experiment, commit, other))
     return found
 
 
@@ -465,7 +477,6 @@ def main():
         if options.out:
             numbers, tables = paper.write(options.out)
             print(f"{numbers} numbers and {tables} tables from results/")
-            print("\n".join(paper.notes()))
     except PaperError as error:
         print(error, file=sys.stderr)
         return 1

@@ -7,6 +7,7 @@ import hashlib
 import pathlib
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -152,6 +153,35 @@ class Doctored(Case):
     def test_a_number_that_is_not_defined(self):
         (self.root / "paper/sections/one.tex").write_text("A\n\\N{unheard}\n")
         self.refused("one.tex:2", "there is no number unheard")
+
+    @unittest.skipUnless(shutil.which("git"), "needs git")
+    def test_an_experiment_that_was_changed_after_its_rows(self):
+        (self.root / "experiments").unlink()
+        for file in ("harness/columns.cpp", "ledger/row_database.cpp", "headline.toml"):
+            (self.root / "experiments" / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / "experiments" / file, self.root / "experiments" / file)
+
+        def git(*words):
+            return subprocess.run(["git", "-C", str(self.root), "-c", "user.name=n", "-c", "user.email=e", *words], check=True,
+                                  capture_output=True, text=True).stdout.strip()
+
+        git("init", "-q")
+        git("add", "experiments")
+        git("commit", "-q", "-m", "rows")
+        commit = git("rev-parse", "HEAD")
+        self.change_rows(lambda row: row.update(commit=commit))
+        seal(self.root)
+        Paper(self.root).write(self.out)
+        path = self.root / "experiments/headline.toml"
+        text = path.read_text()
+        path.write_text(text.replace("tolerance = 7,", "tolerance = 8,"))
+        self.assertNotEqual(path.read_text(), text)
+        self.refused("headline is stale", "headline.toml has changed manifold by regions since commit " + commit[:12])
+        settings = self.root / "paper/paper.toml"
+        settings.write_text('[changed]\nheadline = { labels = ["manifold by regions"], why = "It is a test." }\n' +
+                            settings.read_text().replace('sections', '#', 1).replace('plain', '#', 1))
+        settings.write_text('sections = ["one"]\n' + settings.read_text())
+        Paper(self.root).write(self.out)
 
     def test_a_query_that_reads_no_rows(self):
         path = self.root / "paper/paper.toml"
