@@ -4,6 +4,7 @@
 #include <regex>
 #include <set>
 
+#include "experiments/ablations/read_ablation.h"
 #include "experiments/harness/command_extractor.h"
 #include "experiments/harness/toml_section.h"
 
@@ -296,6 +297,12 @@ Tier read_parameters(const Section& file, const std::string& name, const toml::t
   return tier;
 }
 
+const std::vector<std::string> kKeys = {"kind",          "question",      "shows", "voxelizers",  "columns",
+                                        "variants",      "features",      "plots", "measurement", "seed",
+                                        "exterior_band", "interior_band", "quick", "full",
+                                        // Those of an ablation.
+                                        "factor", "levels", "baseline", "effects"};
+
 Experiment read_measurement(const Section& file, const Vocabulary& vocabulary, Experiment experiment) {
   for (const char* key : {"voxelizers", "columns", "variants", "features", "exterior_band", "interior_band"})
     if (file.has(key)) file.fail_at(key, "\"" + std::string(key) + "\" has no place in a measurement");
@@ -311,6 +318,7 @@ Experiment read_measurement(const Section& file, const Vocabulary& vocabulary, E
       experiment.tiers[tier] = read_parameters(file, tier, *found, measurement);
   if (experiment.tiers.empty())
     file.fail(1, "a measurement needs a table [quick] or [full], which may be empty");
+  read_ablation(file, experiment, vocabulary);
   return experiment;
 }
 
@@ -327,10 +335,6 @@ void read_voxelization(const Section& file, Experiment& experiment) {
   experiment.exterior_band = file.number_or("exterior_band", 3.0, 1.0, 1e4);
   experiment.interior_band = file.number_or("interior_band", 3.0, 1.0, 1e4);
 }
-
-const std::vector<std::string> kKeys = {"kind",          "question",      "shows", "voxelizers",  "columns",
-                                        "variants",      "features",      "plots", "measurement", "seed",
-                                        "exterior_band", "interior_band", "quick", "full"};
 
 std::vector<std::string> read_shows(const Section& file) {
   std::vector<std::string> shows;
@@ -373,6 +377,7 @@ Experiment read_experiment(const std::filesystem::path& path, const Vocabulary& 
     if (const toml::table* found = file.optional_table(tier))
       experiment.tiers[tier] = read_tier(file, tier, *found, experiment.kind, vocabulary.cases);
   if (experiment.tiers.empty()) file.fail(1, "an experiment needs a table [quick] or [full] with its cases");
+  read_ablation(file, experiment, vocabulary);
   return experiment;
 }
 

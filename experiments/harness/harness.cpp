@@ -9,6 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "experiments/ablations/effect_report.h"
+#include "experiments/ablations/prediction.h"
+#include "experiments/ablations/read_ablation.h"
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"
@@ -22,7 +25,7 @@
 namespace hermesh {
 namespace {
 
-Json run_head(const Experiment& experiment, const RunSettings& settings) {
+Json run_head(const Experiment& experiment, const std::optional<Ablation>& ablation, const RunSettings& settings) {
   Json head = {{"experiment", experiment.name}, {"tier", settings.tier}, {"question", experiment.question}};
   const Json origin = provenance(experiments_folder());
   head["run"] = origin.at("date").get<std::string>() + "-" + std::to_string(getpid());
@@ -30,12 +33,23 @@ Json run_head(const Experiment& experiment, const RunSettings& settings) {
   if (!experiment.columns.empty()) head["columns"] = experiment.columns;
   if (!experiment.plots.empty()) head["plots"] = Json::array();
   for (const Plot& plot : experiment.plots) head["plots"].push_back(to_json(plot));
+  if (ablation) {
+    head["ablation"] = to_json(*ablation);
+    head["ablation"]["prediction"] = prediction_of(settings.experiment);
+    check_prediction(head.at("ablation").at("prediction"), settings.out);
+  }
   if (experiment.kind == ExperimentKind::kExtraction) return head;
   const bool voxelization = experiment.kind == ExperimentKind::kVoxelization;
   head["kind"] = voxelization ? "voxelization" : "measurement";
   if (voxelization)
     head["band"] = {{"exterior", experiment.exterior_band}, {"interior", experiment.interior_band}};
   return head;
+}
+
+/// What the file predicts, if it is an ablation.
+std::optional<Ablation> ablation_of(const Experiment& experiment, const RunSettings& settings, const Tables& tables) {
+  return read_ablation(settings.experiment, experiment,
+                       {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements});
 }
 
 /// 3 for a broken promise or for judges that contradict one another, 1 for a variant that failed.
@@ -116,7 +130,7 @@ class Run {
         plan_(settings, tables),
         folder_(kept_folder(settings.out)),
         file_(folder_.path() / "rows.jsonl"),
-        head_(run_head(plan_.experiment, settings)),
+        head_(run_head(plan_.experiment, ablation_of(plan_.experiment, settings, tables), settings)),
         quiet_(child_context(context, false)),
         worker_(plan_, folder_.path(), settings.filter, settings.apart ? quiet_ : context),
         start_(std::chrono::steady_clock::now()) {
@@ -151,7 +165,15 @@ class Run {
     if (!is_measurement()) write_legend(rows_, table_);
     table_ << "\nRows: " << file_.string() << "; pictures: " << (folder_.path() / "*.png").string() << "\n";
     // Of all rows in the folder: earlier runs with another filter belong to the same picture.
-    write_plots(read_rows(file_), folder_.path(), table_);
+    const std::vector<Json> all = read_rows(file_);
+    write_plots(all, folder_.path(), table_);
+    const std::vector<JudgedAblation> ablations = judge_ablations(all);
+    for (const JudgedAblation& judged : ablations)
+      if (judged.experiment == plan_.experiment.name && judged.tier == settings_.tier) {
+        table_ << '\n';
+        write_effects(judged, table_);
+      }
+    write_forest_plots(ablations, folder_.path(), table_);
     return exit_code(rows_);
   }
 
@@ -171,13 +193,17 @@ class Run {
                  plan_.experiment.interior_band, head_.at("threads")};
     if (is_extraction()) cell.push_back(named(plan_.experiment.voxelizers[id.voxelizer]));
     if (plan_.experiment.features) cell.push_back(*plan_.experiment.features);
+    // A row is of the prediction that was made before it.
+    if (head_.contains("ablation")) cell.push_back(head_.at("ablation"));
     const JudgedBy& judged = entry.judged;
     cell.push_back({judged.distances.value_or(-1), judged.to_boundary, int(judged.signs), judged.sign_samples, judged.solid,
                     entry.length.value_or(0.0), entry.sweep ? entry.sweep->parameter : ""});
     return digest_of_text(cell.dump());
   }
   std::string fingerprint_of_measurement() const {
-    return digest_of_text(Json{plan_.experiment.measurement, plan_.experiment.seed, plan_.tier.parameters, head_.at("threads")}.dump());
+    Json cell{plan_.experiment.measurement, plan_.experiment.seed, plan_.tier.parameters, head_.at("threads")};
+    if (head_.contains("ablation")) cell.push_back(head_.at("ablation"));
+    return digest_of_text(cell.dump());
   }
 
   void read_what_is_there() {
@@ -415,10 +441,11 @@ class Run {
 
 std::vector<ExperimentInfo> list_experiments() {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(experiments_folder()))
-    if (entry.path().extension() == ".toml" && entry.path().filename() != "cases.toml")
-      files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
+  for (const std::filesystem::path& folder : {experiments_folder(), experiments_folder() / "ablations" / "predictions"})
+    if (std::filesystem::is_directory(folder))
+      for (const auto& entry : std::filesystem::directory_iterator(folder))
+        if (entry.path().extension() == ".toml" && entry.path().filename() != "cases.toml") files.push_back(entry.path());
+  std::ranges::sort(files, {}, [](const std::filesystem::path& file) { return file.filename(); });
   std::vector<ExperimentInfo> experiments;
   for (const auto& file : files) {
     ExperimentHead head = read_head(file);

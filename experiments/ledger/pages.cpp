@@ -12,6 +12,8 @@
 #include <sstream>
 
 #include "algorithms/core/error.h"
+#include "experiments/ablations/effect_report.h"
+#include "experiments/ablations/prediction.h"
 #include "experiments/cases/case_file.h"
 #include "experiments/harness/harness.h"
 #include "experiments/harness/rows.h"
@@ -271,6 +273,13 @@ std::string Pages::content_of(const std::string& marker) const {
     while (text.ends_with('\n')) text.pop_back();
     return "\n" + text + "\n";
   }
+  if (kind == "ablations" && words.size() == 1) {
+    std::vector<JudgedAblation> ablations;
+    for (const auto& [file, text] : tables())
+      for (JudgedAblation& judged : judge_ablations(read_rows(root_ / fs::path(file).parent_path() / "rows.jsonl")))
+        if (judged.tier == "full") ablations.push_back(std::move(judged));
+    return summary_of(ablations);
+  }
   if (kind == "claims" || kind == "count") {
     const std::vector<Claim> claims = read_claims(root_ / "paper" / "claims.toml");
     std::vector<Judged> verdicts;
@@ -373,9 +382,12 @@ std::vector<std::string> Pages::problems() const {
     for (const CaseFile& file : recipe.files) known.insert(file.sha256);
   }
   std::set<std::string> strange;
+  std::set<std::pair<std::string, std::string>> predictions;  // those looked at, for git is slow
   for (const auto& [file, text] : tables()) {
     const fs::path folder = fs::path(file).parent_path();
     for (const Json& row : read_rows(root_ / folder / "rows.jsonl")) {
+      if (predictions.emplace(text_at(row, "/ablation/prediction"), text_at(row, "/commit")).second)
+        if (const std::string problem = prediction_problem(row, root_); !problem.empty()) strange.insert(folder.string() + ": " + problem);
       std::vector<Json> inputs{row.value("case", Json::object())};
       if (const Json* more = find(row, "/inputs")) inputs.insert(inputs.end(), more->begin(), more->end());
       for (const Json& input : inputs) {

@@ -5,6 +5,7 @@
 //                                                       `hermesh report` writes them
 //   <!--=legend FOLDER-->…<!--/-->                      what their headers mean
 //   <!--=claims-->…<!--/-->                             the claims of paper/claims.toml with their verdicts
+//   <!--=ablations-->…<!--/-->                          the effects of the full tiers of all ablations, with their verdicts
 //   <!--=count VERDICT-->…<!--/-->                      how many claims have that verdict; without one how many there are
 #pragma once
 
@@ -54,7 +55,8 @@ class Pages {
   /// Writes all pages and the table.md of each folder of results, and results/SHA256SUMS; returns those that changed.
   std::vector<std::string> fill() const;
   /// What is wrong, a sentence each: pages and tables that differ from the rows, numbers in the text of a page that no
-  /// marker explains, rows that differ from results/SHA256SUMS, and inputs of rows whose hash is not the one of cases.toml.
+  /// marker explains, rows that differ from results/SHA256SUMS, inputs of rows whose hash is not the one of
+  /// cases.toml, and rows of ablations whose prediction was not committed before them.
   std::vector<std::string> problems() const;
 
  private:

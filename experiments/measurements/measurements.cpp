@@ -1,3 +1,4 @@
+#include "experiments/ablations/boolean_rule.h"
 #include "experiments/measurements/measurements.h"
 
 #include <algorithm>
@@ -84,7 +85,8 @@ std::span<const Measurement> all_measurements() {
                                                  arithmetic_measurement(),
                                                  tests_measurement(),
                                                  reproductions_measurement(),
-                                                 stale_measurement()};
+                                                 stale_measurement(),
+                                                 boolean_rule_measurement()};
   return table;
 }
 

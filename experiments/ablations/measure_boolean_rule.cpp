@@ -1,0 +1,111 @@
+// Equation 7.1 of the thesis against the rule of signs: a model less a copy of itself that is moved aside.
+// Both results are meshed from the same 10 bytes by the same extraction, so that the rule alone differs:
+// eq. 7.1 combines the bytes, and the rule of signs combines the exact data, which are packed then.
+#include <sstream>
+
+#include "algorithms/hermite/combine.h"
+#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/samplers.h"
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "experiments/ablations/boolean_rule.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/pipeline.h"
+
+namespace hermesh {
+namespace {
+
+/// Models of the tiers, of which parts of CAD have faces along the lattice and scans have not.
+constexpr const char* kFewModels = "torus fandisk";
+constexpr const char* kModels =
+    "turned-cube fandisk rocker-arm joint casting nefertiti bunny-closed armadillo";
+constexpr const char* kPrinted = "eq. 7.1";
+constexpr const char* kSigns = "signs";
+
+std::vector<std::string> words_in(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+/// The mesh moved by shares of its longest side that are no whole number of voxels, on the same origin and so
+/// the same lattice.
+PolygonMesh moved_aside(PolygonMesh mesh) {
+  const Eigen::Vector3f shares(0.231f, 0.117f, 0.071f);
+  const auto longest = static_cast<float>(bounds(mesh).size().maxCoeff());
+  for (Eigen::Vector3f& point : mesh.points) point += longest * shares;
+  return mesh;
+}
+
+FloatHermite sampled(const PolygonMesh& mesh, double voxel_size, const MeasurementInput& input,
+                     RunContext& context) {
+  const LevelSet level_set = voxelize(
+      mesh, {.chosen = choose(input.tables.voxelizers, "hermesh"), .voxel_size = voxel_size}, context);
+  return sample_polygons(level_set, 0.0, mesh, context);
+}
+
+MeasuredRow row_of(const std::string& model, const std::string& resolution, const std::string& level,
+                   const ThesisDense& difference, const RunContext& context) {
+  MeasuredRow row{"difference", model + ", " + resolution + ", " + level};
+  RunContext child = child_context(context, false);
+  // Threshold 0 merges nothing, so that merging cannot hide what a rule left.
+  const PolygonMesh mesh = adaptive_dual_contouring(difference, {.threshold = 0.0}, nullptr, child);
+  validation::JudgeOptions options = kPromisesAlone;
+  options.self_intersections = false;
+  const auto& [report, check] = judge(to_mesh_file(mesh), Promises{}, options, child);
+  row.values = {{"model", model},
+                {"resolution", resolution},
+                {"level", level},
+                {"triangles", mesh.triangle_count()},
+                {"open", report.boundary_edges},
+                {"flipped", report.inconsistent_edges}};
+  for (const auto& [figure, value] : child.figures)
+    if (figure == "lost_crossings" || figure == "needless_crossings") row.values[figure] = value;
+  return row;
+}
+
+std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+  std::vector<MeasuredRow> rows;
+  for (const std::string& model : words_in(input.parameters.text("models"))) {
+    const PolygonMesh mesh = input.tables.load(model, input.context).mesh, copy = moved_aside(mesh);
+    for (const std::string& resolution : words_in(input.parameters.text("resolutions"))) {
+      input.context.progress(model + " " + resolution, 0.0);
+      RunContext child = child_context(input.context, false);
+      const double voxel_size = bounds(mesh).size().maxCoeff() / std::stod(resolution);
+      const FloatHermite a = sampled(mesh, voxel_size, input, child),
+                         b = sampled(copy, voxel_size, input, child);
+      const auto packed = [&](const FloatHermite& data) { return to_dense<ThesisVoxel>(data, child); };
+      rows.push_back(row_of(model, resolution, kPrinted,
+                            combine(Boolean::subtract, packed(a), packed(b), child), input.context));
+      rows.push_back(
+          row_of(model, resolution, kSigns, packed(combine(Boolean::subtract, a, b, child)), input.context));
+    }
+  }
+  return rows;
+}
+
+}  // namespace
+
+Measurement boolean_rule_measurement() {
+  return {
+      .name = "boolean-rule",
+      .summary = "a model less a copy of itself, by eq. 7.1 and by the rule of signs",
+      .parameters =
+          {{"models", kFewModels, "cases", {kFewModels, kModels}},
+           {"resolutions", "48", "voxels along the longest side", {"48", "96", "192", "48 96 192"}}},
+      .tables = {{"difference",
+                  "a model less a copy of itself that is moved aside",
+                  "model, voxels, rule",
+                  {{"model", "model", "case"},
+                   {"resolution", "voxels", "along its longest side"},
+                   {"level", "rule", "of the combination"},
+                   {"triangles", "triangles", "of the mesh of the difference, nothing merged"},
+                   {"open", "open", "boundary edges"},
+                   {"flipped", "flipped", "inconsistently oriented edges"},
+                   {"lost_crossings", "lost", "edges whose ends differ in sign and that have no data"},
+                   {"needless_crossings", "needless", "edges with data whose ends do not differ in sign"}}}},
+      .measure = measure};
+}
+
+}  // namespace hermesh
