@@ -6,6 +6,7 @@
 
 #include "algorithms/io/mesh_file.h"
 #include "experiments/pictures/render.h"
+#include "experiments/pictures/viewpoint.h"
 
 namespace hermesh {
 namespace {
@@ -19,6 +20,7 @@ constexpr int kPixels = 900;
 constexpr std::size_t kExact = 3'000'000;
 /// Pieces move this part of their way from the object's middle, away from it.
 constexpr double kExplosion = 0.5;
+constexpr double kCloseUp = 0.07;  // of the box, so that polygons of some hundred voxels a side are told apart
 
 Json json_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Json json_of(const Eigen::Matrix3d& m) {
@@ -173,19 +175,18 @@ void FractureFolder::draw(const std::string& title, RunContext& context) const {
     sheet.frame.add(box.lower + shift(sketch));
     sheet.frame.add(box.upper + shift(sketch));
   }
-  sheet.pictures.push_back({"exploded", {}, [&] {
-                              PolygonMesh all;
-                              all.origin = middle;
-                              for (const Sketch& sketch : sketches_) {
-                                const auto first = static_cast<std::uint32_t>(all.points.size());
-                                for (std::size_t p = 0; p < sketch.mesh.points.size(); ++p)
-                                  all.points.push_back(
-                                      Vector3d(sketch.mesh.world(p) + shift(sketch) - middle).cast<float>());
-                                for (const Triangle& t : triangulated(sketch.mesh))
-                                  all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-                              }
-                              return all;
-                            }});
+  PolygonMesh all;
+  all.origin = middle;
+  for (const Sketch& sketch : sketches_) {
+    const auto first = static_cast<std::uint32_t>(all.points.size());
+    for (std::size_t p = 0; p < sketch.mesh.points.size(); ++p)
+      all.points.push_back(Vector3d(sketch.mesh.world(p) + shift(sketch) - middle).cast<float>());
+    for (const Triangle& t : triangulated(sketch.mesh))
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  sheet.viewpoint = open_viewpoint(all, context);
+  sheet.close_up = busy_close_up(all, sheet.frame, sheet.viewpoint, kCloseUp, context);
+  sheet.pictures.push_back({"exploded", {}, [&all] { return std::move(all); }});
   render_sheet(folder_.path() / "exploded.png", sheet, context);
 }
 

@@ -248,7 +248,7 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
   const Section section(
       file.file(), file.table(node, "a plot"), "a plot",
       {"name", "title", "case", "x", "y", "x_label", "y_label", "log_x", "log_y", "percent", "by_variant",
-       "resolution"});
+       "resolution", "categories", "emphasised", "note"});
   const auto known = [&](const std::string& key, const std::string& name,
                          const std::vector<std::string>& names) {
     if (std::find(names.begin(), names.end(), name) == names.end())
@@ -270,6 +270,13 @@ Plot read_plot(const Section& file, const toml::node& node, const Vocabulary& vo
   plot.percent = section.flag_or("percent", false);
   plot.by_variant = section.flag_or("by_variant", false);
   plot.resolution = static_cast<int>(section.integer_or("resolution", 0, 0, 1 << 20));
+  plot.categories = section.flag_or("categories", false);
+  if (section.has("emphasised"))
+    for (const toml::node& name : section.list("emphasised")) {
+      if (!name.is_string()) section.fail_at("emphasised", "\"emphasised\" must be a list of texts");
+      plot.emphasised.push_back(name.value<std::string>().value());
+    }
+  if (section.has("note")) plot.note = section.text("note");
   return plot;
 }
 

@@ -2,6 +2,7 @@
 #include <ostream>
 
 #include "experiments/ablations/effect_report.h"
+#include "experiments/harness/current_plots.h"
 #include "experiments/harness/harness.h"
 #include "experiments/pictures/plot.h"
 #include "experiments/harness/rows.h"
@@ -37,7 +38,7 @@ void write_report(const std::filesystem::path& folder, const std::string& format
   const std::vector<Json> rows = read_rows(folder);
   if (format == "plots") {
     const std::filesystem::path place = std::filesystem::is_directory(folder) ? folder : folder.parent_path();
-    write_plots(rows, place, out);
+    write_plots(with_current_plots(rows), place, out);
     return write_forest_plots(judge_ablations(rows), place, out);
   }
   if (format == "csv") return write_csv(rows, out);

@@ -23,9 +23,10 @@ function readable(value) {
 
 const kColours = 8;
 const kShapes = [
-  'M0-5A5 5 0 1 1 0 5A5 5 0 1 1 0-5Z', 'M-4.6-4.6H4.6V4.6H-4.6Z', 'M0-5.8L5.4 4.2H-5.4Z', 'M0-6.2L5 0L0 6.2L-5 0Z',
-  'M0 5.8L5.4-4.2H-5.4Z', 'M-1.8-5.6H1.8V-1.8H5.6V1.8H1.8V5.6H-1.8V1.8H-5.6V-1.8H-1.8Z',
-  'M0-6.3L1.7-2H6L2.6.8L3.9 5.2L0 2.6L-3.9 5.2L-2.6.8L-6-2H-1.7Z', 'M0-5.8L5.5-1.8L3.4 4.7H-3.4L-5.5-1.8Z'];
+  'M0-5A5 5 0 1 1 0 5A5 5 0 1 1 0-5Z', 'M-4.6-4.6H4.6V4.6H-4.6Z', 'M0-5.8L5.4 4.2H-5.4Z', 'M0 5.8L5.4-4.2H-5.4Z',
+  'M0-6.2L5 0L0 6.2L-5 0Z', 'M0-5.8L5.5-1.8L3.4 4.7H-3.4L-5.5-1.8Z',
+  'M-1.8-5.6H1.8V-1.8H5.6V1.8H1.8V5.6H-1.8V1.8H-5.6V-1.8H-1.8Z',
+  'M0-6.3L1.7-2H6L2.6.8L3.9 5.2L0 2.6L-3.9 5.2L-2.6.8L-6-2H-1.7Z'];
 const kDashes = [null, '7 4', '2 3', '9 3 2 3'];
 
 /// How the label with this number looks: colour and shape go round together, and the shapes go on by three with each round, so that 64 labels
@@ -195,6 +196,7 @@ function curvesFigure(figure) {
     for (const p of one.points) svg.append(linkedMark(styleOf(one.style), X(p.x), Y(p.y), p.href, p.text, 0.95 + 0.4 * above));
   });
   const box = element('figure', {}, element('figcaption', {}, figure.title), svg, keyOf(figure.series, figure.lines));
+  if (figure.note) box.append(element('p', {class: 'soft'}, figure.note));
   if (figure.front) box.append(element('p', {class: 'soft'}, 'The dashed line joins the meshes that no other one beats in both numbers.'));
   roving(svg, 'a', stepThrough);
   return box;
@@ -227,7 +229,7 @@ function dotsFigure(figure) {
     svg.append(linkedMark(style, X(p.x), y, p.href, p.text));
   });
   roving(svg, 'a', stepThrough);
-  return element('figure', {}, element('figcaption', {}, figure.title), svg);
+  return element('figure', {}, element('figcaption', {}, figure.title), svg, figure.note ? element('p', {class: 'soft'}, figure.note) : null);
 }
 
 function figureElement(figure) { return figure.kind === 'dots' ? dotsFigure(figure) : curvesFigure(figure); }

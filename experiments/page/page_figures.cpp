@@ -139,20 +139,24 @@ class Figures {
   void add_plot(const Plot& plot) {
     const std::vector<Curve> curves = curves_of(plot, own_.rows);
     if (curves.empty()) return;
-    Json made = figure("curves", plot.title, Json::object());
+    Json made = figure(plot.categories ? "dots" : "curves", plot.title, Json::object());
     made["case"] = plot.case_name;
     if (plot.resolution != 0) made["resolution"] = std::to_string(plot.resolution);
-    name_axes(made, plot.x_label, plot.y_label);
-    made["log_x"] = plot.log_x;
-    made["log_y"] = plot.log_y;
+    // What is compared lies along x in a figure of dots.
+    plot.categories ? name_axes(made, plot.y_label, "") : name_axes(made, plot.x_label, plot.y_label);
+    made["log_x"] = plot.categories ? plot.log_y : plot.log_x;
+    made["log_y"] = !plot.categories && plot.log_y;
     made["zero_y"] = !plot.log_y;
+    if (!plot.note.empty()) made["note"] = plot.note;
     made["lines"] = true;
     for (const Curve& curve : curves)
       for (const CurvePoint& at : curve.points) {
         const Json& row = own_.rows[at.row];
-        const Interval interval =
-            curve.column == "seconds" && !find(row, "/measurement") ? spread(row) : Interval{};
-        series(made, curve.label)["points"].push_back(point(row, at.x, at.y, interval));
+        if (plot.categories)
+          series(made, text_at(row, plot.by_variant ? "/variant/name" : "/variant/label"))["points"].push_back(
+              point(row, at.y, 0.0, {at.low, at.high}));
+        else
+          series(made, curve.label)["points"].push_back(point(row, at.x, at.y, {at.low, at.high}));
       }
     figures_.push_back(std::move(made));
   }

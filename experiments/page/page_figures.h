@@ -17,6 +17,7 @@ std::size_t page_row(const Json& row);
 ///   title, experiment, case, resolution (text), x_label, y_label with units
 ///   log_x, log_y, zero_y (whether the axis starts at 0), lines (whether points are joined),
 ///   front (whether the points that no other one beats in both coordinates are joined)
+///   note      a sentence below the figure, where a plot has one
 ///   series    [{label, style, points: [[row, x, y, low, high], …]}, …]; `style` numbers the labels of an
 ///   experiment, so
 ///             that a variant looks the same in all of its figures; low and high are the ends of the interval

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@ namespace hermesh {
 struct CurvePoint {
   double x, y;      ///< in the columns' units; y in percent where the plot asks for that
   std::size_t row;  ///< index into the rows that were given
+  std::optional<double> low = {}, high = {};  ///< ends of y's interval, both or none
 };
 
 struct Curve {
@@ -21,7 +23,9 @@ struct Curve {
 };
 
 /// The curves of a plot. The first column gives a curve for every label or variant. The others do not depend on who
-/// competes: they are taken from the rows of the first label alone, and are called by their column's header.
+/// competes: they are taken from the rows of the first label alone, and are called by their column's header. A plot
+/// of categories has one curve a column, called by its header, and x numbers the labels from 0 by their least value of
+/// plot.x, then as they come; a row need not have that column.
 /// @throws Error for a column that there is not.
 std::vector<Curve> curves_of(const Plot& plot, const std::vector<Json>& rows);
 

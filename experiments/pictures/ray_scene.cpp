@@ -174,7 +174,7 @@ struct Painter {
       longest = std::max(longest, length);
       if (i != diagonal && length > 0.0f) nearest = std::min(nearest, weight[i] * area2 / length);
     }
-    const float fade = smooth_step(1.5f, 7.0f, longest);
+    const float fade = smooth_step(3.0f, 16.0f, longest);
     return fade * (1.0f - smooth_step(kEdgePixels, kEdgePixels + 0.7f, nearest));
   }
 
@@ -201,9 +201,12 @@ struct Painter {
     const float lit =
         key > 0.0f && !blocked(position, key_light, 3.0f * occlusion_radius) ? key : 0.25f * key;
     const float fill = 0.5f + 0.5f * normal.dot(up);
-    Vector3f colour = to_linear(from_behind ? kBack : kFront) * (0.95f * lit + sky * (0.18f + 0.30f * fill));
+    // A light at the viewer, without which what faces the viewer in the shadow of another part is nearly black.
+    const float head = normal.dot(towards);
+    Vector3f colour =
+        to_linear(from_behind ? kBack : kFront) * (0.78f * lit + sky * (0.18f + 0.27f * fill) + 0.32f * head);
     if (view.edges)
-      colour += (to_linear(kEdge) - colour) * (0.8f * edge_cover(hit.hit.primID, hit.hit.u, hit.hit.v));
+      colour += (to_linear(kEdge) - colour) * (0.7f * edge_cover(hit.hit.primID, hit.hit.u, hit.hit.v));
     return colour;
   }
 
@@ -221,6 +224,42 @@ struct Painter {
 };
 
 }  // namespace
+
+std::vector<Glimpse> RayScene::glimpses(const Camera& camera, const View& view, RunContext& context) const {
+  const Bounds box = bounds(machinery_->mesh);
+  const double reach =
+      box.empty() ? 1.0 : box.size().norm() + (0.5 * (box.lower + box.upper) - view.centre).norm();
+  const double pixel = view.world_width / view.width;
+  const Eigen::Vector3d centre = view.centre - machinery_->mesh.origin + reach * camera.towards;
+  std::vector<Glimpse> seen(static_cast<std::size_t>(view.width) * view.height);
+  tbb::parallel_for(tbb::blocked_range<int>(0, view.height), [&](const tbb::blocked_range<int>& rows) {
+    for (int row = rows.begin(); row != rows.end(); ++row) {
+      context.check();
+      for (int column = 0; column < view.width; ++column) {
+        const Vector3f start = (centre + (column + 0.5 - 0.5 * view.width) * pixel * camera.right +
+                                (0.5 * view.height - row - 0.5) * pixel * camera.up)
+                                   .cast<float>();
+        const Vector3f ahead = (-camera.towards).cast<float>();
+        RTCRayHit hit{};
+        hit.ray.org_x = start.x(), hit.ray.org_y = start.y(), hit.ray.org_z = start.z();
+        hit.ray.dir_x = ahead.x(), hit.ray.dir_y = ahead.y(), hit.ray.dir_z = ahead.z();
+        hit.ray.tfar = std::numeric_limits<float>::infinity();
+        hit.ray.mask = ~0u;
+        hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        RTCIntersectContext intersection;
+        rtcInitIntersectContext(&intersection);
+        rtcIntersect1(machinery_->scene, &intersection, &hit);
+        if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        Glimpse& glimpse = seen[static_cast<std::size_t>(row) * view.width + column];
+        glimpse.hit = true;
+        glimpse.normal = Vector3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
+        if (glimpse.normal.dot(ahead) > 0.0f) glimpse.normal = -glimpse.normal;
+        glimpse.place = machinery_->mesh.origin + (start + hit.ray.tfar * ahead).cast<double>();
+      }
+    }
+  });
+  return seen;
+}
 
 Image RayScene::render(const Camera& camera, const View& view, RunContext& context) const {
   const PolygonMesh& mesh = machinery_->mesh;

@@ -35,6 +35,13 @@ struct Image {
   std::vector<std::uint32_t> pixels;
 };
 
+/// What a ray through the middle of a pixel meets first.
+struct Glimpse {
+  bool hit = false;
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of unit length, turned to the viewer
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();   ///< world units
+};
+
 class RayScene {
  public:
   /// Keeps a reference to the mesh. @throws Error if Embree cannot be started or runs out of memory.
@@ -43,9 +50,12 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// The picture of the mesh: each face in one tone (so that facets show) under a key light with ambient occlusion, 2×2
-  /// samples a pixel. Deterministic at any thread count. @throws Cancelled.
+  /// The picture of the mesh: each face in one tone (so that facets show) under a key light and one at the viewer, with
+  /// ambient occlusion, 2×2 samples a pixel. Deterministic at any thread count. @throws Cancelled.
   Image render(const Camera& camera, const View& view, RunContext& context) const;
+
+  /// What the pixels of the view see, rows from the top. Deterministic at any thread count. @throws Cancelled.
+  std::vector<Glimpse> glimpses(const Camera& camera, const View& view, RunContext& context) const;
 
  private:
   struct Machinery;

@@ -1,0 +1,34 @@
+#include "experiments/harness/current_plots.h"
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "experiments/cases/cases.h"
+#include "experiments/harness/experiment_file.h"
+#include "experiments/harness/run_cells.h"
+
+namespace hermesh {
+
+std::vector<Json> with_current_plots(std::vector<Json> rows) {
+  std::map<std::string, Json> plots;  // null where there is no file
+  for (Json& row : rows) {
+    const std::string name = text_at(row, "/experiment");
+    if (!plots.contains(name)) {
+      const std::filesystem::path file = experiments_folder() / (name + ".toml");
+      Json own;
+      if (!name.empty() && name.find('/') == std::string::npos && std::filesystem::is_regular_file(file)) {
+        const Tables tables = all_tables();
+        const Experiment experiment = read_experiment(
+            file, {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements});
+        own = Json::array();
+        for (const Plot& plot : experiment.plots) own.push_back(to_json(plot));
+      }
+      plots[name] = std::move(own);
+    }
+    if (!plots[name].is_null()) row["plots"] = plots[name];
+  }
+  return rows;
+}
+
+}  // namespace hermesh
