@@ -26,7 +26,8 @@ double angle(const Vector3d& a, const Vector3d& b) {
   return 2.0 * std::asin(std::min(1.0, 0.5 * (a - b).norm()));
 }
 
-/// Calls f(point, weight) for the rule of seven points on each piece of a triangle; weights add up to 1.
+/// Calls f(point, weight, whether it is the piece's middle) for the rule of seven points on each piece of a
+/// triangle; weights add up to 1.
 template <class F>
 void for_each_sample(const Corners& corners, double length, const F& f) {
   const double longest = std::max(
@@ -36,10 +37,10 @@ void for_each_sample(const Corners& corners, double length, const F& f) {
   const double share = 1.0 / (double(n) * n);
   const Vector3d u = (corners[1] - corners[0]) / n, v = (corners[2] - corners[0]) / n;
   const auto piece = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    for (const Vector3d& p : {a, b, c}) f(p, share / 20.0);
+    for (const Vector3d& p : {a, b, c}) f(p, share / 20.0, false);
     for (const Vector3d& p : {Vector3d(0.5 * (a + b)), Vector3d(0.5 * (b + c)), Vector3d(0.5 * (c + a))})
-      f(p, share * 2.0 / 15.0);
-    f(Vector3d((a + b + c) / 3.0), share * 9.0 / 20.0);
+      f(p, share * 2.0 / 15.0, false);
+    f(Vector3d((a + b + c) / 3.0), share * 9.0 / 20.0, true);
   };
   for (int i = 0; i < n; ++i)
     for (int j = 0; i + j < n; ++j) {
@@ -74,14 +75,17 @@ Sums sum_over(const Described& mesh, const PlacedShape& shape, double length, bo
       const Vector3d cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
       const double twice = cross.norm(), area = 0.5 * twice;
       const Vector3d normal = twice > 0 ? Vector3d(cross / twice) : Vector3d(Vector3d::Zero());
-      for_each_sample(corners, length, [&](const Vector3d& p, double weight) {
+      for_each_sample(corners, length, [&](const Vector3d& p, double weight, bool is_middle) {
         const SurfacePlace place = shape.nearest(p);
         const double squared = (p - place.point).squaredNorm();
         sums.max = std::max(sums.max, squared);
         if (distances_alone || twice == 0) return;
         sums.squares += weight * area * squared;
+        // The middle of a piece stands for all of it: corners and sides on a crease that is kept belong to
+        // two faces.
+        if (!is_middle) return;
         const double turned = angle(normal, place.normal);
-        sums.normals += weight * area * turned * turned;
+        sums.normals += weight * 20.0 / 9.0 * area * turned * turned;
       });
       sums.area += area;
       sums.volume += corners[0].dot(corners[1].cross(corners[2])) / 6.0;
@@ -180,7 +184,7 @@ MeshErrors mesh_errors(const PolygonMesh& mesh, const PlacedShape& shape, double
     // Flat faces come in two triangles, whose corners are no sample of the surface.
     for (const Triangle& t : facets.triangles)
       for_each_sample({facets.world(t[0]), facets.world(t[1]), facets.world(t[2])}, length,
-                      [&](const Vector3d& p, double) { surface.push_back(p); });
+                      [&](const Vector3d& p, double, bool) { surface.push_back(p); });
   } else {
     for (std::size_t i = 0; i < facets.points.size(); ++i) surface.push_back(facets.world(i));
   }

@@ -21,7 +21,7 @@ Expectation expectation(const ExactShape& shape, bool keeps_creases) {
 }
 
 std::optional<double> theory(Expectation expectation, Quantity quantity) {
-  if (expectation == Expectation::kExact) return std::nullopt;
+  if (expectation == Expectation::kExact && quantity != Quantity::kCurvature) return std::nullopt;
   if (expectation == Expectation::kFirstOrder) return 1.0;
   const bool cut = expectation == Expectation::kSharp;
   switch (quantity) {
