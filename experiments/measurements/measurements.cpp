@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "experiments/accuracy/measure_order.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/experiment_file.h"
 #include "experiments/harness/provenance.h"
@@ -82,6 +83,7 @@ std::span<const Measurement> all_measurements() {
                                                  threads_measurement(),
                                                  sampling_measurement(),
                                                  surface_noise_measurement(),
+                                                 order_measurement(),
                                                  arithmetic_measurement(),
                                                  tests_measurement(),
                                                  reproductions_measurement(),

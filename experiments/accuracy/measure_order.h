@@ -1,0 +1,11 @@
+// Orders of accuracy of extractors, voxelizers and codes of normals on shapes whose truth is known.
+#pragma once
+
+#include "experiments/measurements/measurements.h"
+
+namespace hermesh {
+
+/// The measurement "order".
+Measurement order_measurement();
+
+}  // namespace hermesh
