@@ -1,4 +1,4 @@
-// hermesh compare and accept: rows held against a baseline, and rows made one.
+// hermesh compare, accept and merge: rows held against a baseline, rows made one, and shards of an experiment joined.
 #include "experiments/ledger/compare.h"
 
 #include <iostream>
@@ -9,7 +9,9 @@
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/session.h"
 #include "experiments/harness/rows.h"
+#include "experiments/harness/provenance.h"
 #include "experiments/ledger/baseline.h"
+#include "experiments/ledger/merge.h"
 
 namespace hermesh::cli {
 namespace {
@@ -100,11 +102,32 @@ void add_accept(CLI::App& app, Session& session) {
   });
 }
 
+void add_merge(CLI::App& app, Session& session) {
+  struct Arguments {
+    std::filesystem::path out;
+    std::vector<std::filesystem::path> shards;
+  };
+  CLI::App* command = add_command(app, session, "merge",
+                                  "Join the shards of an experiment (hermesh run --shard) to the rows of the whole; if one or a "
+                                  "cell is missing, or they are not of one program and file, exit code 1");
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("OUT", arguments->out, "Folder for the rows, meshes and pictures of all shards")->required();
+  command->add_option("DIR", arguments->shards, "Folders of the shards, in any order")->required();
+  command->callback([arguments, &session] {
+    session.command = [arguments] {
+      check_may_be_kept(arguments->out, experiments_folder().parent_path(), source_state());
+      merge_shards(arguments->out, arguments->shards, std::cout);
+      return kDone;
+    };
+  });
+}
+
 }  // namespace
 
 void add_compare(CLI::App& app, Session& session) {
   add_comparing(app, session);
   add_accept(app, session);
+  add_merge(app, session);
 }
 
 }  // namespace hermesh::cli

@@ -16,6 +16,7 @@
 #include "experiments/harness/harness.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/rows.h"
+#include "experiments/harness/shards.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/ledger/compare.h"
 #include "experiments/ledger/pages.h"
@@ -25,12 +26,13 @@
 namespace hermesh::cli {
 namespace {
 
-int run(RunSettings settings, Session& session) {
+int run(RunSettings settings, const std::optional<Shard>& shard, Session& session) {
   if (settings.out.empty())
     settings.out = std::filesystem::path("results/local") / settings.experiment.stem();
   // The table is printed in one piece, since the line of progress would cut through it.
   std::ostringstream table;
-  const int exit_code = run_experiment(settings, session.context, table);
+  const int exit_code =
+      shard ? run_shard(*shard, settings, session.context, table) : run_experiment(settings, session.context, table);
   erase_progress_line();
   std::cout << table.str();
   return exit_code;
@@ -79,10 +81,20 @@ void add_run(CLI::App& app, Session& session) {
       ->check(CLI::Range(16.0, 1e9));
   command->add_flag("--in-process", limits->in_process,
                     "Work in this process instead of one of its own, for a debugger: a crash then ends the run");
+  auto shard = std::make_shared<std::string>();
+  command->add_option("--shard", *shard,
+                      "Only the part I of N of the file's groups of cells, as I/N; `hermesh merge` joins the folders of all parts");
   auto with_data = std::make_shared<bool>(false);
   command->add_flag("--require-data", *with_data,
-                    "Take no stand-in for a model that is not at hand: name it, and end with exit code 3");
+                    "Take no stand-in for a model that is not at hand: its cells fail, and the exit code is 3");
   command->callback([=, &session] {
+    if (!shard->empty()) {
+      as_usage([&] { return shard_of(*shard); });
+      for (const char* option : {"--filter", "--variant", "--case", "--resolution", "--repetitions"})
+        if (command->count(option) > 0)
+          throw UsageError("--shard is a part of the whole file, of which " + std::string(option) + " leaves out or changes something");
+      if (settings->out.empty()) throw UsageError("--shard needs --out, a folder for each shard");
+    }
     if (limits->in_process) refuse_idle(*command, {"--timeout", "--memory"}, "--in-process cannot end what takes too much");
     session.command = [=, &session] {
       settings->experiment = experiment_file(*name);
@@ -92,7 +104,7 @@ void add_run(CLI::App& app, Session& session) {
       if (!session.quiet && !isatty(STDERR_FILENO))
         settings->log = [](const std::string& line) { std::cerr << line << std::endl; };
       require_data(*with_data);
-      return run(*settings, session);
+      return run(*settings, shard->empty() ? std::nullopt : std::optional(shard_of(*shard)), session);
     };
   });
 }

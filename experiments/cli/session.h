@@ -52,7 +52,7 @@ void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_experiments(CLI::App& app, Session& session);  ///< adds run, conform, report and claims
-void add_compare(CLI::App& app, Session& session);      ///< adds compare and accept
+void add_compare(CLI::App& app, Session& session);      ///< adds compare, accept and merge
 
 /// Lets a command that makes volumes or surfaces print what it did as JSON: its notes, figures and times of stages.
 void add_json_option(CLI::App& command, Session& session);

@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "algorithms/core/error.h"
+#include "experiments/harness/failures.h"
 
 namespace hermesh {
 
@@ -35,6 +36,7 @@ ApartOutcome run_apart(const Apart& apart, const Json& job, const std::function<
     if (answer.contains("error")) {
       const std::string sentence = answer.at("error").get<std::string>();
       if (answer.value("missing", false)) throw DataMissing(sentence);
+      if (answer.value("unreadable", false)) throw CaseUnreadable(sentence);
       throw Error(sentence);
     }
     if (answer.contains("note")) {

@@ -8,7 +8,7 @@
 //   note      a sentence that the user should read (RunContext::note)
 //   stage     name of a stage, with "fraction", for the line of progress
 //   done      all rows have been sent
-//   error     a sentence; with "missing": true where data are not at hand (DataMissing). No rows come after it
+//   error     a sentence; with "missing": true (DataMissing) or "unreadable": true (CaseUnreadable); no rows come after it
 #pragma once
 
 #include <functional>
@@ -38,7 +38,7 @@ struct ApartOutcome {
   bool crashed = false; ///< whether that was a signal, which may have its cause in an earlier cell
 };
 
-/// Runs a job to its end. `row` gets each row as it comes. @throws Cancelled; DataMissing and Error that the child sent.
+/// Runs a job to its end. `row` gets each row as it comes. @throws Cancelled; DataMissing, CaseUnreadable, Error: the child's.
 ApartOutcome run_apart(const Apart& apart, const Json& job, const std::function<void(const Json&)>& row,
                        RunContext& context);
 

@@ -4,6 +4,7 @@
 #include <regex>
 #include <set>
 
+#include "algorithms/io/mesh_file.h"
 #include "experiments/ablations/read_ablation.h"
 #include "experiments/harness/command_extractor.h"
 #include "experiments/harness/toml_section.h"
@@ -201,8 +202,9 @@ CaseEntry read_case(const Section& file, const toml::node& node, ExperimentKind 
                                      "sweep", "distances", "signs", "sign_samples", "solid", "to_boundary"});
   CaseEntry entry;
   entry.name = section.text("name");
-  // A case may be a mesh file, too.
-  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end() && !std::filesystem::is_regular_file(entry.name))
+  // A case may be a mesh file, too; one that is not there is no mistake in this file, and makes rows that say so.
+  if (std::find(cases.begin(), cases.end(), entry.name) == cases.end() && !is_mesh_path(entry.name) &&
+      !std::filesystem::is_regular_file(entry.name))
     section.fail_at("name", "there is no case \"" + shown(entry.name) + "\", nor such a file; there are " +
                                 joined(likest_first(cases, entry.name)));
   if (section.has("voxel_sizes")) {

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "experiments/harness/apart.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/command_extractor.h"
+#include "experiments/harness/failures.h"
 #include "experiments/harness/run_voxelizers.h"
 #include "experiments/harness/toml_section.h"
 
@@ -141,6 +143,19 @@ std::string GroupWorker::name_of(const GroupId& id) const {
          (entry.voxel_sizes.empty() ? std::to_string(entry.resolutions[id.size]) : readable(entry.voxel_sizes[id.size])) + "/";
 }
 
+double GroupWorker::weight_of(const GroupId& id) const {
+  const CaseEntry& entry = plan_.tier.cases[id.entry];
+  double resolution = 0.0;
+  if (entry.voxel_sizes.empty()) {
+    resolution = entry.resolutions[id.size];
+  } else {
+    constexpr double kCoarsest = 100.0;
+    const double longest = entry.length.value_or(kCoarsest * std::ranges::max(entry.voxel_sizes));
+    resolution = longest / entry.voxel_sizes[id.size];
+  }
+  return double(contenders(id).size()) * resolution * resolution;
+}
+
 const LoadedCase& GroupWorker::input(const GroupId& id) { return loaded(plan_.tier.cases[id.entry].name, id, input_); }
 
 std::vector<Json> GroupWorker::rows(const GroupId& id, const std::set<std::string>& left_out, const Json& head, const CellWatch& watch) {
@@ -188,8 +203,18 @@ const LoadedCase& GroupWorker::loaded(const std::string& name, const GroupId& id
   const std::string key = name + (entry.sweep ? "/" + entry.sweep->parameter + "/" + std::to_string(id.sweep) : "");
   if (kept.input && kept.name == key) return *kept.input;
   kept = {};
-  kept.input = entry.sweep ? plan_.tables.load_changed(name, {{entry.sweep->parameter, entry.sweep->values[id.sweep]}}, context_)
-                           : plan_.tables.load(name, context_);
+  const auto sentence = attempt([&] {
+    kept.input = entry.sweep ? plan_.tables.load_changed(name, {{entry.sweep->parameter, entry.sweep->values[id.sweep]}}, context_)
+                             : plan_.tables.load(name, context_);
+    // A resolution counts the voxels along the longest side, so an input without one has no voxel size.
+    if (kept.input->mesh.triangle_count() == 0) throw Error("it holds no polygons");
+    if (const double longest = bounds(kept.input->mesh).size().maxCoeff(); !(longest > 0.0) || !std::isfinite(longest))
+      throw Error("its bounding box has no finite extent");
+  });
+  if (sentence) {
+    kept = {};
+    throw CaseUnreadable("the case " + name + " cannot be read: " + *sentence);
+  }
   kept.name = key;
   return *kept.input;
 }
@@ -247,6 +272,8 @@ int serve_cells(const Tables& tables, RunContext& context) {
     answers.send({{"done", true}});
   } catch (const DataMissing& error) {
     answers.send({{"error", error.what()}, {"missing", true}});
+  } catch (const CaseUnreadable& error) {
+    answers.send({{"error", error.what()}, {"unreadable", true}});
   } catch (const Cancelled&) {
     throw;
   } catch (const std::bad_alloc&) {

@@ -44,7 +44,11 @@ class GroupWorker {
   std::vector<VariantEntry> contenders(const GroupId& id) const;
   /// "dragon/400/".
   std::string name_of(const GroupId& id) const;
-  /// The input of a group; the last one is kept, since the next group mostly has it, too. @throws what loading it throws.
+  /// An estimate of the group's work that depends on the file alone, for partition(): its cells times the square of its
+  /// resolution. Voxel sizes in world units tell of no resolution; the largest of the entry then counts as 100.
+  double weight_of(const GroupId& id) const;
+  /// The input of a group; the last one is kept, since the next group mostly has it, too. @throws Cancelled; DataMissing;
+  /// CaseUnreadable, with the reason.
   const LoadedCase& input(const GroupId& id);
 
   /// The rows of a group, without the contenders whose labels are `left_out`. @throws as run_group().

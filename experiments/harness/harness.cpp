@@ -15,10 +15,12 @@
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"
+#include "experiments/harness/failures.h"
 #include "experiments/harness/group_worker.h"
 #include "experiments/harness/provenance.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/sha256.h"
+#include "experiments/harness/shards.h"
 #include "experiments/harness/table.h"
 #include "experiments/harness/toml_section.h"
 
@@ -52,12 +54,14 @@ std::optional<Ablation> ablation_of(const Experiment& experiment, const RunSetti
                        {tables.extractors, tables.voxelizers, tables.cases, column_names(), tables.measurements});
 }
 
-/// 3 for a broken promise or for judges that contradict one another, 1 for a variant that failed.
+/// 3 for a broken promise, for judges that contradict one another or for data that are required and missing, 1 for a cell
+/// that failed.
 int exit_code(const std::vector<Json>& rows) {
   int code = 0;
   for (const Json& row : rows) {
     const auto any = [&](const char* key) { return row.contains(key) && !row.at(key).empty(); };
     if (any("broken") || any("disagreements")) return 3;
+    if (row.contains("data_missing")) return 3;
     if (row.contains("failed")) code = 1;
   }
   return code;
@@ -123,8 +127,9 @@ const std::string& program_hash() {
 /// Runs the cells of a tier, one group after the other; every group's rows are on disk before the next one starts.
 class Run {
  public:
-  Run(const RunSettings& settings, const Tables& tables, RunContext& context, std::ostream& table)
+  Run(const RunSettings& settings, std::optional<Shard> shard, const Tables& tables, RunContext& context, std::ostream& table)
       : settings_(settings),
+        shard_(shard),
         context_(context),
         table_(table),
         plan_(settings, tables),
@@ -147,15 +152,21 @@ class Run {
   }
 
   int run() {
+    const std::vector<GroupId> groups = shard_ ? own_groups(worker_.groups()) : worker_.groups();
     read_what_is_there();
     table_ << "## " << plan_.experiment.name << " (" << settings_.tier << "): " << plan_.experiment.question << "\n\n";
-    const std::vector<GroupId> groups = worker_.groups();
     for (std::size_t i = 0; i < groups.size(); ++i) {
       const ProgressPrefix prefix(context_, overall(i, groups.size()));
       is_measurement() ? measure() : run_group(groups[i]);
       if (is_measurement() || i + 1 == groups.size() || !share_a_table(groups[i], groups[i + 1])) print_tables();
       say_done(i, groups);
     }
+    if (shard_) {
+      manifest_.finished = true;
+      write_manifest(manifest_, folder_.path());
+      table_ << "Shard " << name_of(*shard_) << ": " << rows_.size() << " of " << manifest_.cells.size() << " cells\n\n";
+    }
+    if (shard_ && rows_.empty()) return 0;
     if (rows_.empty())
       throw Error("no cell of " + plan_.experiment.name + " contains \"" + settings_.filter +
                   "\" in its case/resolution/variant");
@@ -165,15 +176,18 @@ class Run {
     if (!is_measurement()) write_legend(rows_, table_);
     table_ << "\nRows: " << file_.string() << "; pictures: " << (folder_.path() / "*.png").string() << "\n";
     // Of all rows in the folder: earlier runs with another filter belong to the same picture.
-    const std::vector<Json> all = read_rows(file_);
-    write_plots(all, folder_.path(), table_);
-    const std::vector<JudgedAblation> ablations = judge_ablations(all);
-    for (const JudgedAblation& judged : ablations)
-      if (judged.experiment == plan_.experiment.name && judged.tier == settings_.tier) {
-        table_ << '\n';
-        write_effects(judged, table_);
-      }
-    write_forest_plots(ablations, folder_.path(), table_);
+    if (!shard_) {
+      const std::vector<Json> all = read_rows(file_);
+      write_plots(all, folder_.path(), table_);
+      const std::vector<JudgedAblation> ablations = judge_ablations(all);
+      for (const JudgedAblation& judged : ablations)
+        if (judged.experiment == plan_.experiment.name && judged.tier == settings_.tier) {
+          table_ << '\n';
+          write_effects(judged, table_);
+        }
+      write_forest_plots(ablations, folder_.path(), table_);
+    }
+    write_failures(rows_, table_);
     return exit_code(rows_);
   }
 
@@ -206,6 +220,48 @@ class Run {
     return digest_of_text(cell.dump());
   }
 
+  // ---- Shards.
+
+  static std::string name_of(const Shard& shard) { return std::to_string(shard.number) + "/" + std::to_string(shard.of); }
+
+  /// Returns the groups of the shard, and writes its manifest.
+  std::vector<GroupId> own_groups(const std::vector<GroupId>& all) {
+    const Overrides& changed = settings_.overrides;
+    if (is_measurement())
+      throw Error(plan_.experiment.name + " is a measurement, one function that makes all of its rows, and has no shards");
+    if (!settings_.filter.empty() || !changed.variants.empty() || !changed.cases.empty() || !changed.resolutions.empty() ||
+        changed.repetitions)
+      throw Error("a shard is a part of the whole file, of which nothing can be left out or changed");
+    std::vector<double> weights;
+    for (const GroupId& id : all) weights.push_back(worker_.weight_of(id));
+    const std::vector<int> parts = partition(weights, shard_->of);
+    std::vector<GroupId> own;
+    std::set<std::string> cells;
+    manifest_ = {.experiment = plan_.experiment.name, .tier = settings_.tier, .file_sha256 = sha256_of_file(settings_.experiment),
+                 .shard = *shard_, .commit = text_at(head_, "/commit"), .binary = program_hash(),
+                 .threads = head_.at("threads").get<int>()};
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (parts[i] == shard_->number) own.push_back(all[i]);
+      const std::string voxelizer = is_extraction() ? plan_.experiment.voxelizers[all[i].voxelizer].label + "/" : "";
+      for (const VariantEntry& variant : worker_.contenders(all[i])) {
+        manifest_.cells.push_back({fingerprint(all[i], variant), worker_.name_of(all[i]) + voxelizer + variant.label, parts[i]});
+        if (!cells.insert(manifest_.cells.back().cell).second)
+          throw Error(plan_.experiment.name + " names the cell " + manifest_.cells.back().name + " twice, and so has no shards");
+      }
+    }
+    if (std::filesystem::exists(manifest_path(folder_.path()))) {
+      const ShardManifest there = read_manifest(folder_.path());
+      if (there.experiment != manifest_.experiment || there.tier != manifest_.tier || there.file_sha256 != manifest_.file_sha256 ||
+          there.shard != manifest_.shard)
+        throw Error(folder_.path().string() + " holds shard " + name_of(there.shard) + " of " + there.experiment + " (" +
+                    there.tier + ") as its file was then; take another folder for this one");
+    } else if (std::filesystem::exists(file_)) {
+      throw Error(folder_.path().string() + " holds rows that are of no shard; take another folder for this one");
+    }
+    write_manifest(manifest_, folder_.path());
+    return own;
+  }
+
   void read_what_is_there() {
     if (!std::filesystem::exists(file_)) return;
     if (drop_torn_row(file_)) context_.note("the last line of " + file_.string() + " was half a row, and is gone");
@@ -227,8 +283,16 @@ class Run {
       if (found == there_by_cell_.end()) return {};  // of a group that is there in part none counts: its cells race each other
       rows.push_back(found->second);
     }
-    const std::string hash = worker_.input(id).sha256;
-    if (std::ranges::any_of(rows, [&](const Json& row) { return text_at(row, "/case/sha256") != hash; })) return {};
+    // Rows of an input that cannot be read are of the data at hand as long as the reason stays the same.
+    std::string place = "/case/sha256", now;
+    try {
+      now = worker_.input(id).sha256;
+    } catch (const DataMissing& error) {
+      place = "/failed", now = error.what();
+    } catch (const CaseUnreadable& error) {
+      place = "/failed", now = error.what();
+    }
+    if (std::ranges::any_of(rows, [&](const Json& row) { return text_at(row, place) != now; })) return {};
     return rows;
   }
 
@@ -257,7 +321,14 @@ class Run {
         return there_by_cell_.contains(fingerprint(id, variant));
       });
       head_["run"] = joins ? earlier_run_ : own_run_;
-      rows = settings_.apart ? rows_apart(id) : worker_.rows(id, {}, head_, {});
+      try {
+        rows = settings_.apart ? rows_apart(id) : worker_.rows(id, {}, head_, {});
+      } catch (const DataMissing& error) {
+        rows = failed_rows(id, error.what());
+        for (Json& row : rows) row["data_missing"] = true;
+      } catch (const CaseUnreadable& error) {
+        rows = failed_rows(id, error.what());
+      }
       for (Json& row : rows)
         for (const VariantEntry& variant : variants)
           if (variant.label == text_at(row, "/variant/label")) row["cell"] = fingerprint(id, variant);
@@ -291,12 +362,29 @@ class Run {
 
   /// A row of a cell of which nothing more is known.
   Json bare_row(const GroupId& id, const VariantEntry& variant) const {
+    const CaseEntry& entry = plan_.tier.cases[id.entry];
     Json row = head_;
-    row["case"] = {{"name", plan_.tier.cases[id.entry].name}};
-    if (plan_.tier.cases[id.entry].voxel_sizes.empty()) row["resolution"] = plan_.tier.cases[id.entry].resolutions[id.size];
+    row["case"] = {{"name", entry.name}};
+    if (entry.voxel_sizes.empty())
+      row["resolution"] = entry.resolutions[id.size];
+    else
+      row["nominal_voxel_size"] = entry.voxel_sizes[id.size];
+    if (entry.sweep) row["sweep"] = {{"parameter", entry.sweep->parameter}, {"value", entry.sweep->values[id.sweep]}};
     row["variant"] = {{"name", variant.name}, {"label", variant.label}, {"options", ""}};
     if (is_extraction()) row["voxelization"] = {{"label", plan_.experiment.voxelizers[id.voxelizer].label}};
     return row;
+  }
+
+  Json failed_row(Json row, const std::string& reason) const {
+    is_extraction() ? mark_failed(row, reason) : void(row["failed"] = reason);
+    return row;
+  }
+
+  /// The rows of a group that has no input.
+  std::vector<Json> failed_rows(const GroupId& id, const std::string& reason) const {
+    std::vector<Json> rows;
+    for (const VariantEntry& variant : worker_.contenders(id)) rows.push_back(failed_row(bare_row(id, variant), reason));
+    return rows;
   }
 
   std::vector<Json> rows_apart(const GroupId& id) {
@@ -310,8 +398,7 @@ class Run {
           row = each;
           if (is_extraction()) row["voxelization"] = {{"label", plan_.experiment.voxelizers[id.voxelizer].label}};
         }
-      is_extraction() ? mark_failed(row, reason) : void(row["failed"] = reason);
-      found[variant.label] = std::move(row);
+      found[variant.label] = failed_row(std::move(row), reason);
       left_out.insert(variant.label);
     };
     while (left_out.size() < variants.size()) {
@@ -420,6 +507,7 @@ class Run {
   }
 
   const RunSettings& settings_;
+  std::optional<Shard> shard_;  ///< none: all cells
   RunContext& context_;
   std::ostream& table_;
   Plan plan_;
@@ -435,6 +523,7 @@ class Run {
   std::string own_run_, earlier_run_;
   std::size_t there_ = 0;
   std::vector<Json> rows_, unprinted_;
+  ShardManifest manifest_;  ///< of the shard, if there is one
 };
 
 }  // namespace
@@ -468,7 +557,11 @@ std::filesystem::path experiment_file(const std::string& name) {
 
 int run_experiment(const RunSettings& settings, const Tables& tables, RunContext& context,
                    std::ostream& table) {
-  return Run(settings, tables, context, table).run();
+  return Run(settings, std::nullopt, tables, context, table).run();
+}
+
+int run_shard(const Shard& shard, const RunSettings& settings, const Tables& tables, RunContext& context, std::ostream& table) {
+  return Run(settings, shard, tables, context, table).run();
 }
 
 Tables all_tables() {
@@ -481,6 +574,10 @@ Tables all_tables() {
 
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table) {
   return run_experiment(settings, all_tables(), context, table);
+}
+
+int run_shard(const Shard& shard, const RunSettings& settings, RunContext& context, std::ostream& table) {
+  return run_shard(shard, settings, all_tables(), context, table);
 }
 
 int serve_cells(RunContext& context) { return serve_cells(all_tables(), context); }

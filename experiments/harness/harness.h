@@ -55,9 +55,9 @@ struct RunSettings {
 
 /// Runs every cell: validates once, then times in interleaved repetitions; appends rows to out/rows.jsonl, those of a group
 /// (a case, resolution and voxelizer) as soon as it is done, prints the table to `table`, writes a picture a group. A cell
-/// that crashes, hangs or goes over a limit is a row with the reason, and the others of its group are begun anew without it.
-/// Returns 0; 3 if a promise was broken or the libraries' counts are not ours; otherwise 1 if a variant failed, which its row
-/// explains.
+/// that crashes, hangs or goes over a limit, or has no input, is a row with the reason; the others of its group are begun anew.
+/// Returns 0; 3 if a promise was broken, the libraries' counts are not ours or required data are missing; otherwise 1 if a cell
+/// failed, which its row explains, and the last line counts.
 /// @throws Error for a mistake in the file, naming its line; Cancelled.
 int run_experiment(const RunSettings& settings, RunContext& context, std::ostream& table);
 
