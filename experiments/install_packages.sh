@@ -8,6 +8,10 @@ hermesh_packages=(
   libcairo2-dev gnuplot-nox libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev libsqlite3-dev zlib1g-dev libbenchmark-dev libgtest-dev
   libopenvdb-tools)
 
+# To run sweeps on all cores of a machine, and to try them on a cluster of one node (experiments/sweep).
+sweep_packages=(snakemake)
+slurm_packages=(slurm-wlm munge)
+
 install_packages() {
   local missing=() name
   if ! command -v dpkg-query >/dev/null; then
