@@ -38,13 +38,13 @@ Json run_head(const Experiment& experiment, const RunSettings& settings) {
   return head;
 }
 
-/// 3 for a broken promise or for judges that contradict one another, 1 for a variant that failed.
+/// 3 for a broken promise or for judges that contradict one another, 1 for a variant that failed; one that is not installed is no failure.
 int exit_code(const std::vector<Json>& rows) {
   int code = 0;
   for (const Json& row : rows) {
     const auto any = [&](const char* key) { return row.contains(key) && !row.at(key).empty(); };
     if (any("broken") || any("disagreements")) return 3;
-    if (row.contains("failed")) code = 1;
+    if (row.contains("failed") && !row.contains("absent")) code = 1;
   }
   return code;
 }
