@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-find algorithms reference validation -name '*.h' -o -name '*.cpp' -o -name '*.inc' |
+find algorithms reference validation -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
   grep -v -e '_test\.cpp$' -e '/test_' -e '_for_tests' | sort | xargs awk '
     BEGIN {
       may["core"] = ""

@@ -36,6 +36,13 @@ void mark_failed(Json& row, const std::string& sentence) {
   row["promise_verdict"] = "FAILED: " + sentence;
 }
 
+void mark_absent(Json& row, const std::string& reason) {
+  mark_failed(row, "absent: " + reason);
+  row["absent"] = true;
+  row["promise_letters"] = "absent";
+  row["promise_verdict"] = "absent: " + reason;
+}
+
 Timing::Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
   contender.budget_seconds = tier.seconds_per_variant;
   contender.repetitions = tier.repetitions;

@@ -37,6 +37,8 @@ struct CellWatch {
 
 /// Says in the row that its cell failed, and why.
 void mark_failed(Json& row, const std::string& sentence);
+/// Says that its program is not installed: there are no figures, as where a cell failed, and it is no failure of the run.
+void mark_absent(Json& row, const std::string& reason);
 
 /// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
 /// up and does not count, unless it alone uses up the budget: then it is the only repetition there is.

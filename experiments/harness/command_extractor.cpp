@@ -9,19 +9,25 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <regex>
+#include <set>
 
 #include "algorithms/core/shown.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
+#include "algorithms/variants.h"
 #include "experiments/harness/measure.h"
 #include "experiments/harness/shell.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -48,8 +54,11 @@ class Scratch {
   fs::path path_;
 };
 
-const std::regex kPlaceholder("\\{([a-z.]*)\\}");
-const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?");
+const std::regex kPlaceholder("\\{([a-z.]*|[0-9.]+ voxel)\\}"), kVoxels("([0-9]+(\\.[0-9]+)?) voxel");
+const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?"), kUniform("uniform(\\.(ply|obj|stl|off))?");
+
+/// Exit codes: Automake's for a test that is skipped, and the shell's for a program that it does not find.
+constexpr int kSkipped = 77, kNotFound = 127;
 
 /// Calls `replace` for each word in braces, and puts what it returns in its place.
 std::string replaced(const std::string& command, const std::function<std::string(const std::string&)>& replace) {
@@ -68,6 +77,20 @@ std::string last_line(const fs::path& file) {
   for (std::string line; std::getline(stream, line);)
     if (!line.empty()) last = line;
   return shown(last, 200);
+}
+
+/// The number of the last line "word NUMBER"; none where there is no such line, or no finite number that is not negative.
+std::optional<double> number_said(const fs::path& file, const std::string& word) {
+  std::ifstream stream(file);
+  std::optional<double> number;
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.starts_with(word + " ")) continue;
+    const char* const from = line.c_str() + word.size() + 1;
+    char* end = nullptr;
+    const double value = std::strtod(from, &end);
+    if (end != from && *end == '\0' && std::isfinite(value) && value >= 0.0) number = value;
+  }
+  return number;
 }
 
 std::string plain_number(double value) {
@@ -108,12 +131,26 @@ void run_shell(const std::string& command, const fs::path& log, RunContext& cont
   });
   const std::string said = last_line(log), more = said.empty() ? "" : ": " + said;
   if (WIFSIGNALED(status)) throw Error(std::string("the command crashed (") + strsignal(WTERMSIG(status)) + ")" + more);
+  if (WEXITSTATUS(status) == kNotFound) throw ProgramAbsent("the shell does not find its program");
+  if (WEXITSTATUS(status) == kSkipped) throw ProgramAbsent(said.empty() ? "it ended with 77 and without a reason" : said);
   if (WEXITSTATUS(status) > 128)  // the shell's word for it
     throw Error(std::string("the command crashed (") + strsignal(WEXITSTATUS(status) - 128) + ")" + more);
   if (WEXITSTATUS(status) != 0)
     throw Error("the command ended with exit code " + std::to_string(WEXITSTATUS(status)) + more);
-  context.figure(std::string(kCommandSeconds), seconds);
-  context.figure(std::string(kCommandPeakBytes), double(used.ru_maxrss) * 1024);
+  const double peak = double(used.ru_maxrss) * 1024;
+  context.figure(std::string(kProcessSeconds), seconds);
+  context.figure(std::string(kProcessPeakBytes), peak);
+  // A time longer than the whole process cannot be right; nor can more memory.
+  const auto own_seconds = number_said(log, "seconds"), own_bytes = number_said(log, "bytes");
+  if (own_seconds && *own_seconds > seconds) throw Error("the command says that it took longer than it ran");
+  if (own_bytes && *own_bytes > peak) throw Error("the command says that it took more memory than it had");
+  context.figure(std::string(kCommandSeconds), own_seconds.value_or(seconds));
+  context.figure(std::string(kCommandPeakBytes), own_bytes.value_or(peak));
+}
+
+PolygonMesh uniform_mesh(const ExtractionInput& input, RunContext& context) {
+  const ExtractRecipe recipe{.chosen = choose(our_extractors(), "marching-cubes")};
+  return extract(input.level_set, input.source, recipe, context).mesh;
 }
 
 PolygonMesh run_command(const ExtractionInput& input) {
@@ -132,11 +169,20 @@ PolygonMesh run_command(const ExtractionInput& input) {
       made = scratch / (word == "out" ? "out.ply" : word);
       return shell_quoted(made.string());
     }
+    if (std::regex_match(word, kUniform)) {
+      const fs::path file = scratch / (word == "uniform" ? "uniform.ply" : word);
+      if (!fs::exists(file)) write_mesh(file, uniform_mesh(input, quiet), quiet);
+      return shell_quoted(file.string());
+    }
+    if (word == "source") return shell_quoted(HERMESH_SOURCE_DIR);
+    if (word == "build") return shell_quoted(HERMESH_BUILD_DIR);
     if (word == "volume") {
       const fs::path file = scratch / "volume.vdb";
       if (!fs::exists(file)) write_level_set(file, input.level_set, quiet);
       return shell_quoted(file.string());
     }
+    if (std::smatch number; std::regex_match(word, number, kVoxels))
+      return plain_number(std::strtod(number[1].str().c_str(), nullptr) * input.level_set.voxel_size());
     if (word == "voxel") return plain_number(input.level_set.voxel_size());
     return std::to_string(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   });
@@ -154,8 +200,10 @@ Extractor command_extractor(const std::string& name, const std::string& command)
   bool writes = false;
   replaced(command, [&](const std::string& word) {
     writes = writes || std::regex_match(word, kOut);
-    if (!std::regex_match(word, kIn) && !std::regex_match(word, kOut) && word != "volume" && word != "voxel" && word != "threads")
-      throw Error("a command knows {in}, {volume}, {out}, {voxel} and {threads}, and not {" + word + "}");
+    static const std::set<std::string> plain = {"volume", "voxel", "threads", "source", "build"};
+    if (!std::regex_match(word, kIn) && !std::regex_match(word, kOut) && !std::regex_match(word, kUniform) &&
+        !std::regex_match(word, kVoxels) && !plain.contains(word))
+      throw Error("a command knows {in}, {uniform}, {volume}, {out}, {voxel} or {0.25 voxel}, {threads}, {source} and {build}, and not {" + word + "}");
     return std::string();
   });
   if (!writes) throw Error("a command needs {out}, the file that it has to write");

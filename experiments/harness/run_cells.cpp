@@ -59,7 +59,14 @@ class Group {
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       cells_[i].row["voxelization"] = voxelization_;
       in_.watch.step(cells_[i].row);
-      const auto sentence = failed ? failed : attempt([&] { extract_and_judge(cells_[i], i); });
+      const auto sentence = failed ? failed : attempt([&] {
+        try {
+          extract_and_judge(cells_[i], i);
+        } catch (const ProgramAbsent& absent) {
+          mark_absent(cells_[i].row, absent.what());
+          cells_[i].timing.reset();
+        }
+      });
       if (sentence) fail(cells_[i], *sentence);
     }
     time_all();

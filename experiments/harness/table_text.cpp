@@ -119,7 +119,10 @@ std::vector<std::string> alarms(const Json& row) {
   std::vector<std::string> sentences;
   const std::string who =
       text_at(row, "/variant/label") + " on " + group_title(row) + cell_text_of(row) + ": ";
-  if (find(row, "/failed")) sentences.push_back("FAILED: " + who + text_at(row, "/failed"));
+  if (find(row, "/absent"))
+    sentences.push_back("NOTE: " + who + text_at(row, "/failed"));
+  else if (find(row, "/failed"))
+    sentences.push_back("FAILED: " + who + text_at(row, "/failed"));
   for (const std::string& broken : joined_list(row, "/broken"))
     sentences.push_back("BROKEN: " + who + broken);
   for (const std::string& unchecked : joined_list(row, "/unchecked"))

@@ -1,0 +1,29 @@
+"""Blender's modifier Remesh with voxels: blender -b --python blender_peer.py -- IN.obj OUT.obj VOXEL ADAPTIVITY"""
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import bpy
+import peer
+
+source, target, voxel, adaptivity = sys.argv[sys.argv.index("--") + 1:]
+points, triangles = peer.read_obj(source)
+mesh = bpy.data.meshes.new("peer")
+mesh.from_pydata(points.tolist(), [], triangles.tolist())
+thing = bpy.data.objects.new("peer", mesh)
+bpy.context.collection.objects.link(thing)
+modifier = thing.modifiers.new("remesh", "REMESH")
+modifier.mode = "VOXEL"
+modifier.voxel_size = float(voxel)
+modifier.adaptivity = float(adaptivity)
+
+
+def work():
+    graph = bpy.context.evaluated_depsgraph_get()
+    made = thing.evaluated_get(graph).to_mesh()
+    made.calc_loop_triangles()
+    return made
+
+
+made = peer.measured(work)
+peer.write_obj(target, [v.co for v in made.vertices], [tuple(t.vertices) for t in made.loop_triangles])

@@ -1,0 +1,113 @@
+// CGAL: edge collapse with Garland and Heckbert's quadrics, alone and within a polyhedral envelope, and alpha
+// wrapping.
+//   cgal_peer garland-heckbert IN.obj OUT.obj FRACTION      keeps this fraction of the edges
+//   cgal_peer envelope IN.obj OUT.obj TOLERANCE             as far as an envelope of that width allows; world
+//   units cgal_peer alpha-wrap IN.obj OUT.obj ALPHA OFFSET        world units
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_filter.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_placement.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_ratio_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/GarlandHeckbert_plane_policies.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_cost.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Polyhedral_envelope_filter.h>
+#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <CGAL/alpha_wrap_3.h>
+
+#include "reference/peers/peer.h"
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Surface = CGAL::Surface_mesh<Point>;
+namespace simplification = CGAL::Surface_mesh_simplification;
+namespace processing = CGAL::Polygon_mesh_processing;
+
+std::vector<Point> points_of(const peers::Mesh& mesh) {
+  std::vector<Point> points;
+  for (const auto& p : mesh.points) points.emplace_back(p[0], p[1], p[2]);
+  return points;
+}
+
+/// As a halfedge mesh, which has to be manifold.
+Surface to_cgal(const peers::Mesh& mesh) {
+  Surface surface;
+  if (!processing::is_polygon_soup_a_polygon_mesh(mesh.triangles))
+    throw std::runtime_error("CGAL cannot take a mesh that is not manifold");
+  processing::polygon_soup_to_polygon_mesh(points_of(mesh), mesh.triangles, surface);
+  return surface;
+}
+
+peers::Mesh from_cgal(Surface& surface) {
+  surface.collect_garbage();
+  peers::Mesh mesh;
+  for (const auto v : surface.vertices())
+    mesh.points.push_back({surface.point(v).x(), surface.point(v).y(), surface.point(v).z()});
+  for (const auto f : surface.faces()) {
+    std::array<int, 3> corners{};
+    int i = 0;
+    for (const auto v : surface.vertices_around_face(surface.halfedge(f)))
+      corners[std::size_t(i++)] = int(v.idx());
+    mesh.triangles.push_back(corners);
+  }
+  return mesh;
+}
+
+/// The user manual's example edge_collapse_garland_heckbert.cpp.
+peers::Mesh garland_heckbert(const peers::Mesh& mesh, double fraction) {
+  Surface surface = to_cgal(mesh);
+  peers::measured([&] {
+    using Policies = simplification::GarlandHeckbert_plane_policies<Surface, Kernel>;
+    const Policies policies(surface);
+    const simplification::Bounded_normal_change_placement<Policies::Get_placement> placement(
+        policies.get_placement());
+    simplification::edge_collapse(surface, simplification::Count_ratio_stop_predicate<Surface>(fraction),
+                                  CGAL::parameters::get_cost(policies.get_cost()).get_placement(placement));
+  });
+  return from_cgal(surface);
+}
+
+/// The user manual's example edge_collapse_envelope.cpp, which goes on until nothing is left that the
+/// envelope allows.
+peers::Mesh envelope(const peers::Mesh& mesh, double tolerance) {
+  Surface surface = to_cgal(mesh);
+  peers::measured([&] {
+    const simplification::Polyhedral_envelope_filter<Kernel, simplification::Bounded_normal_change_filter<>>
+        filter(tolerance);
+    simplification::edge_collapse(surface, simplification::Count_stop_predicate<Surface>(0),
+                                  CGAL::parameters::filter(filter)
+                                      .get_cost(simplification::LindstromTurk_cost<Surface>())
+                                      .get_placement(simplification::LindstromTurk_placement<Surface>()));
+  });
+  return from_cgal(surface);
+}
+
+peers::Mesh alpha_wrap(const peers::Mesh& mesh, double alpha, double offset) {
+  const auto points = points_of(mesh);
+  Surface surface;
+  peers::measured([&] { CGAL::alpha_wrap_3(points, mesh.triangles, alpha, offset, surface); });
+  return from_cgal(surface);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return peers::guarded([&] {
+    const std::string method = argc > 1 ? argv[1] : "";
+    if (argc != (method == "alpha-wrap" ? 6 : 5))
+      throw std::runtime_error(
+          "cgal_peer garland-heckbert|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA OFFSET");
+    const peers::Mesh mesh = peers::read_obj(argv[2]);
+    const double number = std::atof(argv[4]);
+    peers::write_obj(argv[3], method == "garland-heckbert" ? garland_heckbert(mesh, number)
+                              : method == "envelope"       ? envelope(mesh, number)
+                              : method == "alpha-wrap"
+                                  ? alpha_wrap(mesh, number, std::atof(argv[5]))
+                                  : throw std::runtime_error("cgal_peer knows no method " + method));
+  });
+}
