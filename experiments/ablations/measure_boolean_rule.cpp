@@ -1,6 +1,7 @@
 // Equation 7.1 of the thesis against the rule of signs: a model less a copy of itself that is moved aside.
 // Both results are meshed from the same 10 bytes by the same extraction, so that the rule alone differs:
 // eq. 7.1 combines the bytes, and the rule of signs combines the exact data, which are packed then.
+#include <algorithm>
 #include <sstream>
 
 #include "algorithms/hermite/combine.h"
@@ -45,9 +46,13 @@ FloatHermite sampled(const PolygonMesh& mesh, double voxel_size, const Measureme
   return sample_polygons(level_set, 0.0, mesh, context);
 }
 
+std::string label_of(const std::string& model, const std::string& resolution, const std::string& level) {
+  return model + ", " + resolution + ", " + level;
+}
+
 MeasuredRow row_of(const std::string& model, const std::string& resolution, const std::string& level,
                    const ThesisDense& difference, const RunContext& context) {
-  MeasuredRow row{"difference", model + ", " + resolution + ", " + level};
+  MeasuredRow row{"difference", label_of(model, resolution, level)};
   RunContext child = child_context(context, false);
   // Threshold 0 merges nothing, so that merging cannot hide what a rule left.
   const PolygonMesh mesh = adaptive_dual_contouring(difference, {.threshold = 0.0}, nullptr, child);
@@ -68,8 +73,15 @@ MeasuredRow row_of(const std::string& model, const std::string& resolution, cons
 std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   for (const std::string& model : words_in(input.parameters.text("models"))) {
+    const auto wanted = [&](const std::string& resolution) {
+      return input.wants("difference", label_of(model, resolution, kPrinted)) ||
+             input.wants("difference", label_of(model, resolution, kSigns));
+    };
+    const std::vector<std::string> resolutions = words_in(input.parameters.text("resolutions"));
+    if (std::ranges::none_of(resolutions, wanted)) continue;
     const PolygonMesh mesh = input.tables.load(model, input.context).mesh, copy = moved_aside(mesh);
-    for (const std::string& resolution : words_in(input.parameters.text("resolutions"))) {
+    for (const std::string& resolution : resolutions) {
+      if (!wanted(resolution)) continue;
       input.context.progress(model + " " + resolution, 0.0);
       RunContext child = child_context(input.context, false);
       const double voxel_size = bounds(mesh).size().maxCoeff() / std::stod(resolution);

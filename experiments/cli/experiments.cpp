@@ -16,7 +16,7 @@
 #include "experiments/harness/harness.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/rows.h"
-#include "experiments/harness/shards.h"
+#include "experiments/sweep/shards.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/ledger/compare.h"
 #include "experiments/ledger/pages.h"

@@ -19,7 +19,7 @@
 #include "experiments/harness/harness.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/sha256.h"
-#include "experiments/harness/shards.h"
+#include "experiments/sweep/shards.h"
 #include "experiments/ledger/compare.h"
 #include "experiments/ledger/merge.h"
 #include "reference/variants.h"

@@ -15,7 +15,8 @@ class CaseUnreadable : public Error {
   using Error::Error;
 };
 
-/// Writes a line with the number of rows that failed and the first one's reason; without such a row, nothing.
+/// Writes a line with the number of rows that failed and the first one's reason; without such a row, nothing. Rows of variants
+/// that are absent do not count.
 void write_failures(const std::vector<Json>& rows, std::ostream& out);
 
 }  // namespace hermesh

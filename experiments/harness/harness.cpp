@@ -20,7 +20,7 @@
 #include "experiments/harness/provenance.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/harness/sha256.h"
-#include "experiments/harness/shards.h"
+#include "experiments/sweep/shards.h"
 #include "experiments/harness/table.h"
 #include "experiments/harness/toml_section.h"
 

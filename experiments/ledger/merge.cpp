@@ -8,7 +8,7 @@
 #include "algorithms/core/error.h"
 #include "experiments/harness/failures.h"
 #include "experiments/harness/rows.h"
-#include "experiments/harness/shards.h"
+#include "experiments/sweep/shards.h"
 #include "experiments/ledger/compare.h"
 #include "experiments/pictures/plot.h"
 

@@ -1,4 +1,4 @@
-// Shards of an experiment (experiments/harness/shards.h), joined to the rows of the whole.
+// Shards of an experiment (experiments/sweep/shards.h), joined to the rows of the whole.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-#include "experiments/harness/shards.h"
+#include "experiments/sweep/shards.h"
 
 #include <unistd.h>
 
