@@ -7,10 +7,12 @@
 #include <iomanip>
 #include <limits>
 #include <ostream>
+#include <sstream>
+#include <vector>
 
 #include "algorithms/core/error.h"
 #include "experiments/ablations/effect_report.h"
-#include "experiments/harness/shell.h"
+#include "experiments/pictures/gnuplot.h"
 
 namespace hermesh {
 namespace {
@@ -72,6 +74,34 @@ std::array<double, 2> axis_of(const Forest& forest) {
   return {low - margin, high + margin};
 }
 
+std::string label_of(const PredictedEffect& predicted) { return predicted.level + ": " + predicted.column; }
+
+/// The share of the width that the longest name takes, of characters 0.009 wide.
+double left_margin(const Forest& forest) {
+  std::size_t longest = 0;
+  for (const JudgedEffect* effect : forest.effects)
+    longest = std::max(longest, label_of(effect->predicted).size());
+  return std::min(0.03 + 0.009 * double(longest), 0.6);
+}
+
+/// Marks of a logarithmic axis that spans less than two decades, where powers of ten alone would be one or
+/// none.
+std::string marks_of(double low, double high) {
+  if (high / low >= 100.0) return "";
+  const std::vector<double> steps = high / low < 6.0 ? std::vector<double>{1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8}
+                                                     : std::vector<double>{1, 2, 5};
+  std::ostringstream out;
+  const char* separator = "set xtics (";
+  for (int power = -9; power <= 9; ++power)
+    for (const double step : steps) {
+      const double mark = step * std::pow(10.0, power);
+      if (mark < low || mark > high) continue;
+      out << separator << mark;
+      separator = ", ";
+    }
+  return out.str().empty() ? "" : out.str() + ")\n";
+}
+
 void write_forest(const fs::path& script, const Forest& forest) {
   constexpr std::array<const char*, 3> kColours = {"#009e73", "#d55e00",
                                                    "#666666"};  // of verdicts (Okabe and Ito 2008)
@@ -86,17 +116,14 @@ void write_forest(const fs::path& script, const Forest& forest) {
   }
   out << "EOD\nset border 1 lw 1.2\nset tics nomirror\nset ytics scale 0\nset grid xtics lc rgb '#dddddd' lt "
          "1 lw 1\n"
-      << "set key tmargin center horizontal Left reverse samplen 1\nset lmargin at screen 0.4\nset rmargin "
-         "3\n"
-      << "set title " << gnuplot_text(forest.title) << " noenhanced\nset xlabel "
-      << gnuplot_text(forest.label) << " noenhanced\n"
+      << "set key tmargin center horizontal Left reverse samplen 1\nset rmargin 3\n"
+      << "set lmargin at screen " << left_margin(forest) << "\nset title " << gnuplot_text(forest.title)
+      << " noenhanced\nset xlabel " << gnuplot_text(forest.label) << " noenhanced\n"
       << "set xrange [" << low << ':' << high << "]\nset yrange [0.4:" << double(n) + 0.6 << "]\n";
-  if (forest.logarithmic) out << "set logscale x\n";
+  if (forest.logarithmic) out << "set logscale x\n" << marks_of(low, high);
   out << "set ytics (";
   for (std::size_t i = 0; i < n; ++i)
-    out << (i ? ", " : "")
-        << gnuplot_text(forest.effects[i]->predicted.level + ": " + forest.effects[i]->predicted.column)
-        << ' ' << n - i;
+    out << (i ? ", " : "") << gnuplot_text(label_of(forest.effects[i]->predicted)) << ' ' << n - i;
   out << ") noenhanced\n";
   for (std::size_t i = 0; i < n; ++i) {
     const PredictedEffect& predicted = forest.effects[i]->predicted;
@@ -113,7 +140,10 @@ void write_forest(const fs::path& script, const Forest& forest) {
        {std::pair("pngcairo size 1300," + std::to_string(height) + " font 'DejaVu Sans,17'", "png"),
         std::pair("svg size 870," + std::to_string(height * 2 / 3) +
                       " dynamic font 'DejaVu Sans,12' background '#ffffff'",
-                  "svg")}) {
+                  "svg"),
+        std::pair("pdfcairo size 22cm," + std::to_string(double(height) * 22.0 / 1300.0) +
+                      "cm font 'DejaVu Sans,8.5'",
+                  "pdf")}) {
     out << "set terminal " << terminal << "\nset output '" << script.stem().string() << '.' << extension
         << "'\nplot ";
     for (const PredictionVerdict verdict :
@@ -134,12 +164,7 @@ void write_forest_plots(const std::vector<JudgedAblation>& ablations, const fs::
     for (const Forest& forest : forests_of(judged)) {
       const fs::path stem = folder / forest.name;
       write_forest(stem.string() + ".gp", forest);
-      const std::string where = folder.empty() ? "." : folder.string();
-      const bool drawn = shell_output("cd " + shell_quoted(where) + " && gnuplot " +
-                                      shell_quoted(forest.name + ".gp") + " 2>/dev/null </dev/null")
-                             .status == 0;
-      out << (drawn ? "Plot: " + stem.string() + ".png, .svg\n"
-                    : "Not drawn, because gnuplot is missing or failed: " + stem.string() + ".gp\n");
+      draw_with_gnuplot(stem, out);
     }
 }
 
