@@ -137,6 +137,17 @@ class Paper:
                 self.verdicts.append((claim, verdict, figures))
         return self.verdicts
 
+    def ask(self, query, what):
+        """(columns, rows) of a query, of which there is at least one row. `what` asks, as errors say."""
+        self.check_tables(query, what)
+        try:
+            columns, rows = self.rows.query(query)
+        except PaperError as error:
+            raise PaperError(f"{what}: {error}") from None
+        if not rows:
+            raise PaperError(f"{what} has no row: {said(query)}")
+        return columns, rows
+
     def number(self, name):
         """The text of a number."""
         if name == "ablations" or name.startswith("ablations_"):
@@ -154,13 +165,7 @@ class Paper:
         if isinstance(entry, dict) and "constant" in entry:
             return self.constant(name, entry)
         query, form = (entry, "") if isinstance(entry, str) else (entry["query"], entry.get("format", ""))
-        self.check_tables(query, f"the number {name}")
-        try:
-            names, found = self.rows.query(query)
-        except PaperError as error:
-            raise PaperError(f"the number {name}: {error}") from None
-        if not found:
-            raise PaperError(f"the number {name} has no row: {said(query)}")
+        names, found = self.ask(query, f"the number {name}")
         parts = []
         for column, value in zip(names, found[0]):
             if value is None:
@@ -256,13 +261,7 @@ class Paper:
                 raise PaperError(f"the table {name} has no row: there is no results/{entry['folders']}")
         heads, found = [], []
         for query in queries:
-            self.check_tables(query, f"the table {name}")
-            try:
-                heads, rows = self.rows.query(query)
-            except PaperError as error:
-                raise PaperError(f"the table {name}: {error}") from None
-            if not rows:
-                raise PaperError(f"the table {name} has no row: {said(query)}")
+            heads, rows = self.ask(query, f"the table {name}")
             found += rows
         return heads, found
 

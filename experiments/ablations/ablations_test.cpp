@@ -472,6 +472,11 @@ TEST(AblationReport, DrawsAForestPlot) {
   text << file.rdbuf();
   EXPECT_NE(text.str().find("set logscale x"), std::string::npos);
   EXPECT_NE(text.str().find("'b: triangles' 1"), std::string::npos) << text.str();
+  for (const char* extension : {".png", ".pdf", ".svg"}) {
+    const fs::path drawn = fs::path(script).replace_extension(extension);
+    ASSERT_TRUE(fs::exists(drawn)) << drawn << ": experiments/install_packages.sh installs gnuplot";
+    EXPECT_GT(fs::file_size(drawn), 2000U) << drawn;
+  }
   fs::remove_all(folder);
 }
 

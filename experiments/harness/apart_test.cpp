@@ -18,6 +18,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "experiments/harness/harness.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/harness/unit_box_for_tests.h"
 #include "experiments/harness/sha256.h"
 #include "experiments/sweep/shards.h"
 #include "experiments/ledger/compare.h"
@@ -28,13 +29,6 @@ namespace hermesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-PolygonMesh box() {
-  PolygonMesh mesh;
-  for (int i = 0; i < 8; ++i) mesh.points.emplace_back(float(i & 1), float(i >> 1 & 1), float(i >> 2));
-  mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  return mesh;
-}
 
 bool poisoned = false;
 volatile int sink = 0;
@@ -90,7 +84,7 @@ Tables toys() {
   tables.load = [](const std::string& name, RunContext& context) {
     if (is_mesh_path(name)) return LoadedCase{name, read_mesh(name, context), "file", sha256_of_file(name)};
     if (name == "brick") check_stand_in_allowed(name, "it is a toy");
-    return LoadedCase{name, box(), "generated", "0123456789abcdef"};
+    return LoadedCase{name, unit_box(), "generated", "0123456789abcdef"};
   };
   tables.measurements = {{"letters", "", {}, {{"letters", "letters", "letter", {{"value", "value", ""}}}}, measure}};
   return tables;

@@ -8,6 +8,7 @@
 
 #include "algorithms/core/error.h"
 #include "experiments/cases/cases.h"
+#include "experiments/harness/unit_box_for_tests.h"
 #include "experiments/harness/sha256.h"
 #include "experiments/ledger/claims.h"
 #include "experiments/ledger/pages.h"
@@ -323,7 +324,7 @@ class Stale : public testing::Test {
                           {"openvdb", "", {}, {}, [](const ExtractionInput& input) { return *input.source; }}};
     tables_.cases = {"box"};
     tables_.load = [this](const std::string& name, RunContext&) {
-      return LoadedCase{name, make_box(), "generated", sha256_};
+      return LoadedCase{name, unit_box(), "generated", sha256_};
     };
     tables_.measurements = {{"count", "", {{"up", "3", "", {}, 0, 9}}, {{"numbers", "numbers", "number", {{"value", "value", ""}, {"seconds", "time [s]", ""}}}},
                              [this](const MeasurementInput& input) {
@@ -341,12 +342,6 @@ class Stale : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  static PolygonMesh make_box() {
-    PolygonMesh mesh;
-    for (int i = 0; i < 8; ++i) mesh.points.emplace_back(float(i & 1), float(i >> 1 & 1), float(i >> 2));
-    mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-    return mesh;
-  }
   void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
   FolderCheck check(const std::string& name, const std::function<void(Json&)>& change = {}) {
     std::vector<Json> rows = read_rows(folder_ / name / "rows.jsonl");
