@@ -1,16 +1,17 @@
 #include "experiments/harness/current_plots.h"
 
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "experiments/cases/cases.h"
 #include "experiments/harness/experiment_file.h"
+#include "experiments/harness/provenance.h"
 #include "experiments/harness/run_cells.h"
 
 namespace hermesh {
 
-std::vector<Json> with_current_plots(std::vector<Json> rows) {
+std::vector<Json> with_current_plots(std::vector<Json> rows, const std::filesystem::path& folder) {
+  if (!is_kept(folder, experiments_folder().parent_path())) return rows;
   std::map<std::string, Json> plots;  // null where there is no file
   for (Json& row : rows) {
     const std::string name = text_at(row, "/experiment");

@@ -120,18 +120,22 @@ SourceState checked_out(const std::filesystem::path& folder) {
   return state;
 }
 
-void check_may_be_kept(const std::filesystem::path& out, const std::filesystem::path& checkout, const SourceState& built) {
-  const auto is_below = [](const std::filesystem::path& path, const std::filesystem::path& folder) {
-    const std::filesystem::path way = path.lexically_relative(folder);
+bool is_kept(const std::filesystem::path& folder, const std::filesystem::path& checkout) {
+  const auto is_below = [](const std::filesystem::path& path, const std::filesystem::path& above) {
+    const std::filesystem::path way = path.lexically_relative(above);
     return !way.empty() && *way.begin() != "..";
   };
-  const std::filesystem::path target = std::filesystem::weakly_canonical(std::filesystem::absolute(out));
+  const std::filesystem::path target = std::filesystem::weakly_canonical(std::filesystem::absolute(folder));
   const std::filesystem::path results = std::filesystem::weakly_canonical(checkout / "results");
-  if (!is_below(target, results) || is_below(target, results / "local")) return;
+  return is_below(target, results) && !is_below(target, results / "local");
+}
+
+void check_may_be_kept(const std::filesystem::path& out, const std::filesystem::path& checkout, const SourceState& built) {
+  if (!is_kept(out, checkout)) return;
   const SourceState now = checked_out(checkout);
   const auto refuse = [&](const std::string& why) {
     throw Error(out.string() + " takes rows of a clean commit alone, and " + why +
-                "; name a folder such as results/local/" + target.filename().string() + " instead");
+                "; name a folder such as results/local/" + std::filesystem::absolute(out).lexically_normal().filename().string() + " instead");
   };
   if (now.commit == "unknown" || !now.dirty) refuse("there is no git checkout to compare the program with");
   if (built.commit != now.commit)

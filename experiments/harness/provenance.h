@@ -25,8 +25,10 @@ const SourceState& source_state();
 /// The state of the git checkout that a folder is in.
 SourceState checked_out(const std::filesystem::path& folder);
 
-/// Rows of folders that are kept in the project must name what made them. Does nothing for a folder that is not below
-/// `checkout`/results, or is below results/local.
+/// Whether rows in the folder are the project's own: it is below `checkout`/results, and not below results/local.
+bool is_kept(const std::filesystem::path& folder, const std::filesystem::path& checkout);
+
+/// Rows of folders that are kept in the project must name what made them. Does nothing for a folder that is not.
 /// @throws Error unless the program was built from the commit that is checked out, and neither had changes.
 void check_may_be_kept(const std::filesystem::path& out, const std::filesystem::path& checkout, const SourceState& built);
 

@@ -38,7 +38,7 @@ void write_report(const std::filesystem::path& folder, const std::string& format
   const std::vector<Json> rows = read_rows(folder);
   if (format == "plots") {
     const std::filesystem::path place = std::filesystem::is_directory(folder) ? folder : folder.parent_path();
-    write_plots(with_current_plots(rows), place, out);
+    write_plots(with_current_plots(rows, place), place, out);
     return write_forest_plots(judge_ablations(rows), place, out);
   }
   if (format == "csv") return write_csv(rows, out);

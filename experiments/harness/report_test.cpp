@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "experiments/cases/cases.h"
+#include "experiments/harness/current_plots.h"
 #include "experiments/harness/harness.h"
 #include "experiments/harness/table.h"
 
@@ -182,6 +184,18 @@ TEST(Report, UnknownFormatsAndEmptyFoldersAreErrors) {
     EXPECT_NE(text.str().find("ball"), std::string::npos) << format;
   }
   std::filesystem::remove_all(folder);
+}
+
+/// A row of somebody's own experiment that has the name of one of the project's is drawn as it asks itself.
+TEST(Report, RowsOfOnesOwnKeepTheirPlots) {
+  Json row = row_of("1", "mine", 1.0);
+  row["plots"] = Json::array();
+  const auto folder = std::filesystem::temp_directory_path() / ("hermesh-own-" + std::to_string(getpid()));
+  EXPECT_EQ(with_current_plots({row}, folder)[0].at("plots").size(), 0U);
+  const std::filesystem::path results = experiments_folder().parent_path() / "results";
+  EXPECT_EQ(with_current_plots({row}, results / "local" / "headline")[0].at("plots").size(), 0U);
+  row["experiment"] = "pareto";
+  EXPECT_GT(with_current_plots({row}, results / "pareto")[0].at("plots").size(), 0U);
 }
 
 }  // namespace

@@ -7,10 +7,10 @@
 
 #include "algorithms/core/error.h"
 #include "experiments/harness/failures.h"
+#include "experiments/harness/harness.h"
 #include "experiments/harness/rows.h"
-#include "experiments/sweep/shards.h"
 #include "experiments/ledger/compare.h"
-#include "experiments/pictures/plot.h"
+#include "experiments/sweep/shards.h"
 
 namespace hermesh {
 namespace {
@@ -188,7 +188,7 @@ void merge_shards(const fs::path& out, const std::vector<fs::path>& shards, std:
   } catch (const fs::filesystem_error& error) {
     throw Error("cannot merge into " + out.string() + ": " + error.what());
   }
-  write_plots(rows, out, text);
+  write_report(out, "plots", text);
   text << "Rows: " << file.string() << ", " << rows.size() << " cells of " << shards.size() << " shards\n";
   write_failures(rows, text);
 }

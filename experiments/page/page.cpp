@@ -118,7 +118,7 @@ void write_page(const std::filesystem::path& folder, const MeshChoice& choice, R
   std::vector<Json> before = baseline_rows(place, rows);
   // Earlier runs come first, since of a table's runs the last one is shown.
   rows.insert(rows.begin(), std::make_move_iterator(before.begin()), std::make_move_iterator(before.end()));
-  rows = with_current_plots(std::move(rows));
+  rows = with_current_plots(std::move(rows), place);
   const std::vector<PageMesh> meshes = page_meshes(place, rows, choice, context);
   std::string name = std::filesystem::absolute(place).lexically_normal().filename().string();
   if (name.empty())
