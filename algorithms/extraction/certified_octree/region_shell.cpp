@@ -26,6 +26,7 @@ constexpr double kFirst = 0.5, kLow = 0.125;
 /// What keeps within this cosine, of a little less than 45 degrees, of one direction keeps within a right
 /// angle of each other.
 constexpr double kUpright = 0.7072;
+static_assert(2 * kUpright * kUpright - 1 > 0, "the cosine of twice the angle is that of less than a right angle");
 
 /// What single precision may make of places a few blocks away from the one that they are relative to, in
 /// voxels, and far more.
