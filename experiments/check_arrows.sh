@@ -13,6 +13,7 @@ find algorithms reference validation -name node_modules -prune -o \( -name '*.h'
       may["hermite"] = "core lattice search io"
       may["voxelization"] = may["extraction"] = may["hermite"] " hermite"
       may["fracture"] = may["voxelization"] " voxelization extraction"
+      may["remesh"] = may["voxelization"] " voxelization extraction"
       may["thesis"] = may["fracture"] " fracture"
       may["variants"] = may["thesis"] " thesis"
       may["reference"] = may["fracture"] " fracture"

@@ -103,6 +103,31 @@ class FunctionSampler {
   double reach_ = 0.0;
 };
 
+/// The first layer of a leaf's samples along an axis, a bit each in any order.
+std::uint64_t first_layer(const BlockMask& inside, int axis) {
+  if (axis == 0) return inside[0];
+  std::uint64_t bits = 0;
+  for (std::size_t x = 0; x < 8; ++x)
+    for (int i = 0; i < 8; ++i) bits |= (inside[x] >> (axis == 1 ? i : 8 * i) & 1) << (8 * x + std::size_t(i));
+  return bits;
+}
+
+/// Refuses data of which a leaf is missing that owns a crossing edge: a block was passed over whose function is steeper
+/// than was said. Whoever read such data would look for crossings that are not there.
+void check_complete(const FloatHermite& hermite) {
+  for (const SignLeaf& leaf : hermite.leaves)
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int way : {-1, 1}) {
+        Lower next = leaf.lower;
+        next[axis] += 8 * way;
+        if (hermite.find(next)) continue;
+        const std::uint64_t seen = way < 0 ? first_layer(leaf.inside, axis) : leaf.beyond[axis];
+        if (seen != (hermite.sign_without_leaf(next) ? ~std::uint64_t{0} : 0))
+          throw Error("the function changes its sign in a block that it seems far from: it is steeper than the bound of its "
+                      "slope says");
+      }
+}
+
 }  // namespace
 
 FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld& placement, const Lower& lower,
@@ -145,6 +170,7 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
       result.leaves.push_back(candidate.leaf);
       result.crossings.insert(result.crossings.end(), candidate.crossings.begin(), candidate.crossings.end());
     }
+  check_complete(result);
   return result;
 }
 

@@ -94,6 +94,12 @@ TEST(FunctionSampler, RefusesWhatItCannotClose) {
   EXPECT_THROW(sample(sphere(Vector3d::Zero(), 3.0), 9, 0.0), Error);
   const AnalyticSurface nowhere{[](const Vector3d&) { return std::nan(""); }, [](const Vector3d& p) { return p; }};
   EXPECT_THROW(sample(nowhere, 9, 1e-6), Error);
+  // Steeper than it says: blocks that the surface passes through would be passed over, and the data would be in pieces.
+  AnalyticSurface steep = sphere(Vector3d::Zero(), 30.0);
+  steep.value = [](const Vector3d& p) { return 4.0 * (p.norm() - 30.0); };
+  EXPECT_THROW(sample(steep, 40, 1e-6), Error);
+  steep.lipschitz = 4.0;
+  EXPECT_FALSE(sample(steep, 40, 1e-6).leaves.empty());
   EXPECT_TRUE(sample(sphere(Vector3d::Constant(0.5), 0.1), 9, 1e-6).leaves.empty());  // between the samples
 }
 

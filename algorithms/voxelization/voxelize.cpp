@@ -260,11 +260,13 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
     result.distance = assemble_distance(band, Widths(wide, options.voxel_size), result.is_signed);
   }
   // Without signs `near` is as wide as asked.
-  if (result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior)) {
+  const bool is_wider = result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior);
+  if (is_wider || (options.boundary && result.is_signed)) result.boundary = boundary_triangles(soup, boundary);
+  if (is_wider) {
     const Stage stage(context, "wide band");
     band = {};
-    widen_band(boundary_triangles(soup, boundary), options.voxel_size, near, wide, *result.distance,
-               result.nearest.get(), context);
+    widen_band(result.boundary, options.voxel_size, near, wide, *result.distance, result.nearest.get(), context);
+    if (!options.boundary) result.boundary = {};
   }
   result.distance->setTransform(transform_at(mesh.origin, options.voxel_size));
   if (result.nearest) result.nearest->setTransform(transform_at(mesh.origin, options.voxel_size));

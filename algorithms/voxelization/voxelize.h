@@ -5,6 +5,7 @@
 #include "algorithms/core/openvdb_trees.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/voxelization/distance/wide_band.h"
 #include "algorithms/voxelization/sign_rule.h"
 
 namespace hermesh {
@@ -15,7 +16,8 @@ struct VoxelizeOptions {
   double exterior_band = 3.0;  ///< voxels, at least 1
   double interior_band = 3.0;  ///< voxels, at least 1
   SignRule signs = SignRule::automatic;
-  bool nearest = false;  ///< whether `Voxelization::nearest` is made, too
+  bool nearest = false;   ///< whether `Voxelization::nearest` is made, too
+  bool boundary = false;  ///< whether `Voxelization::boundary` is made, too
 };
 
 /// The grids that voxelize() makes, on one lattice.
@@ -29,6 +31,10 @@ struct Voxelization {
   /// `distance`, or −1 where only the cap of a hole is near, in a grid named "triangle-id" with background −1. Null
   /// unless asked for.
   openvdb::Int32Grid::Ptr nearest;
+  /// The triangles that distances inside are measured to: the mesh's, numbered as triangulated() does, without those that
+  /// are inner for certain, the outer pieces of those that are inner in part, and the caps of holes. Empty unless asked
+  /// for, and without signs.
+  BoundaryTriangles boundary = {};
 };
 
 /// Narrow band of distances to any polygons: in any order and orientation, twice, degenerate, intersecting, open.

@@ -89,6 +89,23 @@ TEST_P(Shapes, TheGradientOfTheDistanceIsTheNormalAndItsDivergenceTwiceTheMeanCu
   EXPECT_GT(compared, 100);
 }
 
+TEST_P(Shapes, NoPlaceOfTheSurfaceIsNearerThanTheDistance) {
+  const std::vector<Vector3d> from = places(*shape_, 200);
+  for (const Vector3d& p : from) {
+    const double distance = shape_->distance(p), bounded = shape_->bounded_distance(p);
+    EXPECT_LE(std::abs(bounded), std::abs(distance) + 1e-12);
+    EXPECT_EQ(bounded < 0, distance < 0);
+    if (std::abs(distance) > shape_->exact_within()) continue;
+    for (const Vector3d& other : from) {
+      EXPECT_LE(std::abs(bounded - shape_->bounded_distance(other)), (p - other).norm() + 1e-12);
+      const Vector3d q = shape_->nearest(other).point;
+      // Where a shape was cut off, there is another surface, which may be nearer.
+      if (!shape_->describes(q) || !shape_->describes(p)) continue;
+      EXPECT_LE(std::abs(distance), (p - q).norm() + 1e-9);
+    }
+  }
+}
+
 TEST_P(Shapes, AreaAndVolumeAreThoseOfFineFacets) {
   const PolygonMesh facets = shape_->facets(0.02);
   // Of the gyroid, which has no end, there are neither.

@@ -52,7 +52,7 @@ LevelSet exact_level_set(const PlacedShape& shape, double voxel_size, double hal
     };
     // The farthest sample is 3.5 √3 voxels from the middle, and a distance changes by no more than the way.
     const Vector3d middle = place(blocks[i]) + Vector3d::Constant(3.5 * voxel_size);
-    if (std::abs(shape.distance(middle)) > reach + 6.1 * voxel_size) return;
+    if (std::abs(shape.bounded_distance(middle)) > reach + 6.1 * voxel_size) return;
     Leaf* leaf = new Leaf(blocks[i], float(reach), false);
     for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
       const double distance = shape.distance(place(leaf->offsetToGlobalCoord(n)));
@@ -81,7 +81,7 @@ LevelSet exact_level_set(const PlacedShape& shape, double voxel_size, double hal
 FloatHermite exact_hermite(const PlacedShape& shape, const LevelSet& level_set, RunContext& context) {
   const LatticeBox box = lattice_box(shape, level_set.voxel_size(), 4);
   const AnalyticSurface surface = {
-      .value = [&](const Vector3d& p) { return shape.distance(p); },
+      .value = [&](const Vector3d& p) { return shape.bounded_distance(p); },
       .gradient = [&](const Vector3d& p) -> Vector3d { return shape.nearest(p).normal; }};
   return sample_function(surface, placement_of(*level_set.grid().grid), box.lower, box.upper, 1e-9, context);
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <unordered_map>
 
 #include "algorithms/core/error.h"
@@ -306,24 +307,16 @@ class Cube final : public ExactShape {
 class Gyroid final : public ExactShape {
  public:
   SurfacePlace nearest(const Vector3d& p) const override {
-    // The nearest point q solves q - p + m ∇g(q) = 0 and g(q) = 0. A first guess from the gradient, then
-    // Newton's method for all four unknowns, which doubles the digits in each step.
-    Vector3d q = p;
-    for (int i = 0; i < 3; ++i) q -= value(q) / std::max(gradient(q).squaredNorm(), 0.1) * gradient(q);
-    double m = (p - q).dot(gradient(q)) / gradient(q).squaredNorm();
-    for (int i = 0; i < 12; ++i) {
-      const Vector3d slope = gradient(q);
-      Eigen::Matrix4d system = Eigen::Matrix4d::Zero();
-      system.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() + m * hessian(q);
-      system.topRightCorner<3, 1>() = slope;
-      system.bottomLeftCorner<1, 3>() = slope.transpose();
-      Eigen::Vector4d rest;
-      rest << q - p + m * slope, value(q);
-      const Eigen::Vector4d step = system.partialPivLu().solve(-rest);
-      q += step.head<3>();
-      m += step[3];
-      if (step.norm() < 1e-14) break;
+    // Newton's method finds one of the places where the way to p is normal to the surface, so it starts from several.
+    std::optional<Vector3d> best;
+    for (int start = 0; start < 7; ++start) {
+      Vector3d from = p;
+      if (start > 0) from[(start - 1) / 2] += start % 2 == 0 ? kStart : -kStart;
+      const std::optional<Vector3d> found = foot(p, from);
+      if (found && (!best || (*found - p).squaredNorm() < (*best - p).squaredNorm())) best = found;
     }
+    if (!best) throw Error("no place of the gyroid was found that is nearest to a point");
+    const Vector3d q = *best;
     const Vector3d slope = gradient(q);
     const Eigen::Matrix3d bend = hessian(q);
     const double length = slope.norm();
@@ -351,6 +344,7 @@ class Gyroid final : public ExactShape {
     return std::max(sheet, ball);
   }
   double exact_within() const override { return kExact; }
+  double bounded_distance(const Vector3d& p) const override { return std::max(value(p) / kSteepest, p.norm() - kBall); }
   std::optional<double> area() const override { return std::nullopt; }
   std::optional<double> volume() const override { return std::nullopt; }
   Vector3d half_size() const override { return Vector3d::Constant(kBall); }
@@ -358,6 +352,29 @@ class Gyroid final : public ExactShape {
   PolygonMesh facets(double) const override { return {}; }
 
  private:
+  /// A place q of the surface with q - p + m ∇g(q) = 0, or none: a first guess from the gradient at `start`, then Newton's
+  /// method for all four unknowns, which doubles the digits in each step.
+  static std::optional<Vector3d> foot(const Vector3d& p, const Vector3d& start) {
+    Vector3d q = start;
+    for (int i = 0; i < 3; ++i) q -= value(q) / std::max(gradient(q).squaredNorm(), 0.1) * gradient(q);
+    double m = (p - q).dot(gradient(q)) / gradient(q).squaredNorm();
+    for (int i = 0; i < 20; ++i) {
+      const Vector3d slope = gradient(q);
+      Eigen::Matrix4d system = Eigen::Matrix4d::Zero();
+      system.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() + m * hessian(q);
+      system.topRightCorner<3, 1>() = slope;
+      system.bottomLeftCorner<1, 3>() = slope.transpose();
+      Eigen::Vector4d rest;
+      rest << q - p + m * slope, value(q);
+      const Eigen::Vector4d step = system.partialPivLu().solve(-rest);
+      q += step.head<3>();
+      m += step[3];
+      if (!q.allFinite()) return std::nullopt;
+      if (step.norm() < 1e-13) return q;
+    }
+    return std::nullopt;
+  }
+
   static double value(const Vector3d& p) {
     const Vector3d u = kScale * p;
     return std::sin(u.x()) * std::cos(u.y()) + std::sin(u.y()) * std::cos(u.z()) +
@@ -377,6 +394,7 @@ class Gyroid final : public ExactShape {
     return kScale * kScale * h;
   }
   static constexpr double kScale = 2.0, kBall = 1.25;
+  static constexpr double kStart = 0.2;  ///< how far from a point Newton's method starts, too
   /// Each component of the gradient, kScale (cos a cos b − sin c sin a), is at most √2 kScale, so its length
   /// √6 kScale.
   static constexpr double kSteepest = 2.0 * std::numbers::sqrt2 * std::numbers::sqrt3;

@@ -36,6 +36,9 @@ class ExactShape {
   /// Signed distance to the surface, negative inside; exact where |distance| is below exact_within().
   virtual double distance(const Eigen::Vector3d& p) const = 0;
   virtual double exact_within() const { return 1e300; }
+  /// A function with the sign of distance() that is never larger in size than the distance, and whose slope is at most 1:
+  /// the distance itself where that is one everywhere.
+  virtual double bounded_distance(const Eigen::Vector3d& p) const { return distance(p); }
 
   virtual std::optional<double> area() const = 0;    ///< none: it has no closed form
   virtual std::optional<double> volume() const = 0;  ///< none: it has no closed form
@@ -75,6 +78,7 @@ class PlacedShape {
 
   const ExactShape& shape() const { return *shape_; }
   double distance(const Eigen::Vector3d& p) const { return shape_->distance(to_shape_ * p); }
+  double bounded_distance(const Eigen::Vector3d& p) const { return shape_->bounded_distance(to_shape_ * p); }
   bool describes(const Eigen::Vector3d& p) const { return shape_->describes(to_shape_ * p); }
   SurfacePlace nearest(const Eigen::Vector3d& p) const;
   std::vector<Eigen::Vector3d> crease_points(double spacing) const;

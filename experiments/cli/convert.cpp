@@ -9,6 +9,7 @@
 #include "algorithms/io/written_precision.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "experiments/cli/adaptivity.h"
+#include "experiments/cli/bounded.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
@@ -157,6 +158,7 @@ void add_conversions(CLI::App& app, Session& session) {
     Paths paths;
     VoxelizeArguments voxelizing;
     ExtractArguments extracting;
+    BoundArguments bound;
   };
   auto arguments = std::make_shared<Arguments>();
 
@@ -185,10 +187,16 @@ void add_conversions(CLI::App& app, Session& session) {
   command = add_command(app, session, "remesh", "Polygons to a level set and back to a mesh");
   add_paths(*command, arguments->paths, kMeshIn, kMeshOut);
   add_json_option(*command, session);
-  add_voxelize_options(*command, arguments->voxelizing);
+  CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
   add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
-  command->callback([arguments, &session] {
-    session.command = [arguments, &session] {
+  add_bound_options(*command, *size, arguments->bound);
+  command->callback([arguments, command, &session] {
+    session.command = [arguments, command, &session] {
+      if (arguments->bound.asked()) {
+        check_bound_options(*command, arguments->bound, arguments->voxelizing);
+        return run_bounded(arguments->paths, arguments->bound, arguments->voxelizing, session);
+      }
+      refuse_without_bound(*command);
       return run_remesh(arguments->paths, arguments->voxelizing, arguments->extracting, session);
     };
   });

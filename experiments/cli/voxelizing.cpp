@@ -40,7 +40,7 @@ void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std
   command.add_option("OUT", paths.out, out)->required();
 }
 
-void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
   // Exactly one of them, or the program would have to guess a size.
   CLI::Option_group* size = command.add_option_group("Voxel size, exactly one of");
   size->add_option("--voxel-size", arguments.voxel_size, "Edge of a voxel in world units")
@@ -73,6 +73,7 @@ void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool 
       .add_option("--interior-band", arguments.interior_band,
                   "Width of the band inside, in voxels (default: 3)")
       ->check(band);
+  return size;
 }
 
 Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,

@@ -28,8 +28,9 @@ struct VoxelizeArguments {
 };
 
 void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
-/// Adds the options of VoxelizeArguments, with `with_like` also `--like`, which takes the lattice of a volume.
-void add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
+/// Adds the options of VoxelizeArguments, with `with_like` also `--like`, which takes the lattice of a volume. Returns the
+/// group of those that say how large a voxel is, of which exactly one has to be given.
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
 
 /// Options from texts key=value, checked against `declared`. @throws Error also for an option that is given twice.
 Options parse_options(const std::string& variant, const std::vector<OptionSpec>& declared,

@@ -1,0 +1,577 @@
+#include "algorithms/remesh/bounded_remesh.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/extraction/certified_collapse/certified_decimation.h"
+#include "algorithms/extraction/certified_mesh.h"
+#include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
+#include "algorithms/hermite/hermite_view.h"
+#include "algorithms/hermite/samplers.h"
+#include "algorithms/search/surface_distance.h"
+#include "algorithms/voxelization/inside/oriented_winding.h"
+#include "algorithms/voxelization/voxelize.h"
+
+namespace hermesh {
+namespace {
+
+// Shares of the error. A uniform mesh that is within kUniform of it leaves the collapses the rest; points of
+// both surfaces tell only nearly how far these are apart, which kUnseen allows for.
+constexpr double kUniform = 0.6, kUsed = 0.97, kUnseen = 1.1;
+/// Voxels of the first try and, where nobody says so, the smallest, in errors.
+constexpr double kFirstVoxel = 1.5, kSmallestVoxel = 0.125;
+/// Voxels along the longest side at least, so that there is something to collapse.
+constexpr double kFewestVoxels = 16.0;
+/// A tolerance that was lowered below this many voxels is of no more use.
+constexpr double kLeastTolerance = 0.02;
+/// How often tolerances are lowered before voxels are made smaller.
+constexpr int kLowerings = 3;
+constexpr float kLowering = 0.4f;
+/// Voxels that a wall has to be thick so that a mesh may show it, and the voxel that is tried for a
+/// thickness.
+constexpr double kThinVoxels = 2.0, kVoxelOfThickness = 0.9;
+/// Places at most that are asked how thick the surface is there.
+constexpr std::size_t kMostAsked = 2000;
+/// Radius of the pieces of polygons that are asked whether they bound something, in errors.
+constexpr double kFreePiece = 1.0 / 16.0;
+/// How far from a polygon its sides are looked at, in extents of the polygons: what is thinner is rounding.
+constexpr double kOffSurface = 1e-6;
+/// The first limit that is tried, and what is added to the largest distance that was met, in errors.
+constexpr double kFirstLimit = 0.8, kLimitStep = 0.02;
+
+/// The surface that the bound is about, relative to the mesh's origin.
+struct Surface {
+  std::vector<Eigen::Vector3f> points;
+  std::vector<Triangle> triangles;
+  std::vector<Triangle> caps;  ///< what closes holes
+  double cap_area = 0.0;
+};
+
+double area(const std::vector<Eigen::Vector3f>& points, const Triangle& t) {
+  const Eigen::Vector3d a = points[t[0]].cast<double>(), b = points[t[1]].cast<double>(),
+                        c = points[t[2]].cast<double>();
+  return 0.5 * (b - a).cross(c - a).norm();
+}
+
+/// The polygons' surface as a voxelization found it. `turns` are those of orient_faces().
+Surface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turns, bool over_holes) {
+  Surface surface{std::move(boundary.points), {}, {}, 0.0};
+  for (std::size_t i = 0; i < boundary.triangles.size(); ++i) {
+    const Triangle& t = boundary.triangles[i];
+    if (boundary.ids[i] < 0) {
+      surface.caps.push_back(t);
+      surface.cap_area += area(surface.points, t);
+    } else if (turns.empty() || turns[static_cast<std::size_t>(boundary.ids[i])] != 0) {
+      surface.triangles.push_back(t);
+    }
+  }
+  if (over_holes) surface.triangles.insert(surface.triangles.end(), surface.caps.begin(), surface.caps.end());
+  return surface;
+}
+
+Eigen::Vector3d middle(const Surface& surface, std::uint32_t triangle) {
+  const Triangle& t = surface.triangles[triangle];
+  return (surface.points[t[0]].cast<double>() + surface.points[t[1]].cast<double>() +
+          surface.points[t[2]].cast<double>()) /
+         3.0;
+}
+
+/// The uniform mesh at one voxel size, and the surface that it stands for.
+struct Attempt {
+  double voxel_size;
+  Surface surface;
+  FilePoints file;
+  FineMesh fine;                             ///< index space
+  std::vector<Eigen::Vector3f> file_points;  ///< world units relative to the placement's origin
+  Eigen::Vector3d offset;                    ///< of the placement's origin from the mesh's, world units
+
+  std::vector<Eigen::Vector3f> in_file(const std::vector<Eigen::Vector3d>& points) const {
+    std::vector<Eigen::Vector3f> result(points.size());
+    std::transform(points.begin(), points.end(), result.begin(),
+                   [&](const auto& p) { return file.in_file(p); });
+    return result;
+  }
+};
+
+/// A place, in the frame of the mesh's origin, where the surfaces are farther apart than they should be.
+struct Far {
+  Eigen::Vector3d place;
+  double distance;
+  bool of_surface;         ///< it lies on the polygons' surface, else on the mesh
+  std::uint32_t triangle;  ///< of that surface
+};
+
+class BoundedRemesher {
+ public:
+  BoundedRemesher(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context)
+      : mesh_(mesh),
+        options_(options),
+        context_(context),
+        longest_(bounds(mesh).size().maxCoeff()),
+        extent_(bounds(mesh).size().norm()) {
+    for (const Triangle& t : triangulated(mesh)) area_ += area(mesh.points, t);
+  }
+
+  BoundedMesh run() {
+    if (options_.signs == SignRule::winding_number) {
+      winding_.emplace(IndexSoup(mesh_, 1.0));
+      turns_ = winding_->orientation().turns;
+    }
+    result_.error = options_.error;
+    result_.voxel_size = std::min(kFirstVoxel * options_.error, longest_ / kFewestVoxels);
+    while (!try_at(result_.voxel_size) && result_.unmet.empty()) ++result_.rounds;
+    if (!result_.unmet.empty()) result_.mesh = {};
+    return std::move(result_);
+  }
+
+ private:
+  /// Whether the bound was reached with voxels of this size. If not, result_.voxel_size is the size to try
+  /// next, or result_.unmet says why there is none.
+  bool try_at(double voxel_size) {
+    std::optional<Attempt> made = attempt(voxel_size);
+    if (!made) return smaller(voxel_size);
+    const Attempt& now = *made;
+    result_.hole_area = now.surface.cap_area;
+    const SurfaceDistance surface(now.surface.points, now.surface.triangles);
+    std::vector<double> apart;  // by point of the uniform mesh, about how far the surfaces are apart there
+    const std::vector<Far> far = look(now, surface, apart);
+    if (!far.empty()) {
+      double worst = 0.0;
+      for (const Far& f : far) worst = std::max(worst, f.distance);
+      if (explained(now, far)) return false;
+      return smaller(voxel_size, now.surface, std::clamp(kUniform * options_.error / worst, 0.35, 0.7), far);
+    }
+    return collapse(now, surface, apart);
+  }
+
+  /// Voxels and their uniform mesh; none if that is empty.
+  std::optional<Attempt> attempt(double voxel_size) {
+    Voxelization volume =
+        voxelize(mesh_, {.voxel_size = voxel_size, .signs = options_.signs, .boundary = true}, context_);
+    if (!volume.is_signed)
+      throw Error(
+          "the polygons give no inside that a distance could be measured to (a note says why); give a sheet a "
+          "thickness with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
+    const LevelSet level_set = make_level_set(volume.distance);
+    FloatHermite hermite = sample_polygons(level_set, 0.0, mesh_, context_);
+    if (hermite.crossings.empty()) return std::nullopt;
+    if (options_.written_in_single) {
+      hermite.placement.offset += hermite.placement.origin;
+      hermite.placement.origin.setZero();
+    }
+    const auto view = view_of(hermite, context_);
+    const FilePoints file(hermite.placement);
+    UniformMesh uniform = uniform_mesh(view, {}, file, context_);
+    Attempt result{
+        voxel_size,
+        surface_of(std::move(volume.boundary), turns_, options_.over_holes),
+        file,
+        FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads)),
+        {},
+        file.placement().origin - mesh_.origin};
+    if (result.surface.triangles.empty()) return std::nullopt;
+    result.file_points = result.in_file(result.fine.points());
+    return result;
+  }
+
+  /// How far the surfaces are apart at the points of both, and where that is more than the collapses can do
+  /// with.
+  std::vector<Far> look(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
+    const Stage stage(context_, "compare");
+    const double most = 4.0 * options_.error;
+    const std::size_t n = now.file_points.size();
+    apart.assign(n, 0.0);
+    std::vector<Eigen::Vector3d> at(n);
+    parallel_blocks(n, context_, [&](std::size_t i) {
+      at[i] = now.offset + now.file_points[i].cast<double>();
+      apart[i] = surface.at(at[i], most);
+    });
+    std::vector<Far> far;
+    const double limit = 0.85 * options_.error;
+    for (std::size_t i = 0; i < n; ++i)
+      if (apart[i] > limit) far.push_back({at[i], apart[i], false, now.fine.around(std::uint32_t(i))[0]});
+
+    // The other way, each place of the surface counts at the corners of the uniform triangle that is nearest.
+    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
+    std::vector<std::uint8_t> used(now.surface.points.size(), 0);
+    std::vector<std::uint32_t> one(used.size(), 0);
+    for (std::uint32_t t = 0; t < now.surface.triangles.size(); ++t)
+      for (const std::uint32_t p : now.surface.triangles[t]) used[p] = 1, one[p] = t;
+    std::vector<NearestTriangle> nearest(used.size(), NearestTriangle{0.0, TriangleTree::kNone});
+    parallel_blocks(used.size(), context_, [&](std::size_t i) {
+      if (used[i])
+        nearest[i] = uniform.nearest(now.surface.points[i].cast<double>() - now.offset, most * most);
+    });
+    std::vector<double> own = apart;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (!used[i]) continue;
+      const double distance = std::sqrt(nearest[i].squared);
+      if (distance > limit) {
+        const Far place{now.surface.points[i].cast<double>(), distance, true, one[i]};
+        if (bounds_nothing(now.surface, place)) continue;
+        far.push_back(place);
+      }
+      if (nearest[i].triangle == TriangleTree::kNone) continue;
+      for (const std::uint32_t p : now.fine.triangles()[nearest[i].triangle])
+        own[p] = std::max(own[p], distance);
+    }
+    // A triangle's own places are no farther away than its corners, or not by much.
+    apart = own;
+    for (const Triangle& t : now.fine.triangles()) {
+      const double largest = std::max({own[t[0]], own[t[1]], own[t[2]]});
+      for (const std::uint32_t p : t) apart[p] = std::max(apart[p], largest);
+    }
+    return far;
+  }
+
+  /// Collapses with what is left of the error, and the proof.
+  bool collapse(const Attempt& now, const SurfaceDistance& surface, const std::vector<double>& apart) {
+    std::vector<float> tolerance(apart.size());
+    for (std::size_t i = 0; i < apart.size(); ++i)
+      tolerance[i] = float(std::max(0.0, (kUsed * options_.error - kUnseen * apart[i]) / now.voxel_size));
+    std::vector<Far> far;
+    for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
+      const CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
+      far = prove(now, surface, coarse);
+      if (far.empty()) {
+        PolygonMesh& mesh = result_.mesh;
+        mesh.origin = now.file.placement().origin;
+        mesh.points = now.in_file(coarse.points);
+        mesh.triangles = coarse.triangles;
+        return true;
+      }
+      if (uniform_is_far(now, surface, far) || !lower_around(now, far, tolerance)) break;
+    }
+    if (explained(now, far)) return false;
+    return smaller(now.voxel_size, now.surface, 0.6, far);
+  }
+
+  /// What of the polygons need not be near: pieces that bound nothing.
+  FreePieces free_pieces() const {
+    if (!winding_) return {};
+    return {.is_free = [this](const std::array<Eigen::Vector3d, 3>& piece) { return bounds_nothing(piece); },
+            .radius = kFreePiece * options_.error};
+  }
+
+  /// Holds the mesh against the surface, both ways; the places where it is too far away, or may be.
+  std::vector<Far> prove(const Attempt& now, const SurfaceDistance& surface, const CertifiedMesh& coarse) {
+    const Stage stage(context_, "prove");
+    const std::vector<Eigen::Vector3f> points = now.in_file(coarse.points);
+    const DistanceFromSurface to = hold(surface, points, now.offset, coarse.triangles, {});
+    const SurfaceDistance mesh(points, coarse.triangles);
+    // Polygons that have the same on both sides are not part of the surface; each piece of them that is not
+    // near is asked.
+    const DistanceFromSurface from =
+        hold(mesh, now.surface.points, -now.offset, now.surface.triangles, free_pieces());
+    result_.to_surface = to.upper;
+    result_.from_surface = from.upper;
+    result_.free_area = from.free_area;
+    std::vector<Far> far;
+    for (const FarTriangle& f : to.far)
+      far.push_back({f.place + now.offset, f.distance, false, coarse.fine_triangle[f.triangle]});
+    for (const FarTriangle& f : from.far) far.push_back({f.place, f.distance, true, f.triangle});
+    return far;
+  }
+
+  /// SurfaceDistance::hold() with the smallest limit, to some hundredths of the error, that holds and is no
+  /// larger than that.
+  DistanceFromSurface hold(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,
+                           const Eigen::Vector3d& offset, std::vector<Triangle> triangles,
+                           const FreePieces& free) const {
+    DistanceFromSurface all;
+    std::vector<std::uint32_t> numbers(triangles.size());
+    std::iota(numbers.begin(), numbers.end(), 0u);
+    double limit = kFirstLimit * options_.error;
+    while (true) {
+      const bool is_last = limit >= options_.error;
+      if (is_last) limit = options_.error;
+      // Before the last limit nothing is free, for what is far then may still be near enough.
+      DistanceFromSurface now =
+          to.hold(points, offset, triangles, limit, context_, is_last ? free : FreePieces{});
+      all.upper = std::max(all.upper, now.upper);
+      all.free_area += now.free_area;
+      for (FarTriangle& f : now.far) f.triangle = numbers[f.triangle];
+      if (is_last || now.far.empty()) {
+        all.far = std::move(now.far);
+        return all;
+      }
+      // Only what was too far for this limit is held against the next.
+      std::vector<Triangle> left;
+      double farthest = limit;
+      std::vector<std::uint32_t> left_numbers;
+      for (const FarTriangle& f : now.far) {
+        left_numbers.push_back(f.triangle);
+        farthest = std::max(farthest, f.distance);
+      }
+      for (std::size_t i = 0, k = 0; i < numbers.size() && k < left_numbers.size(); ++i)
+        if (numbers[i] == left_numbers[k]) left.push_back(triangles[i]), ++k;
+      triangles = std::move(left);
+      numbers = std::move(left_numbers);
+      limit = farthest + kLimitStep * options_.error;
+    }
+  }
+
+  /// Whether the uniform mesh itself is too far at one of these places, so that no tolerance helps.
+  bool uniform_is_far(const Attempt& now, const SurfaceDistance& surface, const std::vector<Far>& far) const {
+    // Of the uniform mesh those triangles are asked that the failing ones stand for, or are near to.
+    std::vector<Triangle> of_surface, of_uniform;
+    std::vector<std::uint8_t> taken(now.fine.triangles().size(), 0);
+    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
+    for (const Far& f : far) {
+      if (f.of_surface) {
+        of_surface.push_back(now.surface.triangles[f.triangle]);
+        continue;
+      }
+      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(now.voxel_size);
+      uniform.for_each_near(f.place - now.offset - reach, f.place - now.offset + reach, [&](std::uint32_t t) {
+        if (!std::exchange(taken[t], 1)) of_uniform.push_back(now.fine.triangles()[t]);
+      });
+    }
+    const SurfaceDistance to_uniform(now.file_points, now.fine.triangles());
+    return !surface.hold(now.file_points, now.offset, of_uniform, options_.error, context_).far.empty() ||
+           !to_uniform
+                .hold(now.surface.points, -now.offset, of_surface, options_.error, context_, free_pieces())
+                .far.empty();
+  }
+
+  /// Lowers the tolerance around the places. False if it is next to nothing at one of them already.
+  bool lower_around(const Attempt& now, const std::vector<Far>& far, std::vector<float>& tolerance) {
+    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
+    std::vector<std::uint8_t> lowered(tolerance.size(), 0);
+    bool useful = true;
+    for (const Far& f : far) {
+      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(options_.error + 2.0 * now.voxel_size);
+      const Eigen::Vector3d p = f.place - now.offset;
+      float largest = 0.0f;
+      uniform.for_each_near(p - reach, p + reach, [&](std::uint32_t t) {
+        for (const std::uint32_t corner : now.fine.triangles()[t]) {
+          lowered[corner] = 1;
+          largest = std::max(largest, tolerance[corner]);
+        }
+      });
+      useful = useful && largest > kLeastTolerance;
+    }
+    for (std::size_t i = 0; i < tolerance.size(); ++i)
+      if (lowered[i]) tolerance[i] *= kLowering;
+    return useful;
+  }
+
+  /// Whether the solid is on both sides of a piece of a polygon, or on neither, in the frame of the mesh's
+  /// origin.
+  bool bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const {
+    const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
+    if (!normal.allFinite() || normal.isZero()) return true;  // it has no area
+    const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0,
+                          step = kOffSurface * extent_ * normal;
+    return (winding_->number().at(middle + step) > 0.5) == (winding_->number().at(middle - step) > 0.5);
+  }
+  /// Whether a triangle of the surface bounds nothing beside one of its corners.
+  bool bounds_nothing(const Surface& surface, const Far& at) const {
+    if (!winding_) return false;
+    const Triangle& t = surface.triangles[at.triangle];
+    std::array<Eigen::Vector3d, 3> piece;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d from_corner = surface.points[t[i]].cast<double>() - at.place;
+      // On the edges of the triangle normals do not mean what they say, so the piece is a small one beside
+      // the corner.
+      piece[i] =
+          at.place +
+          std::min(1.0, kFreePiece * options_.error / std::max(from_corner.norm(), 1e-300)) * from_corner;
+    }
+    return bounds_nothing(piece);
+  }
+
+  /// Says so if smaller voxels would not help, for a hole is closed there.
+  bool explained(const Attempt& now, const std::vector<Far>& far) {
+    if (!options_.over_holes && !now.surface.caps.empty()) {
+      const SurfaceDistance caps(now.surface.points, now.surface.caps);
+      for (const Far& f : far)
+        if (!f.of_surface && f.distance > options_.error && caps.at(f.place, f.distance) < f.distance)
+          add(Unmet::hole, f);
+    }
+    sort_unmet();
+    return !result_.unmet.empty();
+  }
+
+  void add(Unmet why, const Far& f) { result_.unmet.push_back({why, mesh_.origin + f.place, f.distance}); }
+
+  void sort_unmet() {
+    constexpr std::size_t kMost = 10;
+    std::stable_sort(result_.unmet.begin(), result_.unmet.end(),
+                     [](const UnmetPlace& a, const UnmetPlace& b) { return a.distance > b.distance; });
+    if (result_.unmet.size() > kMost) result_.unmet.resize(kMost);
+  }
+
+  /// Asks for smaller voxels where there was no mesh at all, from which all polygons are far.
+  bool smaller(double voxel_size) {
+    const Surface all{mesh_.points, triangulated(mesh_), {}, 0.0};
+    std::vector<Far> far;
+    for (std::uint32_t t = 0; t < all.triangles.size(); ++t)
+      far.push_back({middle(all, t), std::numeric_limits<double>::infinity(), true, t});
+    return smaller(voxel_size, all, 0.5, far);
+  }
+
+  /// The voxels for which there may be as many points as allowed: a surface crosses some one and a half cells
+  /// for each square of a voxel's side.
+  double smallest_voxel() const {
+    const double allowed =
+        options_.smallest_voxel > 0.0 ? options_.smallest_voxel : kSmallestVoxel * options_.error;
+    return std::max(allowed, std::sqrt(1.5 * area_ / options_.most_points));
+  }
+
+  /// Asks for smaller voxels: as small as what is far is thin, or `factor` of what they were where nothing
+  /// is. Gives up where these would be too many.
+  bool smaller(double voxel_size, const Surface& of, double factor, const std::vector<Far>& far) {
+    const SurfaceDistance surface(of.points, of.triangles);
+    const double smallest = smallest_voxel();
+    // Most of what is far is next to more of it, so that an even sample tells how thin it is. A twentieth of
+    // that may be thinner: a wedge is as thin as can be at its edge, and only there.
+    std::vector<std::pair<double, std::size_t>> thick;
+    for (std::size_t i = 0; i < far.size(); i += 1 + far.size() / kMostAsked)
+      if (const double found = thickness(of, surface, far[i]); std::isfinite(found))
+        thick.emplace_back(found, i);
+    std::sort(thick.begin(), thick.end());
+    const double thinnest =
+        thick.empty() ? std::numeric_limits<double>::infinity() : thick[thick.size() / 20].first;
+    const bool is_thin = std::isfinite(thinnest), too_thin = is_thin && kThinVoxels * thinnest < smallest;
+    if (is_thin) factor = std::clamp(kVoxelOfThickness * thinnest / voxel_size, 0.2, 0.7);
+    if (!too_thin && voxel_size > 1.1 * smallest) {
+      result_.voxel_size = std::max(smallest, factor * voxel_size);
+      return false;
+    }
+    result_.voxel_size = smallest;
+    result_.thickness = is_thin ? thinnest : 0.0;
+    if (is_thin)
+      add(Unmet::thin, far[thick[thick.size() / 20].second]);
+    else
+      for (const Far& f : far) add(Unmet::thin, f);
+    sort_unmet();
+    return false;
+  }
+
+  /// The width of the wall or of the gap beside a place of the surface that is far from the mesh: how far the
+  /// next polygon is along the normal or against it, whichever is less. Infinity for a place of the mesh, and
+  /// where there is none within four errors.
+  double thickness(const Surface& of, const SurfaceDistance& surface, const Far& at) const {
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    if (!at.of_surface || at.distance <= options_.error) return kNone;
+    const Triangle& t = of.triangles[at.triangle];
+    std::array<Eigen::Vector3d, 3> corner;
+    for (int i = 0; i < 3; ++i) corner[i] = of.points[t[i]].cast<double>();
+    const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+    const Eigen::Vector3d from = middle(of, at.triangle);
+    const double most = 4.0 * options_.error;
+    double nearest = most;
+    const Eigen::Vector3d reach = most * normal.cwiseAbs();
+    const TriangleTree& tree = surface.tree();
+    tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {
+      const Eigen::Vector3d a = tree.corner(other, 0), b = tree.corner(other, 1), c = tree.corner(other, 2);
+      // Neighbours are no opposite wall.
+      for (const Eigen::Vector3d& p : corner)
+        if (p == a || p == b || p == c) return;
+      // The line along the normal in barycentric coordinates of the triangle (Möller & Trumbore 1997).
+      const Eigen::Vector3d across = normal.cross(c - a);
+      const double slope = (b - a).dot(across);
+      if (std::abs(slope) < 1e-12 * (b - a).norm() * (c - a).norm()) return;
+      const double u = (from - a).dot(across) / slope;
+      const Eigen::Vector3d turned = (from - a).cross(b - a);
+      const double v = normal.dot(turned) / slope, way = std::abs((c - a).dot(turned) / slope);
+      if (u < 0 || v < 0 || u + v > 1 || way < kOffSurface * extent_) return;
+      nearest = std::min(nearest, way);
+    });
+    return nearest < most ? nearest : kNone;
+  }
+
+  const PolygonMesh& mesh_;
+  const BoundedRemeshOptions& options_;
+  RunContext& context_;
+  double longest_, extent_, area_ = 0.0;  ///< world units
+  std::optional<OrientedWinding> winding_;
+  std::vector<std::int8_t> turns_;
+  BoundedMesh result_;
+};
+
+std::string text(double value) {
+  std::ostringstream stream;
+  stream << value;
+  return stream.str();
+}
+
+}  // namespace
+
+BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options,
+                           RunContext& context) {
+  if (!(options.error > 0.0) || !std::isfinite(options.error))
+    throw Error("the error must be a finite number above 0");
+  if (mesh.empty()) throw Error("there are no polygons to remesh");
+  return BoundedRemesher(mesh, options, context).run();
+}
+
+BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
+                             const BoundedRemeshOptions& options, RunContext& context) {
+  constexpr int kTries = 12;
+  const double extent = bounds(mesh).size().norm();
+  // On a smooth surface the triangles are in inverse proportion to the error; a sphere's 0.01 of the extent
+  // needs some hundreds.
+  BoundedRemeshOptions now = options;
+  now.error = std::clamp(3.0 * extent / double(triangles), 1e-5 * extent, 0.1 * extent);
+  double too_small = 0.0, enough = std::numeric_limits<double>::infinity();
+  std::optional<BoundedMesh> best;
+  for (int i = 0; i < kTries; ++i) {
+    BoundedMesh made = bounded_remesh(mesh, now, context);
+    if (!made.unmet.empty()) {
+      if (best) break;
+      return made;
+    }
+    const double count = double(made.mesh.triangle_count());
+    if (count <= double(triangles)) {
+      enough = now.error;
+      best = std::move(made);
+      if (count >= 0.9 * double(triangles)) break;
+    } else {
+      too_small = now.error;
+    }
+    if (too_small >= 0.5 * extent) break;
+    double next = now.error * std::clamp(count / (0.95 * double(triangles)), 0.1, 10.0);
+    if (next <= too_small || next >= enough)
+      next = std::isfinite(enough) ? std::sqrt(too_small * enough) : 2.0 * too_small;
+    if (too_small > 0.0 && enough / too_small < 1.02) break;
+    now.error = std::min(next, 0.5 * extent);
+  }
+  if (!best)
+    throw Error("no mesh with at most " + std::to_string(triangles) +
+                " triangles was found that is within half of the polygons' extent of them; allow more");
+  return std::move(*best);
+}
+
+std::string explanation(const BoundedMesh& refused) {
+  const UnmetPlace& first = refused.unmet.front();
+  std::ostringstream place;
+  place << "(" << first.place.x() << ", " << first.place.y() << ", " << first.place.z() << ")";
+  const std::string at = "the error of " + text(refused.error) + " is not kept at " + place.str() + ": ";
+  const std::string distance = std::isfinite(first.distance)
+                                   ? " the surfaces are at least " + text(first.distance) + " apart there"
+                                   : std::string(" nothing of the polygons shows");
+  switch (first.why) {
+    case Unmet::hole:
+      return at + "the polygons have a hole there, which has to be closed;" + distance +
+             "; give --over-holes to let the bound hold elsewhere";
+    case Unmet::thin:
+      break;
+  }
+  const std::string what = refused.thickness > 0.0 ? "a wall or gap of " + text(refused.thickness) +
+                                                         " there is too thin for voxels of "
+                                                   : "something there is too small for voxels of ";
+  return at + what + text(refused.voxel_size) + ", the smallest that may be;" + distance +
+         "; raise the error, or allow smaller ones with --smallest-voxel and --limit-points";
+}
+
+}  // namespace hermesh

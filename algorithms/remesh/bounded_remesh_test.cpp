@@ -1,0 +1,178 @@
+#include "algorithms/remesh/bounded_remesh.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "algorithms/voxelization/voxelize_for_tests.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using voxelize_for_tests::sphere;
+
+/// The box as twelve triangles.
+PolygonMesh box(const Vector3d& low, const Vector3d& high) {
+  PolygonMesh mesh = voxelize_for_tests::box(low, high);
+  mesh.triangles = triangulated(mesh);
+  mesh.quads.clear();
+  return mesh;
+}
+
+/// Distance from the surface of the box from `low` to `high`, in closed form.
+double from_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
+  const Vector3d outside = (low - p).cwiseMax(p - high);
+  if (outside.maxCoeff() > 0) return outside.cwiseMax(0.0).norm();
+  return -outside.maxCoeff();
+}
+
+/// Calls f with places spread over each triangle.
+template <class F>
+void for_each_place(const PolygonMesh& mesh, int n, F&& f) {
+  for (const Triangle& t : mesh.triangles)
+    for (int i = 0; i <= n; ++i)
+      for (int j = 0; i + j <= n; ++j)
+        f(Vector3d((i * mesh.world(t[0]) + j * mesh.world(t[1]) + (n - i - j) * mesh.world(t[2])) /
+                   double(n)));
+}
+
+BoundedMesh remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options) {
+  RunContext context;
+  return bounded_remesh(mesh, options, context);
+}
+
+TEST(BoundedRemesh, ABoxIsKeptToTheErrorWithAFewTriangles) {
+  const Vector3d low(0.1, -0.2, 0.3), high(1.1, 0.5, 0.9);
+  const BoundedMesh made = remesh(box(low, high), {.error = 0.02});
+  ASSERT_TRUE(made.unmet.empty());
+  EXPECT_LE(made.to_surface, 0.02);
+  EXPECT_LE(made.from_surface, 0.02);
+  EXPECT_LE(made.mesh.triangle_count(), 60u);
+  EXPECT_GE(made.mesh.triangle_count(), 12u);
+  double farthest = 0;
+  for_each_place(made.mesh, 24,
+                 [&](const Vector3d& p) { farthest = std::max(farthest, from_box(p, low, high)); });
+  EXPECT_LE(farthest, made.to_surface);
+  // From each corner of the box some place of the mesh is no farther.
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d at(corner & 1 ? high.x() : low.x(), corner & 2 ? high.y() : low.y(),
+                      corner & 4 ? high.z() : low.z());
+    double nearest = 1;
+    for (std::size_t i = 0; i < made.mesh.points.size(); ++i)
+      nearest = std::min(nearest, (made.mesh.world(i) - at).norm());
+    EXPECT_LE(nearest, 0.03);
+  }
+}
+
+TEST(BoundedRemesh, ASphereNeedsFewerTrianglesTheLargerTheError) {
+  const PolygonMesh polygons = sphere(Vector3d(5, 5, 5), 1.0, 48);
+  std::size_t before = 1u << 30;
+  for (const double error : {0.015, 0.04, 0.1}) {
+    const BoundedMesh made = remesh(polygons, {.error = error});
+    ASSERT_TRUE(made.unmet.empty());
+    for_each_place(made.mesh, 8, [&](const Vector3d& p) {
+      // The polygons themselves lie up to 0.0022 within the sphere.
+      EXPECT_LE(std::abs((p - Vector3d(5, 5, 5)).norm() - 1.0), error + 0.0022);
+    });
+    EXPECT_LT(made.mesh.triangle_count(), before);
+    before = made.mesh.triangle_count();
+  }
+}
+
+TEST(BoundedRemesh, FacesWithinTheSolidDoNotCount) {
+  // Of two boxes that overlap, the faces of each within the other bound nothing.
+  PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  const PolygonMesh other = box(Vector3d(0.5, 0.25, 0.25), Vector3d(1.5, 0.75, 0.75));
+  const auto first = std::uint32_t(both.points.size());
+  both.points.insert(both.points.end(), other.points.begin(), other.points.end());
+  for (const Triangle& t : other.triangles)
+    both.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  const BoundedMesh made = remesh(both, {.error = 0.03});
+  ASSERT_TRUE(made.unmet.empty());
+  // No place of the mesh is deep within either box.
+  for_each_place(made.mesh, 16, [&](const Vector3d& p) {
+    const double in_first = std::min((p - Vector3d(0, 0, 0)).minCoeff(), (Vector3d(1, 1, 1) - p).minCoeff());
+    const double in_other =
+        std::min((p - Vector3d(0.5, 0.25, 0.25)).minCoeff(), (Vector3d(1.5, 0.75, 0.75) - p).minCoeff());
+    EXPECT_LE(in_first, 0.031);
+    EXPECT_LE(in_other, 0.031);
+  });
+}
+
+TEST(BoundedRemesh, AHoleIsRefusedWithItsPlaceUnlessItMayBeClosed) {
+  PolygonMesh open = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  // The lid at z = 1 goes.
+  std::erase_if(open.triangles, [&](const Triangle& t) {
+    return std::all_of(t.begin(), t.end(), [&](std::uint32_t p) { return open.world(p).z() == 1.0; });
+  });
+  ASSERT_EQ(open.triangles.size(), 10u);
+  const BoundedMesh refused = remesh(open, {.error = 0.05});
+  ASSERT_FALSE(refused.unmet.empty());
+  EXPECT_TRUE(refused.mesh.empty());
+  EXPECT_EQ(refused.unmet.front().why, Unmet::hole);
+  const Vector3d at = refused.unmet.front().place;
+  EXPECT_GT(at.z(), 0.5);
+  EXPECT_GT(at.x(), 0.0);
+  EXPECT_LT(at.x(), 1.0);
+  EXPECT_NE(explanation(refused).find("hole"), std::string::npos);
+
+  const BoundedMesh closed = remesh(open, {.error = 0.05, .over_holes = true});
+  ASSERT_TRUE(closed.unmet.empty());
+  EXPECT_GT(closed.hole_area, 0.5);
+  EXPECT_FALSE(closed.mesh.empty());
+}
+
+TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
+  const PolygonMesh wall = box(Vector3d(0, 0, 0.01), Vector3d(1, 1, 0.0104));
+  const BoundedMesh refused = remesh(wall, {.error = 0.05});
+  ASSERT_FALSE(refused.unmet.empty());
+  EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
+  EXPECT_NEAR(refused.thickness, 0.0004, 1e-6);
+  // With voxels as small as the wall is thick it is there.
+  const BoundedMesh made = remesh(box(Vector3d(0, 0, 0.01), Vector3d(1, 1, 0.02)), {.error = 0.05});
+  ASSERT_TRUE(made.unmet.empty());
+  EXPECT_LE(made.voxel_size, 0.02);
+}
+
+TEST(BoundedRemesh, ABudgetIsKept) {
+  const PolygonMesh polygons = sphere(Vector3d(0, 0, 0), 1.0, 24);
+  RunContext context;
+  double before = 1.0;
+  for (const std::size_t budget : {100u, 300u}) {
+    const BoundedMesh made = remesh_to_budget(polygons, budget, {}, context);
+    ASSERT_TRUE(made.unmet.empty());
+    EXPECT_LE(made.mesh.triangle_count(), budget);
+    EXPECT_GE(made.mesh.triangle_count(), budget / 2);
+    EXPECT_LT(made.to_surface, before);
+    before = made.to_surface;
+  }
+}
+
+TEST(BoundedRemesh, RefusesWhatHasNoBound) {
+  RunContext context;
+  const PolygonMesh cube = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  for (const double error : {0.0, -1.0, std::nan(""), HUGE_VAL})
+    EXPECT_THROW(remesh(cube, {.error = error}), Error);
+  EXPECT_THROW(remesh(PolygonMesh(), {.error = 0.1}), Error);
+  PolygonMesh flat;
+  flat.points = {{0, 0, 0}, {1, 0, 0}, {0, 0, 0}};
+  flat.triangles = {{0, 1, 2}};
+  EXPECT_THROW(remesh(flat, {.error = 0.1}), Error);
+}
+
+TEST(BoundedRemesh, SameBytesAtAnyThreadCount) {
+  const PolygonMesh polygons = sphere(Vector3d(0.3, 0.2, 0.1), 1.0, 24);
+  std::vector<PolygonMesh> made;
+  for (const std::size_t threads : {1u, 2u, 7u}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    made.push_back(remesh(polygons, {.error = 0.03}).mesh);
+  }
+  EXPECT_EQ(made[0], made[1]);
+  EXPECT_EQ(made[0], made[2]);
+}
+
+}  // namespace
+}  // namespace hermesh

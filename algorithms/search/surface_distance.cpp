@@ -1,0 +1,172 @@
+#include "algorithms/search/surface_distance.h"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "algorithms/core/parallel.h"
+
+namespace hermesh {
+namespace {
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+// An end for what no search of this kind can tell, such as a place that is the limit away to the last digit.
+constexpr std::size_t kMostPieces = 4'000'000;
+constexpr double kSmallestPiece = 1.0 / 4096.0;  // of the limit
+
+double radius_about(const Eigen::Vector3d& middle, const Corners& piece) {
+  double squared = 0.0;
+  for (const Eigen::Vector3d& p : piece) squared = std::max(squared, (p - middle).squaredNorm());
+  return std::sqrt(squared);
+}
+
+}  // namespace
+
+/// A part of a triangle, and the triangle of the soup that was nearest to what it is cut from.
+struct SurfaceDistance::Piece {
+  Corners corners;
+  std::uint32_t nearest;
+};
+
+/// Looks at one triangle after another; each thread has its own, for the stack.
+class SurfaceDistance::Walk {
+ public:
+  Walk(const SurfaceDistance& surface, double limit, const Eigen::Vector3d& offset, const FreePieces& free,
+       const RunContext& context)
+      : context_(context),
+        tree_(surface.tree_),
+        limit_(limit - surface.rounding_),
+        search_(4.0 * limit * limit),
+        offset_(offset),
+        free_(free) {}
+
+  /// Whether each place of the triangle is within the limit; then `upper` is at least the largest distance,
+  /// else `far` has a place.
+  bool holds(const Corners& triangle, double& upper, double& free_area, FarTriangle& far) {
+    stack_.assign(1, {triangle, TriangleTree::kNone});
+    std::size_t pieces = 0;
+    while (!stack_.empty()) {
+      if (pieces % 1024 == 0) context_.check();
+      const Piece piece = stack_.back();
+      stack_.pop_back();
+      // What was nearest to the whole is most often near its parts, which saves the search.
+      if (piece.nearest != TriangleTree::kNone && all_near(piece.corners, piece.nearest, upper)) continue;
+      const Eigen::Vector3d middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
+      const NearestTriangle found = nearest(middle, piece.nearest);
+      const double distance = std::sqrt(found.squared), radius = radius_about(middle, piece.corners);
+      const bool is_far = found.triangle == TriangleTree::kNone || distance > limit_;
+      if (!is_far && distance + radius <= limit_) {
+        upper = std::max(upper, distance + radius);
+        continue;
+      }
+      const bool is_last = ++pieces > kMostPieces || radius < kSmallestPiece * limit_;
+      if (is_far && free_.is_free && (radius <= free_.radius || is_last) && is_free(piece.corners)) {
+        free_area +=
+            0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
+        continue;
+      }
+      // What is far for certain may still be cut into pieces some of which are free.
+      if (is_last || (is_far && (!free_.is_free || radius <= free_.radius))) {
+        far.place = middle;
+        far.distance = distance;
+        return false;
+      }
+      if (!is_far && found.triangle != piece.nearest && all_near(piece.corners, found.triangle, upper))
+        continue;
+      halve(piece.corners, found.triangle);
+    }
+    return true;
+  }
+
+ private:
+  bool all_near(const Corners& piece, std::uint32_t triangle, double& upper) const {
+    const Eigen::Vector3d a = tree_.corner(triangle, 0), b = tree_.corner(triangle, 1),
+                          c = tree_.corner(triangle, 2);
+    double largest = 0.0;
+    for (const Eigen::Vector3d& p : piece) {
+      largest = std::max(largest, squared_distance(p, a, b, c));
+      if (largest > limit_ * limit_) return false;
+    }
+    upper = std::max(upper, std::sqrt(largest));
+    return true;
+  }
+
+  /// The triangle nearest to p. The distance to `known`, which is near, saves most of the search.
+  NearestTriangle nearest(const Eigen::Vector3d& p, std::uint32_t known) const {
+    if (known == TriangleTree::kNone) return tree_.nearest(p, search_);
+    const double squared =
+        squared_distance(p, tree_.corner(known, 0), tree_.corner(known, 1), tree_.corner(known, 2));
+    const NearestTriangle found = tree_.nearest(p, std::min(squared, search_));
+    return found.triangle != TriangleTree::kNone || squared > search_ ? found
+                                                                      : NearestTriangle{squared, known};
+  }
+
+  bool is_free(Corners piece) const {
+    for (Eigen::Vector3d& p : piece) p -= offset_;
+    return free_.is_free(piece);
+  }
+
+  void halve(const Corners& piece, std::uint32_t nearest) {
+    int i = 0;
+    for (int side = 1; side < 3; ++side)
+      if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm())
+        i = side;
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    const Eigen::Vector3d half = 0.5 * (piece[i] + piece[j]);
+    stack_.push_back({{half, piece[j], piece[k]}, nearest});
+    stack_.push_back({{piece[i], half, piece[k]}, nearest});
+  }
+
+  const RunContext& context_;
+  const TriangleTree& tree_;
+  double limit_;            ///< less what rounding may add
+  double search_;           ///< square of how far the nearest triangle is looked for
+  Eigen::Vector3d offset_;  ///< of the frame in which pieces are asked for, from the soup's
+  const FreePieces& free_;
+  std::vector<Piece> stack_;
+};
+
+SurfaceDistance::SurfaceDistance(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
+    : tree_(points, triangles, 1.0) {
+  Bounds box;
+  for (const Triangle& t : triangles)
+    for (const std::uint32_t p : t) box.add(points[p].cast<double>());
+  rounding_ = 1e-7 * box.size().norm();
+}
+
+DistanceFromSurface SurfaceDistance::hold(std::span<const Eigen::Vector3f> points,
+                                          const Eigen::Vector3d& offset, std::span<const Triangle> triangles,
+                                          double limit, const RunContext& context,
+                                          const FreePieces& free) const {
+  // What each block of triangles came to has a place of its own, so that threads need no order.
+  constexpr std::size_t kBlock = 64;
+  std::vector<std::vector<FarTriangle>> far((triangles.size() + kBlock - 1) / kBlock);
+  std::vector<double> upper(far.size(), 0.0), free_area(far.size(), 0.0);
+  parallel_blocks(far.size(), context, [&](std::size_t block) {
+    Walk walk(*this, limit, offset, free, context);
+    for (std::size_t t = block * kBlock; t < std::min(triangles.size(), (block + 1) * kBlock); ++t) {
+      Corners corners;
+      for (int i = 0; i < 3; ++i) corners[i] = offset + points[triangles[t][i]].cast<double>();
+      FarTriangle found{static_cast<std::uint32_t>(t), {}, 0.0};
+      if (walk.holds(corners, upper[block], free_area[block], found)) continue;
+      found.place -= offset;
+      far[block].push_back(found);
+    }
+  });
+  DistanceFromSurface result;
+  for (std::size_t block = 0; block < far.size(); ++block) {
+    result.upper = std::max(result.upper, upper[block]);
+    result.free_area += free_area[block];
+    result.far.insert(result.far.end(), far[block].begin(), far[block].end());
+  }
+  result.upper += rounding_;
+  return result;
+}
+
+double SurfaceDistance::at(const Eigen::Vector3d& p, double most) const {
+  return std::sqrt(tree_.nearest(p, most * most).squared);
+}
+
+}  // namespace hermesh

@@ -1,0 +1,158 @@
+#include "experiments/cli/bounded.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "algorithms/io/written_precision.h"
+#include "algorithms/remesh/bounded_remesh.h"
+#include "experiments/cli/cli11.h"
+#include "experiments/cli/extracting.h"
+#include "experiments/cli/format.h"
+#include "experiments/cli/output_path.h"
+
+namespace hermesh::cli {
+namespace {
+
+struct Unit {
+  const char* name;
+  double metres;
+};
+constexpr std::array<Unit, 7> kUnits{
+    {{"um", 1e-6}, {"mm", 1e-3}, {"cm", 1e-2}, {"dm", 1e-1}, {"m", 1.0}, {"in", 0.0254}, {"ft", 0.3048}}};
+
+double metres(const std::string& unit) {
+  for (const Unit& known : kUnits)
+    if (unit == known.name) return known.metres;
+  throw UsageError("'" + unit + "' is no unit: um, mm, cm, dm, m, in and ft are");
+}
+
+SignRule sign_rule(const VoxelizeArguments& voxelizing) {
+  const std::string rule = voxelizing.signs.value_or("winding-number");
+  if (rule == "winding-number") return SignRule::winding_number;
+  if (rule == "flood-fill") return SignRule::flood_fill;
+  if (rule == "auto") return SignRule::automatic;
+  throw UsageError(
+      "a bound needs an inside: --signs must be winding-number (the default with --error and --triangles), "
+      "flood-fill or auto, not '" +
+      rule + "'");
+}
+
+}  // namespace
+
+void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& arguments) {
+  size.add_option(
+      "--error", arguments.error,
+      "Instead of a size the largest distance between the mesh and the polygons' solid, both ways, which is "
+      "proved: a number in the units of the file, with % of the diagonal of the polygons' box, or with a "
+      "unit "
+      "(0.05mm), for which --units says what the file's numbers are");
+  size.add_option("--triangles", arguments.triangles,
+                  "Instead of a size the number of triangles at most: the mesh with the smallest proved "
+                  "distance that was "
+                  "found for them")
+      ->check(CLI::Range(std::int64_t(4), std::int64_t(1) << 31));
+  CLI::Option_group* group = command.add_option_group("With --error or --triangles");
+  group->add_option("--units", arguments.units, "Unit of the file's numbers: um, mm, cm, dm, m, in, ft");
+  group->add_flag(
+      "--over-holes", arguments.over_holes,
+      "Let the mesh close holes, where no polygon is near that a distance could be proved to; the distance "
+      "there is to the surface on which the winding number is 1/2");
+  group
+      ->add_option("--limit-points", arguments.most_points,
+                   "Points of the finest mesh at most (default: 3e7, some 9 GiB); the bound is refused where "
+                   "it needs more")
+      ->check(CLI::Range(1e3, 1e9));
+  group
+      ->add_option(
+          "--smallest-voxel", arguments.smallest_voxel,
+          "Edge of the smallest voxel that may be tried, in the units of the file (default: an eighth of the "
+          "error); the bound is refused where a wall or gap is too thin for it")
+      ->check(CLI::PositiveNumber);
+}
+
+void check_bound_options(const CLI::App& command, const BoundArguments& arguments,
+                         const VoxelizeArguments& voxelizing) {
+  refuse_idle(command,
+              {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
+               "--isovalue", "--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid"},
+              "with --error and --triangles the method is chosen for the bound");
+  sign_rule(voxelizing);
+  if (arguments.error.empty()) {
+    refuse_idle(command, {"--units"}, "there is no --error that has a unit");
+    return;
+  }
+  error_in_file_units(arguments.error, arguments.units, 1.0);
+}
+
+void refuse_without_bound(const CLI::App& command) {
+  refuse_idle(command, {"--units", "--over-holes", "--limit-points", "--smallest-voxel"},
+              "it needs --error or --triangles");
+}
+
+double error_in_file_units(const std::string& text, const std::string& units, double diagonal) {
+  double value = 0.0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const std::string unit(end, text.data() + text.size());
+  if (failure != std::errc() || !std::isfinite(value) || value <= 0.0)
+    throw UsageError("--error must be a number above 0, such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
+  if (unit == "%" || unit.empty()) {
+    if (!units.empty()) throw UsageError("--units has no effect: --error '" + text + "' has no unit");
+    return unit.empty() ? value : value / 100.0 * diagonal;
+  }
+  const double wanted = metres(unit);
+  if (units.empty())
+    throw UsageError("--error '" + text +
+                     "' has a unit, and mesh files have none: say with --units what the file's numbers are");
+  return value * wanted / metres(units);
+}
+
+int run_bounded(const Paths& paths, const BoundArguments& arguments, const VoxelizeArguments& voxelizing,
+                Session& session) {
+  check_mesh_output(paths.out);
+  const PolygonMesh mesh = read_polygons(paths.in, session);
+  const double diagonal = bounds(mesh).size().norm();
+  BoundedRemeshOptions options{.signs = sign_rule(voxelizing),
+                               .over_holes = arguments.over_holes,
+                               .most_points = arguments.most_points,
+                               .smallest_voxel = arguments.smallest_voxel,
+                               .written_in_single = is_written_in_single(paths.out)};
+  if (!arguments.triangles) options.error = error_in_file_units(arguments.error, arguments.units, diagonal);
+  const Stopwatch watch;
+  const BoundedMesh made = about_file(paths.in, [&] {
+    if (!(diagonal > 0.0)) throw Error("the polygons have no extent");
+    return arguments.triangles
+               ? remesh_to_budget(mesh, std::size_t(*arguments.triangles), options, session.context)
+               : bounded_remesh(mesh, options, session.context);
+  });
+  session.context.check();
+  if (!made.unmet.empty()) throw Error("'" + paths.in + "': " + explanation(made) + "; nothing was written");
+  session.context.figure("error_asked", made.error);
+  session.context.figure("certified_to_polygons", made.to_surface);
+  session.context.figure("certified_from_polygons", made.from_surface);
+  session.context.figure("voxel_size", made.voxel_size);
+  session.context.figure("triangles", double(made.mesh.triangle_count()));
+  session.context.figure("rounds", made.rounds);
+  if (made.free_area > 0.0) {
+    session.context.figure("area_that_bounds_nothing", made.free_area);
+    session.context.note("polygons of " + text(made.free_area) +
+                         " in all, as area, have the same on both sides, by winding "
+                         "numbers at places a 16th of the error apart, and were taken to bound nothing");
+  }
+  if (made.hole_area > 0.0) {
+    session.context.figure("hole_area", made.hole_area);
+    if (arguments.over_holes)
+      session.context.note("holes of " + text(made.hole_area) +
+                           " in all were closed, where the bound is to the surface on "
+                           "which the winding number is 1/2");
+  }
+  print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
+  const double bound = std::max(made.to_surface, made.from_surface);
+  print_summary(session, "proved: the mesh is within " + text(made.to_surface) +
+                             " of the polygons' solid and that within " + text(made.from_surface) +
+                             " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)");
+  save(paths.out, made.mesh, session);
+  return kDone;
+}
+
+}  // namespace hermesh::cli
