@@ -21,7 +21,7 @@ find algorithms reference validation -name node_modules -prune -o \( -name '*.h'
     function room(path,    part) {
       split(path, part, "/")
       if (part[1] != "algorithms") return part[1]
-      return part[2] ~ /^variants\./ ? "variants" : part[2]
+      return part[2] ~ /^(variants|voxelizers)\./ ? "variants" : part[2]
     }
     /^#include "/ {
       split($0, quoted, "\"")
