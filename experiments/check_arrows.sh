@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-find algorithms reference validation -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
+find algorithms reference validation packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
   grep -v -e '_test\.cpp$' -e '/test_' -e '_for_tests' | sort | xargs awk '
     BEGIN {
       may["core"] = ""
@@ -17,6 +17,7 @@ find algorithms reference validation -name node_modules -prune -o \( -name '*.h'
       may["variants"] = may["thesis"] " thesis"
       may["reference"] = may["fracture"] " fracture"
       may["validation"] = "core io"
+      may["packages"] = may["thesis"] " thesis variants validation hermesh"
     }
     function room(path,    part) {
       split(path, part, "/")

@@ -19,9 +19,8 @@ void check_source_has_effect(const Extractor& extractor, const Options& options,
 /// A sentence that says where a surface runs into the end of the data; empty where it does not.
 std::string ends_note(const DataEnds& ends, Ends treatment);
 
-/// A sentence that says why a mesh is empty.
-/// @param of_polygons whether the volume was made of polygons in the same run
-/// @param extractor the name of the one that found nothing
+/// A sentence that says why the mesh that the extractor of that name made of a volume is empty; `of_polygons` is whether the
+/// volume was made of polygons in the same run.
 std::string no_surface(const LevelSet& volume, double isovalue, bool of_polygons, const std::string& extractor);
 
 }  // namespace hermesh

@@ -9,7 +9,7 @@ build=$1
 where=$build/package_check
 rm -rf "$where"
 mkdir -p "$where"
-for component in runtime development; do
+for component in runtime validation development; do
   cmake --install "$build" --prefix "$where/prefix" --component $component > "$where/install.log"
 done
 

@@ -1,5 +1,5 @@
 # What `cmake --install` installs: libraries, public headers, the files by which find_package(hermesh) finds them, the program.
-# Components: program, runtime (shared libraries), development.
+# Components: program, runtime and validation (shared libraries), development.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -19,7 +19,8 @@ endforeach()
 if(BUILD_SHARED_LIBS)
   list(APPEND libraries hermesh_shared)
   if(HERMESH_BUILD_VALIDATION)
-    list(APPEND libraries hermesh_validation_shared)
+    install(TARGETS hermesh_validation_shared EXPORT hermeshTargets
+      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT validation NAMELINK_COMPONENT development)
   endif()
 else()
   # Static libraries do not hold what they need; the package file finds it on the machine of the program that links them.
@@ -44,4 +45,9 @@ install(DIRECTORY packages/cpp/include/hermesh ${PROJECT_BINARY_DIR}/packages/cp
 
 if(HERMESH_BUILD_PROGRAM)
   install(TARGETS hermesh RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+endif()
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/hermesh COMPONENT development)
+
+if(HERMESH_DEBIAN_PACKAGES)
+  include(packages/debian/packages.cmake)
 endif()

@@ -17,6 +17,7 @@ namespace hermesh::HERMESH_V1 {
 /// Every call takes one, and may be given a fresh one for each (`Context()` where nothing is to be watched).
 /// One context serves one call at a time; cancel() and cancelled() alone may be called at any time from any
 /// thread.
+/// @snippet main.cpp cancel
 class Context {
  public:
   /// Called with the name of a stage and the share of it that is done, 0 to 1, from the thread that made the

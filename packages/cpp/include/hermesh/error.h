@@ -10,6 +10,7 @@ namespace hermesh::HERMESH_V1 {
 
 /// Bad input, or a failure that the caller can do something about. what() is one sentence, that of the
 /// program `hermesh`, that names the file or the option and says what to do.
+/// @snippet main.cpp error
 class HERMESH_API Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -55,8 +55,9 @@ HERMESH_API std::vector<MethodInfo> extractors();
 
 /// The surface of a volume. Where it runs into the end of the data, a note says so. The same bytes at any
 /// number of threads.
-/// @param source the polygons that the volume was made from, for extractors that take exact crossings; null:
-/// not at hand
+/// `source`, if not null, is the polygons that the volume was made from, for extractors that take exact
+/// crossings.
+/// @snippet main.cpp extract
 /// @throws Error where there is no surface (the sentence says why), for options that there are not or that
 /// have no effect; Cancelled.
 HERMESH_API Mesh extract(const Volume& volume, const ExtractOptions& options, Context& context,
@@ -64,13 +65,16 @@ HERMESH_API Mesh extract(const Volume& volume, const ExtractOptions& options, Co
 /// The surface of a solid, by an extractor that takes Hermite data. @throws Error as above; Cancelled.
 HERMESH_API Mesh extract(const Solid& solid, const ExtractOptions& options, Context& context);
 
-/// Polygons to a level set and back to a mesh. @throws Error as voxelize() and extract(); Cancelled.
+/// Polygons to a level set and back to a mesh.
+/// @snippet main.cpp remesh
+/// @throws Error as voxelize() and extract(); Cancelled.
 HERMESH_API Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
                         Context& context);
 
 /// The union, intersection or difference of two meshes' solids: both on one lattice, with their exact
 /// crossings, which keep the curves where their surfaces meet. A resolution counts along the larger one. What
 /// is lost between samples is a note.
+/// @snippet main.cpp combine
 /// @throws Error as voxelize() and extract(), for a result that is empty or everywhere thinner than a voxel;
 /// Cancelled.
 HERMESH_API Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOptions& voxelizing,

@@ -32,7 +32,7 @@ class HERMESH_API Solid {
   /// The solid of a level set, with crossings interpolated between samples. @throws Error for values that are
   /// not finite; Cancelled.
   static Solid of(const Volume& level_set, Context& context);
-  /// The same with the exact crossings of the polygons that the level set was made from. @throws Error;
+  /// A solid with the exact crossings of the polygons that the level set was made from. @throws Error;
   /// Cancelled.
   static Solid of(const Volume& level_set, const Mesh& source, Context& context);
 

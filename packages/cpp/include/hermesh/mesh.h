@@ -49,6 +49,7 @@ class HERMESH_API Mesh {
   Mesh();
 
   /// A mesh of arrays, which are copied once.
+  /// @snippet main.cpp arrays
   /// @param points x, y, z of each point, world units
   /// @param triangles three numbers of points each, from 0
   /// @param quads four numbers each
@@ -58,7 +59,7 @@ class HERMESH_API Mesh {
   /// of its own, and an attribute whose number of values does not fit.
   explicit Mesh(std::span<const float> points, std::span<const std::uint32_t> triangles,
                 std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
-  /// The same of points in double precision, which are kept in single precision about origin(), so that a
+  /// A mesh of points in double precision, which are kept in single precision about origin(), so that a
   /// model far from 0 loses nothing that matters. @throws Error as above.
   explicit Mesh(std::span<const double> points, std::span<const std::uint32_t> triangles,
                 std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
@@ -89,7 +90,7 @@ class HERMESH_API Mesh {
 
 /// Reads PLY (ASCII, binary), OBJ, OFF or STL, each also gzipped, told by the name's end and checked against
 /// the content. Polygons of more corners are cut into triangles. What was forgiven is a note.
-/// @param attributes whether attributes (PLY, OBJ) are read, too
+/// With `attributes` those of PLY and OBJ are read, too.
 /// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
 HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
 

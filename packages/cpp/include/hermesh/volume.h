@@ -97,7 +97,7 @@ class HERMESH_API Volume {
 
 /// Reads a scalar grid of a .vdb file: floats, or half and double precision, whole numbers, bool and masks as
 /// floats.
-/// @param name empty: the grid "sdf", or the only scalar grid there is
+/// An empty name takes the grid "sdf", or the only scalar grid there is.
 /// @throws Error for a file that is missing or damaged, and a grid that is not there or not scalar;
 /// Cancelled.
 HERMESH_API Volume read_vdb(const std::filesystem::path& path, Context& context,

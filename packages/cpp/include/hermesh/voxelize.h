@@ -32,15 +32,14 @@ HERMESH_API std::vector<MethodInfo> voxelizers();
 /// The level set "sdf" of any polygons, closed or not ("udf", without signs, where the option `signs` is
 /// "unsigned"). What of the surface passes between the samples is a note. The same bytes at any number of
 /// threads.
+/// @snippet main.cpp volume
 /// @throws Error for a mesh without polygons or extent, a size that does not fit in memory, and options that
 /// there are not; Cancelled.
 HERMESH_API Volume voxelize(const Mesh& mesh, const VoxelizeOptions& options, Context& context);
 
-/// Several volumes of one voxelization, by the voxelizers hermesh and thesis.
-/// @param grids names with commas between them: sdf, udf, fog, closest-point, triangle-id, attributes,
-/// attribute:NAME
-/// @param fog_exterior whether the fog's ramp lies over both bands, not the interior one alone
-/// @return a volume for each, in the order of the program's file
+/// Several volumes of one voxelization, by the voxelizers hermesh and thesis, in the order of the program's
+/// file: `grids` are names with commas between them, of sdf, udf, fog, closest-point, triangle-id, attributes,
+/// attribute:NAME. With `fog_exterior` the fog's ramp lies over both bands, not the interior one alone.
 /// @throws Error as voxelize(), and for a name that there is not; Cancelled.
 HERMESH_API std::vector<Volume> voxelize_grids(const Mesh& mesh, const std::string& grids,
                                                const VoxelizeOptions& options, Context& context,
