@@ -2,7 +2,8 @@
 # Whether another program can be built against what is installed: packages/cpp/check_package.sh BUILD; a quarter of a minute.
 # Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them there, which
 # must take less than 20 s, and runs it; counts headers and symbols, and prints sizes. With shared libraries all that they show
-# must be public names. Exits with 1 and says what is wrong.
+# must be public names. Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and says
+# what is wrong.
 set -euo pipefail
 cd "$(dirname "$0")"
 build=$1
@@ -37,3 +38,13 @@ echo "example: configured and built in $milliseconds ms"
 if [ $milliseconds -gt 20000 ]; then echo "that is more than 20 s"; exit 1; fi
 "$where/example/example" > "$where/output.txt" || { cat "$where/output.txt"; exit 1; }
 tail -1 "$where/output.txt"
+
+# Inside another project, which is configured and not built: that would take as long as the libraries do.
+cmake -S example -B "$where/parent" -G Ninja -DHERMESH_SOURCE="$(cd ../.. && pwd)" > "$where/parent.log" 2>&1 ||
+  { cat "$where/parent.log"; exit 1; }
+if grep -qE -e '-Werror' "$where/parent/build.ninja"; then echo "inside another project warnings are errors"; exit 1; fi
+if ninja -C "$where/parent" -t targets all | grep -qE '_test(:|$)|^hermesh: phony'; then
+  echo "inside another project more is built than the libraries"
+  exit 1
+fi
+echo "inside another project: the libraries alone"

@@ -5,7 +5,7 @@
 #   libhermesh-dev           headers and package files
 #   python3-hermesh          the Python module, where it is built
 if(NOT HERMESH_DEBIAN_MAINTAINER)
-  set(HERMESH_DEBIAN_MAINTAINER "The hermesh project <hermesh@lists.debian.org>")
+  set(HERMESH_DEBIAN_MAINTAINER "The hermesh project <hermesh@example.org>")
 endif()
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME hermesh)
@@ -40,29 +40,36 @@ endmacro()
 execute_process(COMMAND gzip -9nc ${PROJECT_SOURCE_DIR}/packages/debian/changelog
   OUTPUT_FILE ${PROJECT_BINARY_DIR}/packages/changelog.Debian.gz COMMAND_ERROR_IS_FATAL ANY)
 
+set(what
+"Narrow bands of exact distances from any soup of polygons, adaptive dual
+contouring free of self-intersection, Boolean operations on Hermite data and
+fracture, on the sparse volumes of OpenVDB.")
 set(same "(= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
-hermesh_package(program hermesh graphics "polygons to sparse volumes and back"
-  "The program hermesh remeshes scans into watertight, adaptive meshes, makes OpenVDB level sets of any polygons and meshes of any
-volume, combines solids and breaks them into pieces that fit, and judges meshes: topology, self-intersections and certified
-distances.")
-hermesh_package(runtime libhermesh1 libs "polygons to sparse volumes and back - shared library"
-  "The library behind the program hermesh: narrow bands of exact distances from any soup of polygons, adaptive dual contouring free of
-self-intersection, Boolean operations on Hermite data, fracture. This package holds the shared library.")
-hermesh_package(development libhermesh-dev libdevel "polygons to sparse volumes and back - development files"
-  "The library behind the program hermesh: narrow bands of exact distances from any soup of polygons, adaptive dual contouring free of
-self-intersection, Boolean operations on Hermite data, fracture. This package holds the headers, which include the C++ standard
-library alone, and the files by which find_package(hermesh) of CMake finds the libraries.")
+hermesh_package(program hermesh graphics "polygons to sparse volumes and back" "${what}
+This package holds the program, which also judges meshes: topology,
+self-intersections and certified distances.")
+hermesh_package(runtime libhermesh1 libs "polygons to sparse volumes and back - shared library" "${what}
+This package holds the shared library.")
+hermesh_package(development libhermesh-dev libdevel "polygons to sparse volumes and back - development files" "${what}
+This package holds the headers, which include the C++ standard library
+alone, and the files by which find_package(hermesh) of CMake finds all.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libhermesh1 ${same}")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS libopenvdb-dev)
 if(HERMESH_BUILD_VALIDATION)
   hermesh_package(validation libhermesh-validation1 libs "polygons to sparse volumes and back - judges of meshes"
-    "The judges of meshes behind the program hermesh: topology, self-intersections, certified Hausdorff distances, comparison of
-solids, and whether the pieces of a fracture fit. This package holds the shared library, which is under GPL-3.")
+"Topology, self-intersections, certified Hausdorff distances, comparison of
+solids, and whether the pieces of a fracture fit. This package holds the
+shared library, which is under GPL-3.")
+  set(CPACK_DEBIAN_VALIDATION_PACKAGE_DEPENDS "libhermesh1 ${same}")
   string(APPEND CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS ", libhermesh-validation1 ${same}")
 endif()
+# The machine's list of libraries is brought up to date once for all packages.
+foreach(component RUNTIME VALIDATION)
+  set(CPACK_DEBIAN_${component}_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packages/debian/triggers)
+endforeach()
 if(TARGET hermesh_python)
-  hermesh_package(python python3-hermesh python "polygons to sparse volumes and back - Python module"
-    "The Python module of hermesh: volumes and meshes as numpy arrays, voxelize, extract, remesh, combine, fracture, validate.")
+  hermesh_package(python python3-hermesh python "polygons to sparse volumes and back - Python module" "${what}
+This package holds the Python module, with volumes and meshes as numpy arrays.")
 endif()
 set(CPACK_COMPONENTS_ALL ${hermesh_components})
 include(CPack)
