@@ -30,6 +30,13 @@ for library in $(find "$where/prefix" -name '*.so' | sort); do
   if [ -n "$others" ]; then echo "shown, but not public:"; head -20 <<< "$others"; exit 1; fi
 done
 
+# The strictest compilers that are here find nothing to warn of in the headers.
+for compiler in g++ clang++; do
+  if command -v $compiler > /dev/null; then
+    $compiler -std=c++20 -Wall -Wextra -Wpedantic -Wshadow -Werror -fsyntax-only -I "$where/prefix/include" example/main.cpp
+  fi
+done
+
 begun=$(date +%s%N)
 { cmake -S example -B "$where/example" -G Ninja -DCMAKE_PREFIX_PATH="$where/prefix" && cmake --build "$where/example"; } \
   > "$where/example.log" 2>&1 || { cat "$where/example.log"; exit 1; }

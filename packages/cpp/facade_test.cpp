@@ -95,6 +95,14 @@ TEST(PublicMesh, GivesItsArraysBack) {
   EXPECT_EQ(given_back[0].floats[14], 0.5f);
   EXPECT_EQ(given_back[1].integers[2], -1);
   EXPECT_EQ(given_back[1].labels, (std::vector<std::string>{"a", "b"}));
+  const Mesh plain = mesh.with_attributes({});
+  EXPECT_TRUE(plain.attributes().empty());
+  EXPECT_TRUE(std::ranges::equal(plain.quads(), mesh.quads()));
+  EXPECT_EQ(plain.with_attributes(given_back).attributes()[0].floats[14], 0.5f);
+  EXPECT_EQ(complaint([&] {
+              mesh.with_attributes(std::vector<Attribute>{attributes[0], attributes[0]});
+            }),
+            "there are two attributes of the name 'normal'");
   // Copies share the arrays.
   const Mesh copy = mesh;
   EXPECT_EQ(copy.points().data(), mesh.points().data());
@@ -155,6 +163,14 @@ TEST(PublicVolume, GoesToAnArrayAndBack) {
   // Index (0.5, 3.25, 11), 1.5, 1.25 and 1 beyond the first sample, lies at 0.5 · index + (1, 2, 3).
   const std::vector<double> place = {1.25, 3.625, 8.5};
   EXPECT_FLOAT_EQ(volume.sample(place)[0], 150.0f + 12.5f + 1.0f);
+  // A background of one's own leaves the samples that have its value known.
+  options.background = 234.0f;
+  const Volume other = Volume::from_dense(values, dims, options);
+  EXPECT_EQ(other.active_voxels(), 60u);
+  EXPECT_EQ(other.background(), 234.0);
+  EXPECT_EQ(other.to_dense().values, values);
+  const std::vector<double> beyond = {100, 100, 100};
+  EXPECT_EQ(other.sample(beyond)[0], 234.0f);
 }
 
 TEST(PublicVolume, PlacementMayTurnAndMirror) {

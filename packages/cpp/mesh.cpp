@@ -124,6 +124,14 @@ MeshAttribute attribute_of(const Attribute& given, const PolygonMesh& mesh) {
   return attribute;
 }
 
+void take_attributes(std::span<const Attribute> attributes, PolygonMesh& mesh) {
+  for (const Attribute& given : attributes) {
+    if (std::ranges::any_of(mesh.attributes, [&](const MeshAttribute& a) { return a.name == given.name; }))
+      throw hermesh::Error("there are two attributes of the name '" + given.name + "'");
+    mesh.attributes.push_back(attribute_of(given, mesh));
+  }
+}
+
 template <class Number>
 PolygonMesh polygons_of(std::span<const Number> points, std::span<const std::uint32_t> triangles,
                         std::span<const std::uint32_t> quads, std::span<const Attribute> attributes) {
@@ -134,11 +142,7 @@ PolygonMesh polygons_of(std::span<const Number> points, std::span<const std::uin
   take<3>(triangles, points.size() / 3, "triangle", mesh.triangles);
   take<4>(quads, points.size() / 3, "quad", mesh.quads);
   take_points(points, mesh);
-  for (const Attribute& given : attributes) {
-    if (std::ranges::any_of(mesh.attributes, [&](const MeshAttribute& a) { return a.name == given.name; }))
-      throw hermesh::Error("there are two attributes of the name '" + given.name + "'");
-    mesh.attributes.push_back(attribute_of(given, mesh));
-  }
+  take_attributes(attributes, mesh);
   return mesh;
 }
 
@@ -200,6 +204,19 @@ std::vector<Attribute> Mesh::attributes() const {
     views.push_back(std::move(view));
   }
   return views;
+}
+
+Mesh Mesh::with_attributes(std::span<const Attribute> attributes) const {
+  return run([&] {
+    const PolygonMesh& own = arrays_->mesh;
+    PolygonMesh mesh;
+    mesh.origin = own.origin;
+    mesh.points = own.points;
+    mesh.triangles = own.triangles;
+    mesh.quads = own.quads;
+    take_attributes(attributes, mesh);
+    return Inside::mesh(std::move(mesh));
+  });
 }
 
 const PolygonMesh& Inside::sampled(const Mesh& mesh, PolygonMesh& copy) {

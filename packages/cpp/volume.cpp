@@ -1,4 +1,5 @@
 // Volumes: arrays, values, files, OpenVDB's grids.
+#include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/Prune.h>
@@ -244,12 +245,16 @@ Volume Volume::from_dense(std::span<const float> values, std::array<int, 3> dims
       openvdb::tools::pruneInactive(grid->tree());
       openvdb::tools::prune(grid->tree());
     } else {
-      // Every sample is known, also one with the background's value; constant regions become tiles.
-      grid->sparseFill(box, background, true);
-      grid->tree().voxelizeActiveTiles();
-      for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf)
-        for (auto value = leaf->beginValueOn(); value; ++value)
-          value.setValue(dense.getValue(value.getCoord()));
+      // Every sample is known, also one with the background's value: meanwhile the background is one that
+      // none has.
+      const float least_of_all = std::min(least, background);
+      const float none = std::nextafter(least_of_all, -std::numeric_limits<float>::infinity());
+      if (!std::isfinite(none))
+        throw hermesh::Error(
+            "the least sample is the least number of single precision, and no background lies below it");
+      openvdb::tools::changeBackground(grid->tree(), none);
+      openvdb::tools::copyFromDense(dense, *grid, 0.0f);
+      openvdb::tools::changeBackground(grid->tree(), background);
       openvdb::tools::prune(grid->tree());
     }
     return Inside::volume(make_level_set(grid));

@@ -8,16 +8,12 @@
 #define HERMESH_API __attribute__((visibility("default")))
 #endif
 
-// Other programs say hermesh::Mesh, which is hermesh::v1::Mesh. A later version with other members can live
-// in v2 beside it, so that programs compiled against either find their own. Only hermesh's own sources, whose
-// names live in namespace hermesh itself, have to say v1.
+// Other programs say hermesh::Mesh, which is hermesh::v1::Mesh. A later version with other members can live in v2
+// beside it, so that programs compiled against either find their own. Only hermesh's own sources, whose names live
+// in namespace hermesh itself, have to say v1.
 #ifdef HERMESH_IMPLEMENTATION
 #define HERMESH_V1 v1
-namespace hermesh::v1 {}
 #else
 /// The version of the public names.
-#define HERMESH_V1 v1
-namespace hermesh {
-inline namespace v1 {}
-}  // namespace hermesh
+#define HERMESH_V1 inline v1
 #endif

@@ -76,6 +76,10 @@ class HERMESH_API Mesh {
   std::span<const std::uint32_t> quads() const noexcept;      ///< four numbers of points each
   std::vector<Attribute> attributes() const;                  ///< views of the mesh's own arrays
 
+  /// A mesh of the same polygons with these attributes in place of their own; all arrays are copied. @throws
+  /// Error for an attribute whose number of values does not fit.
+  Mesh with_attributes(std::span<const Attribute> attributes) const;
+
   std::size_t point_count() const noexcept { return points().size() / 3; }
   std::size_t triangle_count() const noexcept { return triangles().size() / 3; }
   std::size_t quad_count() const noexcept { return quads().size() / 4; }
