@@ -5,8 +5,6 @@
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/extraction/certified_octree/certified_octree.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
-#include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/thesis/thesis_voxelizer.h"
 
 namespace hermesh {
 
@@ -46,26 +44,6 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .manifold = true, .oriented = true, .no_self_intersection = true},
        .options = certified_octree_options(),
        .extract = certified_octree},
-  };
-  return table;
-}
-
-std::span<const Voxelizer> our_voxelizers() {
-  // The order is that of lists and tables: ours first, then the thesis's as printed, which is kept for comparison.
-  static const std::vector<Voxelizer> table = {
-      {.name = "hermesh",
-       .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",
-       .options = hermesh_voxelizer_options(),
-       .voxelize = hermesh_voxelizer},
-      // Chapter 5 with its faults, for comparison.
-      {.name = "thesis",
-       .summary =
-           "sampled rasterisation, angle signs and layered expansion as printed (Aldén 2011, chapter 5)",
-       .options = thesis_voxelizer_options(),
-       .voxelize =
-           [](const VoxelizationInput& input) {
-             return thesis_voxelizer(input, thesis_voxelizer_options(input.options));
-           }},
   };
   return table;
 }

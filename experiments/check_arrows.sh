@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-find algorithms reference validation -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
+find algorithms reference validation packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
   grep -v -e '_test\.cpp$' -e '/test_' -e '_for_tests' | sort | xargs awk '
     BEGIN {
       may["core"] = ""
@@ -18,11 +18,12 @@ find algorithms reference validation -name node_modules -prune -o \( -name '*.h'
       may["variants"] = may["thesis"] " thesis"
       may["reference"] = may["fracture"] " fracture"
       may["validation"] = "core io"
+      may["packages"] = may["thesis"] " thesis remesh variants validation hermesh"
     }
     function room(path,    part) {
       split(path, part, "/")
       if (part[1] != "algorithms") return part[1]
-      return part[2] ~ /^variants\./ ? "variants" : part[2]
+      return part[2] ~ /^(variants|voxelizers)\./ ? "variants" : part[2]
     }
     /^#include "/ {
       split($0, quoted, "\"")

@@ -8,14 +8,14 @@ cd "$(dirname "$0")/.."
 bad=0
 
 topics() {  # of each folder: its files without ends and tests, each once
-  find algorithms reference validation experiments -type f ! -path '*/node_modules/*' ! -path '*/inputs/*' ! -path '*/foreign_meshes/*' |
+  find algorithms reference validation experiments packages/cpp -type f ! -path '*/node_modules/*' ! -path '*/inputs/*' ! -path '*/foreign_meshes/*' |
     sed -E '/_test\.cpp$|_for_tests\./d; s#\.[A-Za-z0-9]+$##' | sort -u | sed -E 's#/[^/]*$##' | uniq -c
 }
 topics | awk '$1 > 25 { print "topics: " $2 " shows " $1; bad = 1 } $1 > most { most = $1 } END {
   print "topics: at most " most " in a folder"; exit bad }' || bad=1
 
 headless='^[[:space:]]*///<?[[:space:]]*(Of|By|Those|That|The same|Does)[^A-Za-z]'
-find algorithms reference validation experiments -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print | sort |
+find algorithms reference validation experiments packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print | sort |
   xargs awk -v headless="$headless" '
     FNR == 1 { before = 0 }
     { here = $0 ~ /^[[:space:]]*\/\/\//
@@ -32,6 +32,6 @@ find algorithms -name '*.cpp' ! -name '*_test.cpp' | sort | xargs awk '
       printf "comments: %.1f %% of the lines of sources in algorithms/\n", 100 * comments / lines
       exit bad }' || bad=1
 
-find algorithms reference validation experiments -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print | xargs awk '
+find algorithms reference validation experiments packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print | xargs awk '
     !/^[[:space:]]*(\/\/.*)?$/ { n++ } END { print "source lines: " n " that are neither blank nor comments" }'
 exit $bad

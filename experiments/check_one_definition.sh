@@ -19,7 +19,7 @@ build() {  # folder, then options of CMake
 # A class or an enumeration at the scope of a namespace that has a name, defined in two files. Files with a main() or
 # with tests are programs of their own.
 check_names() {
-  find algorithms reference validation experiments -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' ! -name '*_test.cpp' ! -name main.cpp \) -print |
+  find algorithms reference validation experiments packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' ! -name '*_test.cpp' ! -name main.cpp \) -print |
     grep -v '^experiments/bench/' | sort | xargs awk '
       FNR == 1 { depth = 0; hidden = 0; space = "" }
       { line = $0; sub(/\/\/.*/, "", line) }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "algorithms/core/number_text.h"
+
 namespace hermesh {
 namespace {
 
@@ -86,6 +88,16 @@ class Counter {
 
 LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b) {
   return Counter(boolean, a, b).run();
+}
+
+std::string lost_slivers_note(const LostSlivers& lost, Boolean boolean, double voxel_size) {
+  // Counts are in voxels, and users think in the world's units.
+  const double volume = lost.volume * voxel_size * voxel_size * voxel_size;
+  return std::to_string(lost.edges) + " lattice edges pass through " +
+         (boolean == Boolean::unite ? "gaps that hold no sample: they were closed"
+                                    : "parts that hold no sample: they were lost") +
+         ", a volume of about " + text(volume) + ", the thickest of them " + text(lost.longest * voxel_size) +
+         " at " + text(lost.place) + "; smaller voxels keep more";
 }
 
 }  // namespace hermesh

@@ -37,6 +37,14 @@ openvdb::FloatGrid::Ptr combined_values(Boolean boolean, const openvdb::FloatGri
 
 }  // namespace
 
+std::string missed_edges_note(const PolygonSampling& sampling) {
+  const std::size_t missed = sampling.nearest + sampling.fallback;
+  if (missed == 0) return {};
+  return std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
+         " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
+         " took the nearest one's plane, the others the level set's gradient";
+}
+
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size) {
   Bounds both = bounds(a);
   const Bounds other = bounds(b);

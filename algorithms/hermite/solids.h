@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "algorithms/core/level_set.h"
 #include "algorithms/core/polygon_mesh.h"
@@ -35,6 +36,9 @@ using VoxelizeMesh = std::function<LevelSet(const PolygonMesh&)>;
 /// @throws Error for a mesh of more than 2³⁰ voxels' distance; if the level set has no sample inside.
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
                           RunContext& context);
+
+/// A sentence on the crossing edges of a solid that hit no polygon; empty where all hit one.
+std::string missed_edges_note(const PolygonSampling& sampling);
 
 /// Signs and crossings of a combination, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
 /// operands' signs, and the edges with crossings are those whose ends differ. The values of the level set are the

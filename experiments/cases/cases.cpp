@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "algorithms/io/mesh_file.h"
-#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/core/quad_diagonals.h"
 #include "experiments/cases/case_file.h"
 #include "experiments/harness/sha256.h"
 #include "experiments/harness/shell.h"

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "algorithms/io/vdb_file.h"
+#include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
 #include "experiments/cli/cli11.h"
 
@@ -66,16 +67,6 @@ LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, Ada
   });
 }
 
-/// Refuses an extractor that is not adaptive: it would make its usual mesh and leave the user
-/// in the belief that it did not.
-void check_adaptive(const Extractor& extractor) {
-  for (const OptionSpec& option : extractor.options)
-    if (option.name == "threshold" || option.name == "tolerance") return;
-  throw UsageError("the extractor " + extractor.name +
-                   " keeps no bound that a mask or a tolerance grid could change; use adaptive-dual-contouring or "
-                   "manifold-dual-contouring");
-}
-
 }  // namespace
 
 void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments) {
@@ -113,7 +104,7 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
   if (arguments.frustum_resolution && arguments.frustum.empty())
     throw UsageError("--frustum-resolution needs --frustum");
   if (!has_mask && arguments.tolerance_grid.empty()) return std::nullopt;
-  check_adaptive(extractor);
+  as_usage([&] { check_adaptive(extractor); });
   AdaptivityField field;
   field.outside = !has_mask ? AdaptivityField::Outside::everywhere
                             : read_outside(arguments.outside.empty() ? "simplify" : arguments.outside);

@@ -54,24 +54,9 @@ SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const Sha
   };
   SampledSolid solid =
       about_file(file, [&] { return sample_solid(mesh, lattice, voxelized, session.context); });
-  const PolygonSampling& sampling = solid.sampling;
-  if (const std::size_t missed = sampling.nearest + sampling.fallback; missed > 0)
-    session.context.note("'" + file + "': " + std::to_string(missed) + " of " +
-                         std::to_string(sampling.exact + missed) +
-                         " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
-                         " took the nearest one's plane, the others the level set's gradient");
+  if (const std::string note = missed_edges_note(solid.sampling); !note.empty())
+    session.context.note("'" + file + "': " + note);
   return solid;
-}
-
-/// A sentence on what became of parts of the result that are thinner than a voxel. (Parts that an operand by itself
-/// lost are told of when it is voxelized.)
-std::string sentence(const LostSlivers& lost, Boolean boolean, double voxel_size) {
-  const double volume = lost.volume * voxel_size * voxel_size * voxel_size;
-  return std::to_string(lost.edges) + " lattice edges pass through " +
-         (boolean == Boolean::unite ? "gaps that hold no sample: they were closed"
-                                    : "parts that hold no sample: they were lost") +
-         ", a volume of about " + text(volume) + ", the thickest of them " + text(lost.longest * voxel_size) +
-         " at " + text(lost.place) + "; smaller voxels keep more";
 }
 
 /// Refuses a result without a sample. @throws Error that tells a result that is empty from one that is too thin.
@@ -80,7 +65,7 @@ void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const
   if (!result.hermite.leaves.empty()) return;
   if (lost.edges > 0)
     throw Error(result_name(arguments) + " is thinner than a voxel everywhere, nothing was written: " +
-                sentence(lost, boolean_of(arguments.operation), voxel_size));
+                lost_slivers_note(lost, boolean_of(arguments.operation), voxel_size));
   throw Error(result_name(arguments) +
               " is empty, nothing was written: no sample and no edge of the lattice lies in it");
 }
@@ -134,7 +119,7 @@ int run_combine(const Arguments& given, Session& session) {
   const LostSlivers lost = lost_slivers(boolean, a.hermite, b.hermite);
   session.context.check();
   check_not_empty(result, lost, arguments, lattice.voxel_size);
-  if (lost.edges > 0) session.context.note(sentence(lost, boolean, lattice.voxel_size));
+  if (lost.edges > 0) session.context.note(lost_slivers_note(lost, boolean, lattice.voxel_size));
   check_written_precision(arguments.out, result.level_set);
   print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
                              " edge crossings, " + seconds_text(watch.seconds()));

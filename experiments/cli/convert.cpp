@@ -4,7 +4,7 @@
 #include <optional>
 #include <sstream>
 
-#include "algorithms/core/value_range.h"
+#include "algorithms/extraction/explain.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
 #include "algorithms/extraction/volume_attributes.h"
@@ -12,7 +12,6 @@
 #include "experiments/cli/bounded.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
-#include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/validators.h"
@@ -40,17 +39,6 @@ void add_extract_options(CLI::App& command, ExtractArguments& arguments, const s
   add_adaptivity_options(command, arguments.adaptivity);
 }
 
-/// Refuses polygons that the extractor would not look at: they would leave the user in the belief that it did.
-void check_source_has_effect(const ExtractArguments& arguments, const ChosenExtractor& chosen) {
-  const Options& options = chosen.options;
-  if (options.is("hermite", "exact") || options.is("crossings", "exact")) return;
-  const bool automatic = options.is("hermite", "auto");
-  if (automatic && arguments.isovalue == 0.0) return;
-  throw UsageError("--source has no effect: " +
-                   (automatic ? "the polygons lie at the isovalue 0"
-                              : chosen.extractor.name + " with these options takes nothing from polygons"));
-}
-
 std::vector<std::string> attribute_names(const std::string& list) {
   std::vector<std::string> names;
   std::istringstream stream(list);
@@ -59,35 +47,6 @@ std::vector<std::string> attribute_names(const std::string& list) {
     names.push_back(name);
   }
   return names;
-}
-
-/// Says where a surface runs into the end of the data.
-void note_ends(const DataEnds& ends, Ends treatment, Session& session) {
-  if (!ends.any()) return;
-  if (!ends.in_a_box)
-    return session.context.note("the level set breaks off beside its surface (it was clipped by a mask, or has wrong "
-                                "signs) and was closed there");
-  session.context.note("the surface runs into the end of the data (" + ends.text() + ") and was " +
-                       (treatment == Ends::open ? "cut off at its last samples"
-                                                : "closed half a voxel beyond its last samples; see --ends"));
-}
-
-/// A sentence that says why a mesh is empty. `source` is the polygons that the volume was made
-/// from in the same run, if it was.
-std::string no_surface(const LevelSet& level_set, const PolygonMesh* source, const ChosenExtractor& chosen,
-                       const ExtractArguments& arguments) {
-  const auto [lowest, highest] = value_range(level_set);
-  const double isovalue = arguments.isovalue;
-  const std::string values = "its values go from " + exact_text(lowest) + " to " + exact_text(highest) + ", and " +
-                             exact_text(level_set.background()) + " beyond";
-  const std::string nothing = "there is no surface at the isovalue " + text(isovalue) + ", nothing was written: ";
-  if (double(lowest) < isovalue && isovalue < std::max(double(highest), level_set.background()))
-    return nothing + chosen.extractor.name + " found none, although the volume has samples on both sides (" + values +
-           "); try another --extractor or smaller voxels";
-  if (source && isovalue == 0.0 && lowest >= 0.0f)
-    return nothing + "no voxel is inside, for the polygons enclose nothing, cancel one another, or are thinner than a voxel; " +
-           "give a sheet a thickness with --signs unsigned and an --isovalue above 0";
-  return nothing + "the volume has no sample inside, or none outside; " + values;
 }
 
 /// The volume's mesh by the chosen extractor; messages name `paths.in`.
@@ -112,8 +71,10 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
   // No reader takes a mesh file without polygons, ours included.
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
     throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
-  if (mesh.empty()) throw Error("'" + input + "': " + no_surface(level_set, source, chosen, arguments));
-  note_ends(ended.ends, treatment, session);
+  if (mesh.empty())
+    throw Error("'" + input + "': " +
+                no_surface(level_set, arguments.isovalue, source != nullptr, chosen.extractor.name));
+  if (const std::string note = ends_note(ended.ends, treatment); !note.empty()) session.context.note(note);
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;
 }
@@ -125,7 +86,7 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
   if (!attributes.empty()) check_keeps_attributes(paths.out);
   std::optional<PolygonMesh> source;
   if (!arguments.source.empty()) {
-    check_source_has_effect(arguments, chosen);
+    as_usage([&] { check_source_has_effect(chosen.extractor, chosen.options, arguments.isovalue); });
     source = read_polygons(arguments.source, session);
   }
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);

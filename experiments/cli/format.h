@@ -1,31 +1,15 @@
 // Numbers and points as text for the screen.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdio>
 #include <string>
 
+#include "algorithms/core/number_text.h"
+
 namespace hermesh::cli {
 
-/// The number with six significant digits.
-inline std::string text(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.6g", value);
-  return buffer;
-}
-
-/// The number with as many digits as tell it from all others of single precision.
-inline std::string exact_text(float value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.9g", double(value));
-  return buffer;
-}
-
-inline std::string text(const Eigen::Vector3d& point) {
-  char buffer[96];
-  std::snprintf(buffer, sizeof buffer, "(%.6g, %.6g, %.6g)", point.x(), point.y(), point.z());
-  return buffer;
-}
+using hermesh::exact_text;
+using hermesh::text;
 
 inline std::string seconds_text(double seconds) {
   char buffer[32];

@@ -6,7 +6,7 @@
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/grid_frame.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/core/quad_diagonals.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
 #include "algorithms/thesis/thesis_volumes.h"
 #include "experiments/cli/cli11.h"

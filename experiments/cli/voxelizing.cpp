@@ -7,7 +7,7 @@
 
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/voxelization/outputs/lost_surface.h"
-#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/core/quad_diagonals.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/harness/harness.h"

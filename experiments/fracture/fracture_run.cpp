@@ -1,13 +1,10 @@
 #include "experiments/fracture/fracture_run.h"
 
-#include <Eigen/Geometry>
 #include <chrono>
 #include <cmath>
 
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
-#include "algorithms/fracture/mass_properties.h"
-#include "algorithms/fracture/piece_attributes.h"
 #include "reference/openvdb_fracture.h"
 
 namespace hermesh {
@@ -16,17 +13,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-const std::vector<std::int32_t>* whole_numbers(const PolygonMesh& mesh, const char* name) {
-  for (const MeshAttribute& a : mesh.attributes)
-    if (a.name == name && a.domain == AttributeDomain::polygon)
-      return std::get_if<std::vector<std::int32_t>>(&a.values);
-  return nullptr;
-}
-
 class Run {
  public:
   Run(const FractureObject& object, const MadeCutters& cutters, const FractureMethod& method,
-      const std::function<void(PieceOutput&&)>& hand_over, RunContext& context)
+      const HandOver& hand_over, RunContext& context)
       : object_(object), cutters_(cutters), method_(method), hand_over_(hand_over), context_(context) {}
 
   FractureSummary run() {
@@ -45,17 +35,7 @@ class Run {
   void finish(PieceOutput&& piece) {
     const auto start = Clock::now();
     piece.number = ++summary_.pieces;
-    piece.mass = mass_properties(piece.mesh);
-    if (const auto* neighbour = whole_numbers(piece.mesh, "neighbour"))
-      for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {
-        if ((*neighbour)[t] < 0) continue;
-        auto& [triangles, area] = piece.neighbours[(*neighbour)[t]];
-        const auto at = [&](int c) {
-          return Eigen::Vector3d(piece.mesh.points[piece.mesh.triangles[t][c]].cast<double>());
-        };
-        ++triangles;
-        area += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
-      }
+    measure_piece(piece);
     hand_over_(std::move(piece));
     handing_over_ += since(start);
   }
@@ -63,29 +43,9 @@ class Run {
   void labelled() {
     FractureOptions options = method_.options;
     options.tolerance = method_.tolerance;
-    LabelledFracture fracture = labelled_fracture(object_.hermite, *cutters_.cutters, options, context_);
-    const double voxel = std::cbrt(std::abs(object_.hermite.placement.linear.determinant()));
-    std::optional<SourceAttributes> attributes;
-    if (object_.source) attributes.emplace(*object_.source, voxel);
-    const std::uint32_t count = fracture.piece_count();
-    for (std::uint32_t number = 1; number <= count; ++number) {
-      context_.check();
-      PieceOutput piece;
-      const auto start = Clock::now();
-      piece.name = fracture.names[number];
-      piece.samples = fracture.samples[number];
-      piece.mesh = piece_mesh(fracture.mesh, fracture.pieces->of(number));
-      add_cut_uv(piece.mesh, [&](std::int32_t other) {
-        return cutters_.cutters->plane_between(fracture.codes[number],
-                                               fracture.codes[static_cast<std::size_t>(other)]);
-      });
-      if (attributes) attributes->add_to(piece.mesh, context_);
-      piece.extraction_seconds = since(start);
-      context_.progress("pieces", double(number) / double(count));
-      finish(std::move(piece));
-    }
-    fracture.mesh = {};
-    fracture.pieces.reset();
+    LabelledFracture fracture = labelled_pieces(
+        object_.hermite, *cutters_.cutters, options, object_.source,
+        [&](PieceOutput&& piece) { finish(std::move(piece)); }, context_);
     summary_.cutters = fracture.cutters;
     summary_.labelled = std::move(fracture);
   }
@@ -145,7 +105,7 @@ class Run {
   const FractureObject& object_;
   const MadeCutters& cutters_;
   const FractureMethod& method_;
-  const std::function<void(PieceOutput&&)>& hand_over_;
+  const HandOver& hand_over_;
   RunContext& context_;
   FractureSummary summary_;
   double handing_over_ = 0.0;
@@ -171,7 +131,7 @@ double uncut_volume(const FractureObject& object, RunContext& context) {
 
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
                              const FractureMethod& method,
-                             const std::function<void(PieceOutput&&)>& hand_over, RunContext& context) {
+                             const HandOver& hand_over, RunContext& context) {
   check_method(method);
   return Run(object, cutters, method, hand_over, context).run();
 }

@@ -1,16 +1,13 @@
 // One fracture by one of the methods, piece by piece: what the command line and the experiment share.
 #pragma once
 
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
 
 #include "algorithms/core/level_set.h"
-#include "algorithms/fracture/fracture.h"
-#include "algorithms/fracture/mass_properties.h"
+#include "algorithms/fracture/piece_output.h"
 #include "algorithms/thesis/thesis_fracture.h"
-#include "experiments/fracture/fracture_cutters.h"
+#include "algorithms/fracture/cutter_words.h"
 
 namespace hermesh {
 
@@ -34,17 +31,6 @@ struct FractureMethod {
   ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;  ///< of the method thesis alone
 };
 
-struct PieceOutput {
-  std::uint32_t number = 0;  ///< from 1 on
-  std::string name;
-  std::optional<std::uint64_t> samples;  ///< how many samples of the labelled grid are the piece's
-  PolygonMesh mesh;
-  MassProperties mass;
-  /// Triangles and area (square world units) of the seam with each neighbour, by its number; only of tagged pieces.
-  std::map<std::int32_t, std::pair<std::uint64_t, double>> neighbours;
-  double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
-};
-
 struct FractureSummary {
   std::uint32_t pieces = 0;
   std::vector<CutterRecord> cutters;         ///< what each cutter took, by the method `labelled`
@@ -57,8 +43,7 @@ struct FractureSummary {
 /// Breaks the object by the method and hands its pieces over, one after the other.
 /// @throws Error for a method that does not exist, or a tolerance that it does not take; Cancelled.
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
-                             const FractureMethod& method,
-                             const std::function<void(PieceOutput&&)>& hand_over, RunContext& context);
+                             const FractureMethod& method, const HandOver& hand_over, RunContext& context);
 
 /// Refuses a method that run_fracture() would refuse. @throws Error as that does.
 void check_method(const FractureMethod& method);

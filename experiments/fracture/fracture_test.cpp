@@ -17,7 +17,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 #include "experiments/cases/cases.h"
 #include "experiments/cases/recipes.h"
-#include "experiments/fracture/fracture_cutters.h"
+#include "algorithms/fracture/cutter_words.h"
 #include "experiments/fracture/fracture_for_tests.h"
 #include "experiments/fracture/fracture_run.h"
 #include "experiments/fracture/fracture_tags.h"

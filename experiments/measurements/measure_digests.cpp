@@ -10,7 +10,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/variants.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
-#include "experiments/fracture/fracture_cutters.h"
+#include "algorithms/fracture/cutter_words.h"
 #include "experiments/fracture/fracture_run.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"

@@ -23,6 +23,8 @@ struct CutterSpec {
     std::string path;
     std::size_t copies =
         0;  ///< 0: one copy in place; else as many, turned at random, their box's centre at scattered places
+    /// The polygons, where they are at hand and `path` is but their name; null: they are read.
+    const PolygonMesh* mesh = nullptr;
   };
   std::vector<File> files;
 };

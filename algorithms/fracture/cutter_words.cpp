@@ -1,4 +1,4 @@
-#include "experiments/fracture/fracture_cutters.h"
+#include "algorithms/fracture/cutter_words.h"
 
 #include <openvdb/tools/Interpolation.h>
 
@@ -13,7 +13,7 @@
 #include "algorithms/core/value_range.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
-#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/core/quad_diagonals.h"
 
 namespace hermesh {
 namespace {
@@ -87,7 +87,7 @@ MadeCutters made_meshes(const CutterSpec& spec, const LabelledSolid& solid, cons
   MadeCutters made;
   Random random(choices.seed + 0x6d657368);
   for (const CutterSpec::File& file : spec.files) {
-    PolygonMesh mesh = read_mesh(file.path, context);
+    PolygonMesh mesh = file.mesh ? *file.mesh : read_mesh(file.path, context);
     choose_diagonals(mesh);
     const std::string name = std::filesystem::path(file.path).filename().string();
     if (file.copies == 0) {

@@ -1,4 +1,4 @@
-#include "algorithms/voxelization/distance/quad_diagonals.h"
+#include "algorithms/core/quad_diagonals.h"
 
 #include <tbb/parallel_for.h>
 

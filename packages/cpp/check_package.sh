@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Whether another program can be built against what is installed: packages/cpp/check_package.sh BUILD; a quarter of a minute.
+# Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them there, which
+# must take less than 20 s, and runs it; counts headers and symbols, and prints sizes. With shared libraries all that they show
+# must be public names. Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and says
+# what is wrong.
+set -euo pipefail
+cd "$(dirname "$0")"
+build=$1
+where=$build/package_check
+rm -rf "$where"
+mkdir -p "$where"
+for component in runtime validation development; do
+  cmake --install "$build" --prefix "$where/prefix" --component $component > "$where/install.log"
+done
+
+# Another program's headers must not be ours by accident: nothing but the public ones is there.
+headers=$(find "$where/prefix/include" -type f | wc -l)
+inner=$(grep -rlE '#include ("algorithms/|"validation/|<Eigen|<tbb|<CGAL)' "$where/prefix/include" || true)
+if [ -n "$inner" ]; then echo "public headers include what is not installed: $inner"; exit 1; fi
+heavy=$(grep -rlE '#include [<"]openvdb' "$where/prefix/include" | grep -v '/hermesh/openvdb.h$' || true)
+if [ -n "$heavy" ]; then echo "public headers include OpenVDB: $heavy"; exit 1; fi
+echo "headers: $headers, $(cat "$where"/prefix/include/hermesh/*.h | wc -l) lines"
+find "$where/prefix" \( -name '*.a' -o -name '*.so*' \) -type f -printf 'library: %f, %s bytes\n' | sort
+
+for library in $(find "$where/prefix" -name '*.so' | sort); do
+  nm -D --defined-only -C "$library" | sed -E 's/^[0-9a-f]* *[A-Za-z] //' > "$where/symbols.txt"
+  others=$(grep -vE '^((typeinfo|vtable|typeinfo name) for )?hermesh::v1::|^HERMESH_1$' "$where/symbols.txt" || true)
+  echo "symbols: $(wc -l < "$where/symbols.txt") of $(basename "$library")"
+  if [ -n "$others" ]; then echo "shown, but not public:"; head -20 <<< "$others"; exit 1; fi
+done
+
+# The strictest compilers that are here find nothing to warn of in the headers.
+for compiler in g++ clang++; do
+  if command -v $compiler > /dev/null; then
+    $compiler -std=c++20 -Wall -Wextra -Wpedantic -Wshadow -Werror -fsyntax-only -I "$where/prefix/include" example/main.cpp
+  fi
+done
+
+begun=$(date +%s%N)
+{ cmake -S example -B "$where/example" -G Ninja -DCMAKE_PREFIX_PATH="$where/prefix" && cmake --build "$where/example"; } \
+  > "$where/example.log" 2>&1 || { cat "$where/example.log"; exit 1; }
+milliseconds=$((($(date +%s%N) - begun) / 1000000))
+echo "example: configured and built in $milliseconds ms"
+if [ $milliseconds -gt 20000 ]; then echo "that is more than 20 s"; exit 1; fi
+"$where/example/example" > "$where/output.txt" || { cat "$where/output.txt"; exit 1; }
+tail -1 "$where/output.txt"
+
+# Inside another project, which is configured and not built: that would take as long as the libraries do.
+cmake -S example -B "$where/parent" -G Ninja -DHERMESH_SOURCE="$(cd ../.. && pwd)" > "$where/parent.log" 2>&1 ||
+  { cat "$where/parent.log"; exit 1; }
+if grep -qE -e '-Werror' "$where/parent/build.ninja"; then echo "inside another project warnings are errors"; exit 1; fi
+if ninja -C "$where/parent" -t targets all | grep -qE '_test(:|$)|^hermesh: phony'; then
+  echo "inside another project more is built than the libraries"
+  exit 1
+fi
+echo "inside another project: the libraries alone"

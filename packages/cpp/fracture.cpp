@@ -1,0 +1,147 @@
+// Solids into pieces.
+#include "hermesh/fracture.h"
+
+#include <cmath>
+
+#include "algorithms/core/stopwatch.h"
+#include "algorithms/fracture/cutter_words.h"
+#include "algorithms/fracture/piece_output.h"
+#include "algorithms/hermite/samplers.h"
+#include "algorithms/thesis/thesis_fracture.h"
+#include "packages/cpp/stages.h"
+
+namespace hermesh::v1 {
+namespace {
+
+void check(const FractureOptions& options) {
+  if (options.method != "labelled" && options.method != "thesis")
+    throw hermesh::Error("there is no method '" + options.method + "'; there are labelled and thesis");
+  if (!(options.tolerance >= 0.0) || !std::isfinite(options.tolerance))
+    throw hermesh::Error("the tolerance must be a number of at least 0");
+  if (options.rule != "printed" && options.rule != "repaired")
+    throw hermesh::Error("the rule is printed or repaired, not '" + options.rule + "'");
+  if (options.hermite != "auto" && options.hermite != "exact" && options.hermite != "level-set")
+    throw hermesh::Error("hermite is auto, exact or level-set, not '" + options.hermite + "'");
+  if (!(options.roughness >= 0.0 && options.roughness <= 1.0))
+    throw hermesh::Error("the roughness must be a number from 0 to 1");
+  if (!(options.mesh_scale > 0.0) || !std::isfinite(options.mesh_scale))
+    throw hermesh::Error("the scale of scattered meshes must be a number above 0");
+  if (!(options.min_volume >= 0.0 && options.min_volume <= 1e15))
+    throw hermesh::Error("the least volume must be a number from 0 to 1e15 voxels");
+  if (options.impact_radius && !(*options.impact_radius > 0.0 && std::isfinite(*options.impact_radius)))
+    throw hermesh::Error("the radius of the impact must be a number above 0");
+  if (options.impact_radius && !options.impact)
+    throw hermesh::Error("the radius of the impact has no effect: there is no impact");
+  if (options.impact && options.density)
+    throw hermesh::Error("the impact has no effect: the density says where places are scattered");
+  if (options.cutters.empty() == options.meshes.empty())
+    throw hermesh::Error("say what cuts by one of cutters and meshes");
+}
+
+/// The cutters of the options. `copies` keeps polygons that the specification points to.
+CutterSpec spec_of(const FractureOptions& options, std::vector<PolygonMesh>& copies) {
+  if (options.meshes.empty()) return parse_cutters(options.cutters);
+  CutterSpec spec;
+  spec.kind = CutterSpec::Kind::meshes;
+  copies.resize(options.meshes.size());
+  for (std::size_t i = 0; i < options.meshes.size(); ++i) {
+    const CutterMesh& cutter = options.meshes[i];
+    spec.files.push_back({cutter.name, cutter.copies, &Inside::sampled(cutter.mesh, copies[i])});
+  }
+  return spec;
+}
+
+std::array<double, 9> by_rows(const Eigen::Matrix3d& matrix) {
+  std::array<double, 9> rows;
+  for (int i = 0; i < 9; ++i) rows[i] = matrix(i / 3, i % 3);
+  return rows;
+}
+
+Fracture broken(const FloatHermite& hermite, const PolygonMesh* source, const FractureOptions& options,
+                RunContext& context) {
+  if (hermite.leaves.empty())
+    throw hermesh::Error("the object has no inside at this size of voxel, so there is nothing to break");
+  std::vector<PolygonMesh> copies;
+  CutterChoices choices;
+  choices.seed = options.seed;
+  choices.roughness = options.roughness;
+  choices.mesh_scale = options.mesh_scale;
+  if (options.impact)
+    choices.impact = Eigen::Vector3d((*options.impact)[0], (*options.impact)[1], (*options.impact)[2]);
+  choices.impact_radius = options.impact_radius.value_or(0.0);
+  if (options.density) choices.density = Inside::level_set(options.density);
+  const MadeCutters cutters = make_cutters(spec_of(options, copies), hermite, choices, context);
+
+  Fracture result;
+  const auto hand_over = [&](PieceOutput&& made) {
+    measure_piece(made);
+    Piece piece;
+    piece.name = std::move(made.name);
+    piece.mesh = Inside::mesh(std::move(made.mesh));
+    piece.volume = made.mass.volume;
+    piece.area = made.mass.area;
+    piece.centre_of_mass = {made.mass.centre.x(), made.mass.centre.y(), made.mass.centre.z()};
+    piece.inertia = by_rows(made.mass.inertia);
+    piece.neighbours = std::move(made.neighbours);
+    result.pieces.push_back(std::move(piece));
+  };
+  Stopwatch watch;
+  if (options.method == "labelled") {
+    hermesh::FractureOptions labelled;
+    labelled.tolerance = options.tolerance;
+    labelled.split = options.split;
+    labelled.least_samples = static_cast<std::uint64_t>(options.min_volume);
+    const LabelledFracture fracture =
+        labelled_pieces(hermite, *cutters.cutters, labelled, source, hand_over, context);
+    for (const CutterRecord& record : fracture.cutters)
+      if (record.state != CutterRecord::State::cuts) context.note(record.name + " " + in_words(record.state));
+  } else {
+    const ThesisFractureOptions thesis = {.rule = options.rule == "repaired"
+                                                      ? ThesisFractureOptions::Rule::repaired
+                                                      : ThesisFractureOptions::Rule::printed,
+                                          .threshold = options.tolerance * options.tolerance};
+    thesis_fracture(
+        hermite, *cutters.cutters, thesis,
+        [&](ThesisPiece&& made) {
+          if (made.mesh.empty()) return context.note(made.name + ": nothing");
+          PieceOutput piece;
+          piece.name = std::move(made.name);
+          piece.mesh = std::move(made.mesh);
+          hand_over(std::move(piece));
+        },
+        context);
+  }
+  result.seconds = watch.seconds();
+  if (result.pieces.empty()) throw hermesh::Error("no piece has a surface, nothing was written");
+  return result;
+}
+
+}  // namespace
+
+Fracture fracture(const Mesh& mesh, const VoxelizeOptions& voxelizing, const FractureOptions& options,
+                  Context& context) {
+  return run(context, [&](RunContext& inner) {
+    check(options);
+    if (voxelizing.like) throw hermesh::Error("only voxelize takes the lattice of another volume");
+    const ChosenVoxelizer voxelizer = choose(voxelizing);
+    PolygonMesh copy;
+    const PolygonMesh& polygons = Inside::sampled(mesh, copy);
+    const LevelSet level_set =
+        level_set_of(polygons, voxel_size_of(polygons, voxelizing), voxelizing, voxelizer, inner);
+    const FloatHermite hermite = options.hermite == "level-set"
+                                     ? sample_level_set(level_set, 0.0, inner)
+                                     : sample_polygons(level_set, 0.0, polygons, inner);
+    return broken(hermite, &polygons, options, inner);
+  });
+}
+
+Fracture fracture(const Volume& level_set, const FractureOptions& options, Context& context) {
+  return run(context, [&](RunContext& inner) {
+    check(options);
+    if (options.hermite == "exact") throw hermesh::Error("hermite=exact needs polygons, not a volume");
+    const LevelSet inside = Inside::level_set(level_set);
+    return broken(sample_level_set(inside, 0.0, inner), nullptr, options, inner);
+  });
+}
+
+}  // namespace hermesh::v1

@@ -1,0 +1,107 @@
+// Polygon meshes: arrays in, arrays out.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hermesh/context.h"
+#include "hermesh/export.h"
+
+namespace hermesh::HERMESH_V1 {
+
+/// What an attribute has a value for.
+enum class AttributeDomain {
+  point,   ///< each point
+  corner,  ///< each polygon's corner: three a triangle, in their order, then four a quad
+  polygon  ///< each triangle, then each quad
+};
+
+/// Named values on the points, corners or polygons of a mesh, such as "normal", "colour", "uv" or "material".
+/// It is a view: whoever makes one keeps the arrays alive, and those that a mesh gives live as long as it or
+/// a copy of it.
+struct Attribute {
+  std::string name = {};
+  AttributeDomain domain = AttributeDomain::point;
+  int components = 1;                  ///< numbers for each element, 1 to 4, side by side
+  std::span<const float> floats = {};  ///< the values, of one kind; the other is empty
+  std::span<const std::int32_t> integers =
+      {};  ///< whole numbers of one component, never interpolated; −1 stands for "none"
+  std::vector<std::string> labels = {};  ///< names of the whole numbers from 0 on; may be empty
+};
+
+/// Triangles and quads over shared points, counter-clockwise seen from outside, and their attributes. A
+/// value: nobody changes a mesh once it is made, and copies share the arrays, so that to copy one costs
+/// nothing.
+///
+/// A quad (a, b, c, d) of a mesh that hermesh made means the triangles abc and acd. How quads from elsewhere
+/// are cut is not known, so that whatever samples polygons (voxelize, remesh, combine, fracture, and extract
+/// from its source) cuts each along its better diagonal, as the program does; to keep your own cut, give
+/// triangles.
+class HERMESH_API Mesh {
+ public:
+  /// No points, no polygons.
+  Mesh();
+
+  /// A mesh of arrays, which are copied once.
+  /// @snippet main.cpp arrays
+  /// @param points x, y, z of each point, world units
+  /// @param triangles three numbers of points each, from 0
+  /// @param quads four numbers each
+  /// @param attributes each with a name of its own
+  /// @throws Error for an array whose size is no multiple of 3 (or 4), an index out of range, a coordinate
+  /// that is not finite, points in double precision whose box does not fit single precision about an origin
+  /// of its own, and an attribute whose number of values does not fit.
+  explicit Mesh(std::span<const float> points, std::span<const std::uint32_t> triangles,
+                std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
+  /// A mesh of points in double precision, which are kept in single precision about origin(), so that a
+  /// model far from 0 loses nothing that matters. @throws Error as above.
+  explicit Mesh(std::span<const double> points, std::span<const std::uint32_t> triangles,
+                std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
+
+  /// x, y, z of each point, world units, relative to origin(). The arrays of a mesh live as long as it or a
+  /// copy of it.
+  std::span<const float> points() const noexcept;
+  /// Where points() have their zero, world units; (0, 0, 0) unless the mesh lies far from it, compared with
+  /// its size.
+  std::array<double, 3> origin() const noexcept;
+  /// x, y, z of each point in world units, in an array of the caller's own.
+  std::vector<double> world_points() const;
+  std::span<const std::uint32_t> triangles() const noexcept;  ///< three numbers of points each
+  std::span<const std::uint32_t> quads() const noexcept;      ///< four numbers of points each
+  std::vector<Attribute> attributes() const;                  ///< views of the mesh's own arrays
+
+  /// A mesh of the same polygons with these attributes in place of their own; all arrays are copied. @throws
+  /// Error for an attribute whose number of values does not fit.
+  Mesh with_attributes(std::span<const Attribute> attributes) const;
+
+  std::size_t point_count() const noexcept { return points().size() / 3; }
+  std::size_t triangle_count() const noexcept { return triangles().size() / 3; }
+  std::size_t quad_count() const noexcept { return quads().size() / 4; }
+  bool empty() const noexcept { return triangles().empty() && quads().empty(); }
+
+ private:
+  friend struct Inside;
+  struct Arrays;
+  explicit Mesh(std::shared_ptr<const Arrays> arrays) : arrays_(std::move(arrays)) {}
+  std::shared_ptr<const Arrays> arrays_;
+};
+
+/// Reads PLY (ASCII, binary), OBJ, OFF or STL, each also gzipped, told by the name's end and checked against
+/// the content. Polygons of more corners are cut into triangles. What was forgiven is a note.
+/// With `attributes` those of PLY and OBJ are read, too.
+/// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
+HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
+
+/// Writes PLY (binary), OBJ, OFF or STL, as the name ends, beside the path and renames, so that no
+/// half-written file stands there. Reading the file back gives the same points; but STL has single precision,
+/// and a note says what that cost. PLY alone keeps attributes.
+/// @throws Error for an unknown end of the name or a path that cannot be written; Cancelled.
+HERMESH_API void write_mesh(const std::filesystem::path& path, const Mesh& mesh, Context& context);
+
+}  // namespace hermesh::HERMESH_V1

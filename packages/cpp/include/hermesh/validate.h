@@ -1,0 +1,98 @@
+// hermesh::validation: judges of meshes. The library behind this header links CGAL's packages under the GPL,
+// and whatever links it is under GPL-3; the others are under Apache-2.0.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hermesh/context.h"
+#include "hermesh/export.h"
+#include "hermesh/mesh.h"
+
+namespace hermesh::HERMESH_V1 {
+
+/// What `hermesh validate` takes.
+struct ValidateOptions {
+  const Mesh* reference =
+      nullptr;  ///< mesh to measure the distances to and from, and the solid to compare with
+  const Mesh* features = nullptr;  ///< mesh whose sharp edges and corners should be there
+  bool self_intersections = true;  ///< whether they are looked for
+  bool libraries = true;           ///< whether OpenMesh and CGAL count, too
+  bool certify = false;            ///< whether to bound the Hausdorff distances to the reference for certain
+  std::int64_t samples = 200'000;  ///< on each surface for the distances
+  double dihedral = 30.0;          ///< least angle of a sharp edge, degrees
+  double voxel_size = 0.0;         ///< world units, of the volume that the mesh was made from; 0: unknown
+};
+
+/// Distances from samples of one surface to another, world units.
+struct SurfaceDistances {
+  double max = 0.0, mean = 0.0, rms = 0.0;
+  std::array<double, 3> worst = {0, 0, 0};  ///< the place of the greatest
+};
+
+/// A certified bracket of a one-sided Hausdorff distance, world units.
+struct HausdorffBracket {
+  double lower = 0.0, upper = 0.0;
+};
+
+/// Where a defect is, and the polygons (triangles first, then quads) that have it; the second is −1 where
+/// there is one.
+struct DefectPlace {
+  std::array<double, 3> point = {0, 0, 0};
+  std::array<std::int64_t, 2> polygons = {-1, -1};
+};
+
+/// A defect that was found, with the places of the first ten.
+struct Defect {
+  std::string name = {};  ///< boundary_edges, non_manifold_edges, ..., self_intersecting_pairs
+  std::int64_t count = 0;
+  std::vector<DefectPlace> places = {};
+};
+
+/// What the judges say of a mesh.
+struct Report {
+  std::int64_t points = 0, triangles = 0, quads = 0;
+  std::int64_t boundary_edges = 0, non_manifold_edges = 0, non_manifold_vertices = 0, inconsistent_edges = 0;
+  std::int64_t degenerate_polygons = 0, duplicate_polygons = 0, isolated_points = 0;
+  std::int64_t components = 0, euler_characteristic = 0;
+  std::optional<double> genus = {};                          ///< of a closed, manifold, oriented mesh
+  std::optional<std::int64_t> self_intersecting_pairs = {};  ///< none where nobody looked
+  double volume = 0.0, area = 0.0;                           ///< world units
+  double smallest_angle = 0.0;                               ///< degrees
+  double worst_aspect = 0.0;                                 ///< 1 for the equilateral triangle
+  std::optional<SurfaceDistances> to_reference = {}, from_reference = {};
+  std::optional<HausdorffBracket> certified_to_reference = {}, certified_from_reference = {};
+  std::optional<std::string> solid = {};    ///< compared with the reference's: "same", "differs" or "unknown"
+  std::vector<Defect> defects = {};         ///< those there are
+  std::vector<std::string> sentences = {};  ///< the verdict in words, most important first
+  /// All of it and more as one JSON object, as `hermesh validate --json` prints it but for the file's name.
+  std::string json = {};
+
+  bool closed() const { return boundary_edges == 0; }
+  bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
+  bool oriented() const { return inconsistent_edges == 0; }
+  /// Whether the mesh is all of these and free of self-intersections; false where nobody looked for them.
+  bool watertight() const { return closed() && manifold() && oriented() && self_intersecting_pairs == 0; }
+};
+
+/// Judges a mesh. The report depends on the input alone, at any number of threads.
+/// @throws Error for options that have no effect without a reference, and a reference without polygons;
+/// Cancelled.
+HERMESH_API Report validate(const Mesh& mesh, const ValidateOptions& options, Context& context);
+
+/// Whether the pieces of a fracture fit one another.
+struct FractureReport {
+  bool consistent = false;  ///< whether each piece is right by itself, and all fit without gap or overlap
+  std::int64_t pieces = 0, triangles = 0, seam_triangles = 0, unmatched_cut = 0, intersecting_pairs = 0,
+               broken_pieces = 0;
+  double pieces_volume = 0.0;               ///< world units
+  std::vector<std::string> sentences = {};  ///< what does not balance, in words, or that all does
+};
+
+/// Judges all pieces of a fracture together. @throws Error for a piece without polygons; Cancelled.
+HERMESH_API FractureReport validate_fracture(const std::vector<Mesh>& pieces, Context& context);
+
+}  // namespace hermesh::HERMESH_V1
