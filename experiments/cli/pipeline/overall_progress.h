@@ -19,7 +19,7 @@ struct PlannedStage {
 std::vector<PlannedStage> plan_of(std::string_view command);
 
 /// Tells how much of a plan is done. The figure never falls, whatever stages come: one that is not planned, or comes
-/// once more than planned, takes half of what is left before the last stage.
+/// once more than planned, takes a tenth of what is left before the last stage, or half if only that is still to come.
 class OverallProgress {
  public:
   explicit OverallProgress(std::vector<PlannedStage> plan);

@@ -26,6 +26,16 @@ TEST(OverallProgress, AStageThatIsLeftOutIsSteppedOver) {
   EXPECT_DOUBLE_EQ(progress.update("c", 0.5), 0.75);
 }
 
+TEST(OverallProgress, AStageThatNobodyPlannedTakesAPartOfTheRest) {
+  OverallProgress progress({{"a", 1.0}, {"b", 4.0}, {"write", 5.0}});
+  EXPECT_DOUBLE_EQ(progress.update("a", 1.0), 0.1);
+  EXPECT_DOUBLE_EQ(progress.update("x", 1.0), 0.14) << "a tenth of the way from 0.1 to 0.5";
+  EXPECT_DOUBLE_EQ(progress.update("b", 1.0), 0.5);
+  OverallProgress repeated({{"a", 2.0}, {"write", 2.0}});
+  EXPECT_DOUBLE_EQ(repeated.update("a", 0.5), 0.25);
+  EXPECT_DOUBLE_EQ(repeated.update("x", 1.0), 0.375) << "half of the way from 0.25 to 0.5";
+}
+
 TEST(OverallProgress, NeverFallsNorEndsBeforeTheLastStage) {
   OverallProgress progress(plan_of("remesh"));
   double before = 0.0;
