@@ -1,6 +1,5 @@
 #include "experiments/cli/bounded.h"
 
-#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -10,22 +9,10 @@
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
+#include "experiments/cli/pipeline/command_files.h"
 
 namespace hermesh::cli {
 namespace {
-
-struct Unit {
-  const char* name;
-  double metres;
-};
-constexpr std::array<Unit, 7> kUnits{
-    {{"um", 1e-6}, {"mm", 1e-3}, {"cm", 1e-2}, {"dm", 1e-1}, {"m", 1.0}, {"in", 0.0254}, {"ft", 0.3048}}};
-
-double metres(const std::string& unit) {
-  for (const Unit& known : kUnits)
-    if (unit == known.name) return known.metres;
-  throw UsageError("'" + unit + "' is no unit: um, mm, cm, dm, m, in and ft are");
-}
 
 SignRule sign_rule(const VoxelizeArguments& voxelizing) {
   const std::string rule = voxelizing.signs.value_or("winding-number");
@@ -44,16 +31,14 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
   size.add_option(
       "--error", arguments.error,
       "Instead of a size the largest distance between the mesh and the polygons' solid, both ways, which is "
-      "proved: a number in the units of the file, with % of the diagonal of the polygons' box, or with a "
-      "unit "
-      "(0.05mm), for which --units says what the file's numbers are");
+      "proved: a number in world units, with % of the diagonal of the polygons' box, or, where --units says "
+      "what the file's numbers are, with a unit (0.05mm)");
   size.add_option("--triangles", arguments.triangles,
                   "Instead of a size the number of triangles at most: the mesh with the smallest proved "
                   "distance that was "
                   "found for them")
       ->check(CLI::Range(std::int64_t(4), std::int64_t(1) << 31));
   CLI::Option_group* group = command.add_option_group("With --error or --triangles");
-  group->add_option("--units", arguments.units, "Unit of the file's numbers: um, mm, cm, dm, m, in, ft");
   group->add_flag(
       "--over-holes", arguments.over_holes,
       "Let the mesh close holes, where no polygon is near that a distance could be proved to; the distance "
@@ -64,47 +49,42 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
                    "it needs more")
       ->check(CLI::Range(1e3, 1e9));
   group
-      ->add_option(
-          "--smallest-voxel", arguments.smallest_voxel,
-          "Edge of the smallest voxel that may be tried, in the units of the file (default: an eighth of the "
-          "error); the bound is refused where a wall or gap is too thin for it")
+      ->add_option("--smallest-voxel", arguments.smallest_voxel,
+                   "Edge of the smallest voxel that may be tried, in world units (default: an eighth of the "
+                   "error); the "
+                   "bound is refused where a wall or gap is too thin for it")
       ->check(CLI::PositiveNumber);
 }
 
 void check_bound_options(const CLI::App& command, const BoundArguments& arguments,
-                         const VoxelizeArguments& voxelizing) {
+                         const VoxelizeArguments& voxelizing, const std::string& units) {
   refuse_idle(command,
               {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
                "--isovalue", "--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid"},
               "with --error and --triangles the method is chosen for the bound");
   sign_rule(voxelizing);
-  if (arguments.error.empty()) {
-    refuse_idle(command, {"--units"}, "there is no --error that has a unit");
-    return;
-  }
-  error_in_file_units(arguments.error, arguments.units, 1.0);
+  if (!arguments.error.empty()) error_in_world_units(arguments.error, units, 1.0);
 }
 
 void refuse_without_bound(const CLI::App& command) {
-  refuse_idle(command, {"--units", "--over-holes", "--limit-points", "--smallest-voxel"},
+  refuse_idle(command, {"--over-holes", "--limit-points", "--smallest-voxel"},
               "it needs --error or --triangles");
 }
 
-double error_in_file_units(const std::string& text, const std::string& units, double diagonal) {
+double error_in_world_units(const std::string& text, const std::string& units, double diagonal) {
   double value = 0.0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
   const std::string unit(end, text.data() + text.size());
   if (failure != std::errc() || !std::isfinite(value) || value <= 0.0)
     throw UsageError("--error must be a number above 0, such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
-  if (unit == "%" || unit.empty()) {
-    if (!units.empty()) throw UsageError("--units has no effect: --error '" + text + "' has no unit");
-    return unit.empty() ? value : value / 100.0 * diagonal;
-  }
-  const double wanted = metres(unit);
+  if (unit.empty()) return value;
+  if (unit == "%") return value / 100.0 * diagonal;
+  const std::optional<double> metres = metres_in(unit);
+  if (!metres) throw UsageError("--error '" + text + "' ends with what is no unit; see --units");
   if (units.empty())
     throw UsageError("--error '" + text +
                      "' has a unit, and mesh files have none: say with --units what the file's numbers are");
-  return value * wanted / metres(units);
+  return value * *metres;
 }
 
 int run_bounded(const Paths& paths, const BoundArguments& arguments, const VoxelizeArguments& voxelizing,
@@ -117,7 +97,7 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
                                .most_points = arguments.most_points,
                                .smallest_voxel = arguments.smallest_voxel,
                                .written_in_single = is_written_in_single(paths.out)};
-  if (!arguments.triangles) options.error = error_in_file_units(arguments.error, arguments.units, diagonal);
+  if (!arguments.triangles) options.error = error_in_world_units(arguments.error, session.units, diagonal);
   const Stopwatch watch;
   const BoundedMesh made = about_file(paths.in, [&] {
     if (!(diagonal > 0.0)) throw Error("the polygons have no extent");

@@ -14,25 +14,29 @@ namespace hermesh::cli {
 struct BoundArguments {
   std::string error;                      ///< as given: a number, with % or a unit behind it
   std::optional<std::int64_t> triangles;  ///< budget
-  std::string units;                      ///< of the file's numbers: mm, …; empty: nobody said
   bool over_holes = false;
   double most_points = 3e7;
-  double smallest_voxel = 0.0;  ///< units of the file; 0: nobody said
+  double smallest_voxel = 0.0;  ///< world units; 0: nobody said
 
   bool asked() const { return !error.empty() || triangles; }
 };
 
 /// Adds --error and --triangles to the group of sizes, and what goes with them to the command.
 void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& arguments);
-/// Refuses what a bound leaves without effect, and an error that cannot be read. @throws UsageError
+/// Refuses what a bound leaves without effect, and an error that cannot be read. `units` are those of the
+/// file's numbers.
+/// @throws UsageError
 void check_bound_options(const CLI::App& command, const BoundArguments& arguments,
-                         const VoxelizeArguments& voxelizing);
+                         const VoxelizeArguments& voxelizing, const std::string& units);
 /// Refuses the options that need a bound. @throws UsageError
 void refuse_without_bound(const CLI::App& command);
 
-/// The error in the units of the file's numbers. @param text a number, with % or a unit behind it
-/// @param diagonal of the polygons' box, in those units. @throws UsageError
-double error_in_file_units(const std::string& text, const std::string& units, double diagonal);
+/// The error in world units, which are metres where somebody said what the file's numbers are.
+/// @param text a number, with % or a unit behind it
+/// @param units of the file's numbers; empty: nobody said
+/// @param diagonal of the polygons' box, world units
+/// @throws UsageError
+double error_in_world_units(const std::string& text, const std::string& units, double diagonal);
 
 int run_bounded(const Paths& paths, const BoundArguments& arguments, const VoxelizeArguments& voxelizing,
                 Session& session);

@@ -146,7 +146,7 @@ TEST_F(BadInputTest, UnwritableOutput) {
   std::filesystem::create_directory(path("folder.ply"));
   std::filesystem::create_directory(path("folder.vdb"));
   for (const char* out :
-       {"missing/out.ply", "folder.ply", "out.txt", "out.ply.gz", "out", "out.vdb", "cube.off/out.ply"})
+       {"missing/out.ply", "folder.ply", "out.txt", "out.vdb.gz", "out", "out.vdb", "cube.off/out.ply"})
     expect_refusal(1, {"remesh", "cube.off", out, "--resolution", "10"}, {out});
   for (const char* out : {"missing/out.vdb", "folder.vdb", "out.ply"})
     expect_refusal(1, {"voxelize", "cube.off", out, "--resolution", "10"}, {out});

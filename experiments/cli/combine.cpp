@@ -11,6 +11,7 @@
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
@@ -91,6 +92,7 @@ bool keeps_promises(const std::string& file, const Promises& promises, Session& 
       judge(read_mesh_file(file, session.context), promises, kPromisesAlone, session.context);
   std::vector<std::string> lines = report.sentences();
   lines.insert(lines.begin(), promise_verdict(promises, check));
+  made(session, "promises_kept", check.broken.empty());
   for (const std::string& line : lines)
     if (session.json)
       session.context.note(line);
@@ -121,6 +123,7 @@ int run_combine(const Arguments& given, Session& session) {
   check_not_empty(result, lost, arguments, lattice.voxel_size);
   if (lost.edges > 0) session.context.note(lost_slivers_note(lost, boolean, lattice.voxel_size));
   check_written_precision(arguments.out, result.level_set);
+  made(session, "crossings", result.hermite.crossings.size());
   print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
                              " edge crossings, " + seconds_text(watch.seconds()));
   write_mesh(arguments.out, contour(result, extractor, arguments, session), session.context);
@@ -142,6 +145,7 @@ void add_combine(CLI::App& app, Session& session) {
   command->add_option("A", arguments->first, kMeshIn)->required();
   command->add_option("B", arguments->second, kMeshIn)->required();
   command->add_option("OUT", arguments->out, kMeshOut)->required();
+  add_files(*command, session, {.inputs = {&arguments->first, &arguments->second}, .output = &arguments->out});
   add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option("--resolution")->description("Voxels along the longest side of the larger solid");

@@ -124,10 +124,11 @@ void add_conversions(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<Arguments>();
 
   CLI::App* command = add_command(app, session, "extract", "A volume to a mesh");
-  add_paths(*command, arguments->paths, "Volume: .vdb", kMeshOut);
+  add_paths(*command, session, arguments->paths, "Volume: .vdb, or - for the standard input", FileKind::volume, kMeshOut,
+            FileKind::mesh, true);
   add_json_option(*command, session);
   add_extract_options(*command, arguments->extracting, "dual-contouring");
-  command->add_option("--grid", arguments->extracting.grid,
+  command->add_option("--grid,--grid-name", arguments->extracting.grid,
                       "Name of the grid (default: sdf, or the only scalar grid there is)");
   command->add_option("--source", arguments->extracting.source,
                       "Mesh that the volume was made from, for extractors that want exact Hermite data");
@@ -146,7 +147,7 @@ void add_conversions(CLI::App& app, Session& session) {
 
   arguments = std::make_shared<Arguments>();
   command = add_command(app, session, "remesh", "Polygons to a level set and back to a mesh");
-  add_paths(*command, arguments->paths, kMeshIn, kMeshOut);
+  add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
   CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
   add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
@@ -154,7 +155,7 @@ void add_conversions(CLI::App& app, Session& session) {
   command->callback([arguments, command, &session] {
     session.command = [arguments, command, &session] {
       if (arguments->bound.asked()) {
-        check_bound_options(*command, arguments->bound, arguments->voxelizing);
+        check_bound_options(*command, arguments->bound, arguments->voxelizing, session.units);
         return run_bounded(arguments->paths, arguments->bound, arguments->voxelizing, session);
       }
       refuse_without_bound(*command);

@@ -2,6 +2,8 @@
 
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
+#include "experiments/cli/help/suggestions.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
@@ -20,13 +22,18 @@ void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, con
 
 ChosenExtractor choose_extractor(const ExtractorArguments& arguments) {
   return as_usage([&] {
+    check_variant_name(all_extractors(), "extractor", arguments.extractor);
     const Extractor extractor = find_variant(all_extractors(), arguments.extractor);
     return ChosenExtractor{extractor, parse_options(extractor.name, extractor.options, arguments.options)};
   });
 }
 
-void print_extracted(const Session& session, const PolygonMesh& mesh, const std::string& extractor,
+void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
                      double seconds) {
+  made(session, "points", mesh.points.size());
+  made(session, "triangles", mesh.triangle_count());
+  made(session, "quads", mesh.quads.size());
+  made(session, "extractor", extractor);
   print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
                              std::to_string(mesh.triangles.size()) + " triangles, " +
                              std::to_string(mesh.quads.size()) + " quads, " + extractor + ", " +

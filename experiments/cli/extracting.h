@@ -21,7 +21,7 @@ void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, con
 /// Looks the extractor up and checks its options. @throws UsageError for a name or an option that there is not.
 ChosenExtractor choose_extractor(const ExtractorArguments& arguments);
 
-void print_extracted(const Session& session, const PolygonMesh& mesh, const std::string& extractor,
+void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
                      double seconds);
 
 /// Writes the mesh; from then on a signal is too late.

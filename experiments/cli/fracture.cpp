@@ -8,6 +8,7 @@
 #include "algorithms/hermite/samplers.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
@@ -23,6 +24,7 @@ constexpr const char* kSizeGroup = "Voxel size, exactly one of";
 struct Arguments {
   Paths paths;
   VoxelizeArguments voxelizing;
+  std::string grid;  ///< empty: `sdf`, or the only scalar grid there is
   std::string cutters, hermite = "auto", density, rule = "printed";
   FractureMethod method;
   CutterChoices choices;
@@ -42,7 +44,7 @@ FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh
       throw UsageError("'" + arguments.paths.in +
                        "' has voxels already: leave out --resolution and --voxel-size");
     if (arguments.hermite == "exact") throw UsageError("--hermite exact needs polygons, not a volume");
-    object.level_set = read_level_set(arguments.paths.in, "", session.context);
+    object.level_set = read_level_set(arguments.paths.in, arguments.grid, session.context);
     object.hermite = about_file(arguments.paths.in,
                                 [&] { return sample_level_set(object.level_set, 0.0, session.context); });
     return object;
@@ -71,7 +73,12 @@ nlohmann::ordered_json head_of(const Arguments& arguments, const FractureObject&
           {"minimum_volume_voxels", arguments.method.options.least_samples}};
 }
 
-void summarise(const FractureSummary& summary, const Session& session) {
+void summarise(const FractureSummary& summary, Session& session) {
+  made(session, "pieces", summary.pieces);
+  if (summary.labelled) {
+    made(session, "changed_samples", summary.labelled->repair.changed_samples);
+    made(session, "merged_slivers", summary.labelled->merged.size());
+  }
   std::string line =
       "broke into " + std::to_string(summary.pieces) + " pieces, " + seconds_text(summary.seconds);
   if (const auto& labelled = summary.labelled) {
@@ -91,20 +98,23 @@ void note_idle_cutters(const FractureSummary& summary, Session& session) {
 }
 
 /// Whether the pieces are right by themselves; a loss of volume is said in a note, as it is of surfaces.
-bool report_ledger(const validation::FractureLedger& ledger, RunContext& context) {
-  for (const std::string& sentence : ledger.sentences()) std::cout << sentence << '\n';
-  for (const std::string& place : ledger.places) std::cout << "  " << place << '\n';
-  std::cout << "original surface: " << ledger.rest_triangles << " triangles, volume "
-            << text(ledger.rest_volume) << "; the pieces' volumes differ from it by "
-            << text(ledger.volume_difference()) << " of it";
-  if (ledger.expected_difference)
-    std::cout << ", and from the uncut mesh's by " << text(*ledger.expected_difference) << " of that";
-  std::cout << '\n';
+bool report_ledger(const validation::FractureLedger& ledger, Session& session) {
+  std::vector<std::string> lines = ledger.sentences();
+  for (const std::string& place : ledger.places) lines.push_back("  " + place);
+  lines.push_back("original surface: " + std::to_string(ledger.rest_triangles) + " triangles, volume " + text(ledger.rest_volume) +
+                  "; the pieces' volumes differ from it by " + text(ledger.volume_difference()) + " of it" +
+                  (ledger.expected_difference
+                       ? ", and from the uncut mesh's by " + text(*ledger.expected_difference) + " of that"
+                       : ""));
+  made(session, "sentences", lines);
+  made(session, "books_balance", ledger.is_consistent());
+  if (!session.json)
+    for (const std::string& line : lines) std::cout << line << '\n';
   if (ledger.lost_a_piece()) {
     const double difference = 100.0 * *ledger.expected_difference;
-    context.note("the pieces hold " + text(std::abs(difference)) + " % " + (difference < 0 ? "less" : "more") +
-                 " than the uncut mesh: parts thinner than two voxels end in a sharp edge at cuts; "
-                 "smaller voxels keep them");
+    session.context.note("the pieces hold " + text(std::abs(difference)) + " % " + (difference < 0 ? "less" : "more") +
+                         " than the uncut mesh: parts thinner than two voxels end in a sharp edge at cuts; "
+                         "smaller voxels keep them");
   }
   return ledger.is_consistent();
 }
@@ -113,8 +123,10 @@ bool report_ledger(const validation::FractureLedger& ledger, RunContext& context
 void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, const CLI::App& command) {
   using Kind = CutterSpec::Kind;
   if (is_volume(arguments.paths.in))
-    refuse_idle(command, {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band"},
+    refuse_idle(command, {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band", "--scale", "--units"},
                 "'" + arguments.paths.in + "' has voxels already");
+  else
+    refuse_idle(command, {"--grid"}, "'" + arguments.paths.in + "' has polygons, no grids");
   if (arguments.method.name != "labelled")
     refuse_idle(command, {"--min-volume", "--no-split"}, "only --method labelled looks at it");
   if (arguments.method.name != "thesis") refuse_idle(command, {"--rule"}, "only --method thesis looks at it");
@@ -160,7 +172,7 @@ int run_fracture_command(const Arguments& given, const CLI::App& command, Sessio
   note_idle_cutters(summary, session);
   const bool balances =
       !arguments.judge ||
-      report_ledger(folder.judge(session.context, uncut_volume(object, session.context)), session.context);
+      report_ledger(folder.judge(session.context, uncut_volume(object, session.context)), session);
   folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
   work_is_finished();
   return balances ? kDone : kNotMet;
@@ -198,8 +210,10 @@ void add_fracture(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       add_command(app, session, "fracture", "Break a solid into pieces that fit without a gap");
-  add_paths(*command, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb",
-            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty");
+  add_paths(*command, session, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb", FileKind::mesh_or_volume,
+            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty", FileKind::folder);
+  add_json_option(*command, session);
+  command->add_option("--grid,--grid-name", arguments->grid, "Name of the grid of a .vdb (default: sdf, or the only scalar grid there is)");
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option_group(kSizeGroup)->require_option(0, 1);
   add_cutter_options(*command, *arguments);

@@ -8,6 +8,7 @@
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
@@ -83,6 +84,11 @@ int run_import(const Arguments& arguments, Session& session) {
   work_is_finished();
   const std::array<int, 3> dims = volume.dimensions();
   const auto [lowest, highest] = value_range(volume);
+  made(session, "samples", dims);
+  made(session, "lowest", lowest);
+  made(session, "highest", highest);
+  made(session, "voxel_size", volume.voxel_size());
+  made(session, "grids", std::vector<std::string>{"volume"});
   print_summary(session, "imported " + arguments.paths.in + ": " + std::to_string(dims[0]) + " x " +
                              std::to_string(dims[1]) + " x " + std::to_string(dims[2]) + " samples, values " +
                              text(lowest) + " to " + text(highest) + ", " + seconds_text(watch.seconds()));
@@ -94,8 +100,10 @@ int run_import(const Arguments& arguments, Session& session) {
 void add_import(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command = add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
-  add_paths(*command, arguments->paths, "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped",
-            "Volume: .vdb, the grid `volume` in millimetres");
+  add_paths(*command, session, arguments->paths,
+            "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input", FileKind::imported,
+            "Volume: .vdb, the grid `volume` in millimetres, or - for the standard output", FileKind::volume);
+  add_json_option(*command, session);
   command->add_option("--frame", arguments->frame, "Which of a NIfTI file's volumes, from 0 (default: the first)");
   command->add_option("--dims", arguments->dims, "Raw: X,Y,Z, the numbers of samples; x is fastest in the file");
   command->add_option("--type", arguments->type,

@@ -9,28 +9,54 @@
 #include "algorithms/hermite/hermite_file.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/session.h"
 
 namespace hermesh::cli {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 std::string index_text(const std::array<int, 3>& index) {
   return "(" + std::to_string(index[0]) + ", " + std::to_string(index[1]) + ", " + std::to_string(index[2]) +
          ")";
 }
 
-void print_mesh(const std::filesystem::path& path, RunContext& context) {
-  const MeshFile mesh = read_mesh_file(path, context);
+Json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+void print_mesh(const std::filesystem::path& path, Session& session) {
+  const MeshFile mesh = read_mesh_file(path, session.context);
   Bounds used;
   for (const Triangle& triangle : mesh.triangles)
     for (const std::uint32_t point : triangle) used.add(mesh.points[point]);
   for (const Quad& quad : mesh.quads)
     for (const std::uint32_t point : quad) used.add(mesh.points[point]);
-  std::cout << "file       " << path.string() << "\nkind       polygon mesh"
+  made(session, "kind", "polygon mesh");
+  made(session, "points", mesh.points.size());
+  made(session, "triangles", mesh.triangle_count());
+  made(session, "quads", mesh.quads.size());
+  made(session, "lower", numbers(used.lower));
+  made(session, "upper", numbers(used.upper));
+  if (mesh.origin) made(session, "origin", numbers(*mesh.origin));
+  if (session.json) return;
+  std::cout << "file       " << session.named(path.string()) << "\nkind       polygon mesh"
             << "\npoints     " << mesh.points.size() << "\ntriangles  " << mesh.triangles.size()
             << "\nquads      " << mesh.quads.size() << "\nlower      " << text(used.lower) << "\nupper      "
             << text(used.upper) << "\nsize       " << text(used.size()) << "\norigin     "
             << (mesh.origin ? text(*mesh.origin) : "not stated") << '\n';
+}
+
+Json to_json(const GridSummary& grid) {
+  Json json = {{"name", grid.name}, {"type", grid.value_type}, {"class", grid.grid_class}, {"voxel_size", grid.voxel_size}};
+  if (!grid.is_read) return json;
+  json["voxels"] = grid.active_voxels;
+  json["memory_bytes"] = grid.memory_bytes;
+  if (grid.active_voxels > 0) {
+    json["lower"] = grid.lower;
+    json["upper"] = grid.upper;
+  }
+  if (grid.background) json["background"] = *grid.background;
+  return json;
 }
 
 void print_grid(const GridSummary& grid) {
@@ -51,8 +77,12 @@ void print_grid(const GridSummary& grid) {
 }
 
 /// Prints what describe_vdb() cannot tell of grids that hold Hermite data.
-void print_hermite(const std::filesystem::path& path, RunContext& context) {
-  const HermiteSummary hermite = summary_of(read_hermite(path, context));
+void print_hermite(const std::filesystem::path& path, Session& session) {
+  const HermiteSummary hermite = summary_of(read_hermite(path, session.context));
+  made(session, "hermite",
+       {{"representation", hermite.representation}, {"normal_code", hermite.normal_code}, {"crossings", hermite.crossings},
+        {"leaves", hermite.leaves}, {"memory_bytes", hermite.memory_bytes}});
+  if (session.json) return;
   std::cout << "Hermite data\n  voxels       " << hermite.representation << "\n  normals      " << hermite.normal_code
             << "\n  crossings    " << hermite.crossings << ", in " << hermite.leaves << " leaves\n  memory       "
             << hermite.memory_bytes << " bytes";
@@ -62,16 +92,21 @@ void print_hermite(const std::filesystem::path& path, RunContext& context) {
   std::cout << '\n';
 }
 
-void print_volume(const std::filesystem::path& path, RunContext& context) {
+void print_volume(const std::filesystem::path& path, Session& session) {
   const std::vector<GridSummary> grids = describe_vdb(path);
-  std::cout << "file           " << path.string() << "\nkind           OpenVDB, " << grids.size()
-            << (grids.size() == 1 ? " grid\n" : " grids\n");
+  Json list = Json::array();
+  for (const GridSummary& grid : grids) list.push_back(to_json(grid));
+  made(session, "kind", "OpenVDB");
+  made(session, "grids", list);
+  if (!session.json)
+    std::cout << "file           " << session.named(path.string()) << "\nkind           OpenVDB, " << grids.size()
+              << (grids.size() == 1 ? " grid\n" : " grids\n");
   bool has_hermite = false;
   for (const GridSummary& grid : grids) {
-    print_grid(grid);
+    if (!session.json) print_grid(grid);
     has_hermite |= grid.name == "hermite_signs" || grid.value_type.find("hermite_") != std::string::npos;
   }
-  if (has_hermite) print_hermite(path, context);
+  if (has_hermite) print_hermite(path, session);
 }
 
 }  // namespace
@@ -79,14 +114,16 @@ void print_volume(const std::filesystem::path& path, RunContext& context) {
 void add_info(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "info", "What a mesh or a .vdb file holds");
   auto file = std::make_shared<std::string>();
-  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl, also with .gz) or .vdb")->required();
+  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl, also with .gz) or .vdb, or - for the standard input")->required();
+  add_files(*command, session, {.inputs = {file.get()}, .in = FileKind::mesh_or_volume});
+  add_json_option(*command, session);
   command->callback([file, &session] {
     session.command = [file, &session] {
       const std::filesystem::path path = *file;
       if (is_mesh_path(path))
-        print_mesh(path, session.context);
+        print_mesh(path, session);
       else if (path.extension() == ".vdb")
-        print_volume(path, session.context);
+        print_volume(path, session);
       else
         throw Error("cannot tell what '" + *file + "' is: its name ends neither in .vdb nor in " +
                     ".ply, .obj, .off or .stl (.gz may follow)");

@@ -4,13 +4,17 @@
 
 #include <algorithm>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <new>
 #include <thread>
 
 #include "algorithms/core/shown.h"
 #include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
+#include "experiments/cli/help/suggestions.h"
+#include "experiments/cli/pipeline/batch.h"
+#include "experiments/cli/pipeline/json_report.h"
+#include "experiments/cli/pipeline/log_file.h"
+#include "experiments/cli/pipeline/streams.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/terminal_progress.h"
@@ -30,55 +34,69 @@ int fail(int exit_code, const std::string& sentence) {
 
 void print_notes(Session& session) {
   if (!session.quiet)
-    for (const std::string& note : session.context.notes) std::cerr << "note: " << shown(note, kLongest, true) << '\n';
+    for (const std::string& note : session.context.notes)
+      std::cerr << "note: " << shown(session.named(note), kLongest, true) << '\n';
   session.context.notes.clear();
 }
 
-/// Most threads that can be asked for: TBB reserves memory for as many as it is told that there may be.
-constexpr int kMostThreads = 1024;
-
-void add_common_options(CLI::App& app, Session& session) {
-  app.add_option("--threads", session.threads, "Number of threads, 1 to 1024 (default: all of the machine)")
-      ->check([](const std::string& given) {
-        int count = 0;
-        return CLI::detail::lexical_cast(given, count) && count >= 1 && count <= kMostThreads
-                   ? std::string()
-                   : "must be a whole number from 1 to " + std::to_string(kMostThreads) + ", not '" + given + "'";
-      });
-  app.add_flag("--quiet", session.quiet, "Print results and errors only: no progress, notes or summaries");
-}
-
-void print_json(const Session& session) {
-  nlohmann::json json{{"notes", session.context.notes}, {"figures", nlohmann::json::object()}};
-  for (const auto& [name, value] : session.context.figures) json["figures"][name] = value;
-  for (const auto& [stage, seconds] : session.context.stage_seconds)
-    json["stage_seconds"].push_back({{"stage", stage}, {"seconds", seconds}});
-  // A file's name need not be UTF-8, JSON must.
-  std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-}
-
-int run_command(Session& session) {
-  const TerminalProgress progress(session.context, !session.quiet);
+/// Runs the command on the files that were named, or on standard streams.
+int run_on_files(Session& session, CommandFiles* files) {
+  std::optional<Streams> streams;
+  if (files) streams.emplace(*files, session);
   const int exit_code = session.command();
-  if (session.json) print_json(session);
+  if (streams) streams->deliver();
+  return exit_code;
+}
+
+/// Runs the command, shows and logs how it gets on, and tells in JSON what came of it, if asked.
+int run_command(Session& session, CommandFiles* files) {
+  // A batch counts its files, which is all of its progress.
+  const bool batch = session.writes_json_itself;
+  const TerminalProgress progress(session.context, !session.quiet,
+                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(session.command_name));
+  std::optional<LogFile> log;
+  if (!session.log_file.empty()) log.emplace(session, session.log_file, session.command_line);
+  int exit_code = kFailed;
+  try {
+    exit_code = run_on_files(session, files);
+  } catch (const std::exception& error) {
+    if (log) log->line(std::string("failed: ") + error.what());
+    throw;
+  }
+  if (log) log->line("ended with exit code " + std::to_string(exit_code));
+  erase_progress_line();
+  for (std::string& note : session.context.notes) note = session.named(note);
+  if (!session.writes_json_itself) write_json_report(session, exit_code, "");
   std::cout.flush();
   if (!std::cout) throw Error("cannot write to the standard output");
   return exit_code;
 }
 
+/// Exit code and sentence of what ended the command.
+std::pair<int, std::string> failure(const std::exception& error, const Session& session) {
+  if (dynamic_cast<const UsageError*>(&error)) return {kUsage, session.named(error.what())};
+  if (dynamic_cast<const DataMissing*>(&error)) return {kNotMet, session.named(error.what())};
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return {kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory"};
+  return {kFailed, session.named(error.what())};
+}
+
 /// Turns whatever ends the command into an exit code and at most one line.
-int run_to_exit_code(Session& session) {
+int run_to_exit_code(Session& session, CommandFiles* files) {
   try {
-    return run_command(session);
+    return run_command(session, files);
   } catch (const std::exception& error) {
     // Whatever a library throws while the user is waiting for the end, it ends because the user said so.
     if (const int exit_code = signal_exit_code()) end_process(exit_code);
+    const auto [exit_code, sentence] = failure(error, session);
+    // Who reads JSON gets the failure in it, too. What cannot be written then has been complained of by the failure.
+    try {
+      if (!session.writes_json_itself) write_json_report(session, exit_code, sentence);
+      std::cout.flush();
+    } catch (const std::exception&) {
+    }
     print_notes(session);
-    if (dynamic_cast<const UsageError*>(&error)) return fail(kUsage, error.what());
-    if (dynamic_cast<const DataMissing*>(&error)) return fail(kNotMet, error.what());
-    if (dynamic_cast<const std::bad_alloc*>(&error))
-      return fail(kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory");
-    return fail(kFailed, error.what());
+    return fail(exit_code, sentence);
   }
 }
 
@@ -94,9 +112,22 @@ std::string option_without_value(const CLI::App& app) {
   return {};
 }
 
+/// The arguments in the order in which CLI11 takes them, the last one first. The file of --json is tied to it, for a flag
+/// takes no value of its own accord; no file that a command reads or makes ends as that one does.
+std::vector<std::string> with_json_files(int argc, char** argv) {
+  std::vector<std::string> words(argv + 1, argv + argc);
+  for (std::size_t i = 0; i + 1 < words.size(); ++i)
+    if (words[i] == "--json" && (words[i + 1].ends_with(".json") || words[i + 1].ends_with(".jsonl"))) {
+      words[i] += "=" + words[i + 1];
+      words.erase(words.begin() + std::ptrdiff_t(i) + 1);
+    }
+  return {words.rbegin(), words.rend()};
+}
+
 int run_program(int argc, char** argv) {
   Session session;
   session.context.cancel = &handle_signals();
+  session.version = HERMESH_VERSION;
   CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
   set_source_state(built_from());
   app.set_version_flag("--version", [] { return "hermesh " HERMESH_VERSION "\n" + provenance_text(); },
@@ -113,11 +144,15 @@ int run_program(int argc, char** argv) {
   add_info(app, session);
   add_experiments(app, session);
   add_compare(app, session);
+  add_help(app, session);
+  for (int i = 1; i < argc; ++i) session.command_line += (i > 1 ? " " : "") + std::string(argv[i]);
   try {
-    app.parse(argc, argv);
+    app.parse(with_json_files(argc, argv));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
+    std::string sentence = unknown_word(app, {argv + 1, argv + argc});
+    if (sentence.empty() && dynamic_cast<const CLI::RequiredError*>(&error)) sentence = missing_output(app, session);
+    return fail(kUsage, (sentence.empty() ? error.what() : sentence) + "; see hermesh --help");
   }
   if (const std::string option = option_without_value(app); !option.empty())
     return fail(kUsage, option + " was given an empty value; see hermesh --help");
@@ -127,29 +162,23 @@ int run_program(int argc, char** argv) {
   std::optional<tbb::global_control> limit;
   if (session.threads)
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(*session.threads));
-  const int exit_code = run_to_exit_code(session);
+  CommandFiles* files = nullptr;
+  try {
+    files = files_of_command(app, session);
+  } catch (const UsageError& error) {
+    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
+  }
+  session.report = std::make_shared<JsonReport>();
+  // A flag without a value is "true".
+  session.json = session.json_file == "true";
+  if (session.json) session.json_file.clear();
+  const int exit_code = run_to_exit_code(session, files);
   work_is_finished();
   print_notes(session);
   return exit_code;
 }
 
 }  // namespace
-
-CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary) {
-  CLI::App* command = app.add_subcommand(name, summary);
-  add_common_options(*command, session);
-  return command;
-}
-
-void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
-  for (const char* option : options)
-    if (command.count(option) > 0) throw UsageError(std::string(option) + " has no effect: " + why);
-}
-
-void add_json_option(CLI::App& command, Session& session) {
-  command.add_flag("--json", session.json, "Print what was done as JSON: notes, figures, times of stages");
-}
-
 }  // namespace hermesh::cli
 
 int main(int argc, char** argv) {

@@ -22,14 +22,15 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 }  // namespace
 
 void check_mesh_output(const std::filesystem::path& path) {
-  if (!is_mesh_path(path) || lower_case_extension(path) == ".gz")
+  if (!is_mesh_path(path))
     throw Error("cannot write a mesh to '" + path.string() +
-                "': its name must end in .ply, .obj, .off or .stl");
+                "': its name must end in .ply, .obj, .off or .stl (.gz may follow)");
   check_writable(path);
 }
 
 void check_keeps_attributes(const std::filesystem::path& path) {
-  if (lower_case_extension(path) != ".ply")
+  const bool packed = lower_case_extension(path) == ".gz";
+  if (lower_case_extension(packed ? path.stem() : path) != ".ply")
     throw UsageError("'" + path.string() + "' would lose the attributes: only .ply keeps them");
 }
 

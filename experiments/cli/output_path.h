@@ -6,12 +6,12 @@
 namespace hermesh::cli {
 
 /// Checks that a mesh can be written there.
-/// @throws Error if the path is not one that meshes are written to (.ply .obj .off .stl), or check_writable()
+/// @throws Error if the path is not one that meshes are written to (.ply .obj .off .stl, also with .gz), or check_writable()
 /// throws.
 void check_mesh_output(const std::filesystem::path& path);
 
 /// Checks that a file of that kind keeps attributes. @throws UsageError if meshes lose the attributes of their points
-/// in files of that kind: all but .ply.
+/// in files of that kind: all but .ply and .ply.gz.
 void check_keeps_attributes(const std::filesystem::path& path);
 
 /// Checks that a volume can be written there. @throws Error if the path does not end in

@@ -62,6 +62,10 @@ ProgramTest::~ProgramTest() {
 
 void ProgramTest::execute(std::vector<std::string> words, int err) const {
   words.insert(words.begin(), HERMESH_PROGRAM);
+  become(std::move(words), err);
+}
+
+void ProgramTest::become(std::vector<std::string> words, int err) const {
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -87,6 +91,19 @@ Outcome ProgramTest::run(const std::vector<std::string>& arguments,
     std::this_thread::sleep_for(interruption->after);
     kill(child, interruption->signal);
   }
+  return outcome_of(child);
+}
+
+Outcome ProgramTest::run_shell(const std::string& script) {
+  const pid_t child = fork();
+  if (child == 0) {
+    setenv("H", HERMESH_PROGRAM, 1);
+    become({"/bin/bash", "-c", script}, open_or_exit(streams_ / "err", O_WRONLY | O_CREAT | O_TRUNC));
+  }
+  return outcome_of(child);
+}
+
+Outcome ProgramTest::outcome_of(int child) const {
   const Clock::time_point start = Clock::now();
   int status = 0;
   waitpid(child, &status, 0);
@@ -129,6 +146,15 @@ void ProgramTest::write_cube() {
         "OFF\n8 12 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
         "3 0 2 1\n3 0 3 2\n3 4 5 6\n3 4 6 7\n3 0 1 5\n3 0 5 4\n"
         "3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+}
+
+void ProgramTest::write_open_cube() {
+  write_cube();
+  std::string cube = read("cube.off");
+  const std::string face = "3 3 0 4\n3 3 4 7\n", all = "8 12 0";
+  cube.erase(cube.find(face), face.size());
+  cube.replace(cube.find(all), all.size(), "8 10 0");
+  write("open.off", cube);
 }
 
 void ProgramTest::write_sphere() {

@@ -36,6 +36,9 @@ class ProgramTest : public testing::Test {
   /// stdin.
   Outcome run(const std::vector<std::string>& arguments, std::optional<Interruption> interruption = {});
 
+  /// Runs a script of the shell in the test's folder, in which $H is the program.
+  Outcome run_shell(const std::string& script);
+
   /// Sets a limit (RLIMIT_…) for the programs that are run from now on.
   void limit(int resource, std::uint64_t value) { limits_.emplace_back(resource, value); }
 
@@ -50,13 +53,19 @@ class ProgramTest : public testing::Test {
 
   /// A cube with a side of 2 about the origin, 8 points and 12 triangles, as cube.off.
   void write_cube();
+  /// The cube without one of its faces, of which the program notes that it has a hole, as open.off.
+  void write_open_cube();
   /// A unit sphere of latitudes and longitudes, as sphere.off.
   void write_sphere();
 
  private:
-  /// Becomes the program, in the child process: streams, folder and limits are set first; `err` is
+  /// Becomes the program of the first word, in the child process: streams, folder and limits are set first; `err` is
   /// a file descriptor for stderr.
+  [[noreturn]] void become(std::vector<std::string> words, int err) const;
+  /// Becomes `hermesh` with these arguments, as become() does.
   [[noreturn]] void execute(std::vector<std::string> words, int err) const;
+  /// What becomes of a child process, once it has ended.
+  Outcome outcome_of(int child) const;
 
   std::filesystem::path folder_, streams_;
   std::vector<std::pair<int, std::uint64_t>> limits_;

@@ -136,13 +136,12 @@ std::string report_text(const MeshReport& report, const std::string& file,
   return lines.str();
 }
 
-std::string report_json(const MeshReport& report, const std::string& file,
+nlohmann::json report_json(const MeshReport& report, const std::string& file,
                         const std::vector<std::string>& unmet) {
   nlohmann::json json = validation::to_json(report);
   json["mesh"] = file;
   json["unmet_requirements"] = unmet;
-  // A file's name need not be UTF-8, JSON must.
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json;
 }
 
 }  // namespace hermesh::cli

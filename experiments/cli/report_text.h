@@ -1,6 +1,7 @@
 // A mesh report for people and for programs.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ std::string report_text(const validation::MeshReport& report, const std::string&
                         const std::vector<std::string>& unmet);
 
 /// The report as JSON: the object of validation::to_json(), with `mesh`, the file, and `unmet_requirements`, a list.
-std::string report_json(const validation::MeshReport& report, const std::string& file,
-                        const std::vector<std::string>& unmet);
+nlohmann::json report_json(const validation::MeshReport& report, const std::string& file,
+                           const std::vector<std::string>& unmet);
 
 }  // namespace hermesh::cli

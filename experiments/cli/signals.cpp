@@ -26,6 +26,7 @@ enum class State { working, finished, ending };
 std::atomic<bool> cancel_flag{false};
 std::atomic<int> signal_number{0};
 std::atomic<State> state{State::working};
+std::atomic<bool> end_is_held{false};
 int wake_pipe[2] = {-1, -1};
 
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free,
@@ -91,7 +92,10 @@ const std::atomic<bool>& handle_signals() {
   return cancel_flag;
 }
 
+void hold_the_end(bool held) noexcept { end_is_held.store(held); }
+
 void work_is_finished() noexcept {
+  if (end_is_held.load()) return;
   State working = State::working;
   if (state.compare_exchange_strong(working, State::finished)) return;
   while (working == State::ending) pause();

@@ -16,6 +16,9 @@ const std::atomic<bool>& handle_signals();
 /// return if the watchdog is ending the process at this moment.
 void work_is_finished() noexcept;
 
+/// While held, work_is_finished() does nothing: the output is made, but has still to go to where it was asked for.
+void hold_the_end(bool held) noexcept;
+
 /// The exit code for the signal that came, 128 plus its number; 0 if none came.
 int signal_exit_code() noexcept;
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "experiments/cli/cli11.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/report_text.h"
 #include "experiments/cli/session.h"
 #include "validation/mesh_report.h"
@@ -19,7 +20,7 @@ using validation::MeshReport;
 struct Arguments {
   std::string mesh, reference, features;
   std::string require;
-  bool certify = false, json = false;
+  bool certify = false;
   std::int64_t samples = JudgeOptions().samples;
   double dihedral = JudgeOptions().dihedral_degrees, voxel_size = 0.0;
 };
@@ -100,8 +101,11 @@ int run_validate(const Arguments& arguments, const CLI::App& command, Session& s
   // A watertight surface about something else is not what was meant by naming a reference. Where nobody can tell what
   // the reference encloses, only who asks for the solid asks too much.
   if (watertight && !solid && other_solid(report)) unmet.push_back("solid");
-  std::cout << (arguments.json ? report_json(report, arguments.mesh, unmet)
-                               : report_text(report, arguments.mesh, unmet));
+  const std::string name = session.inputs[0];
+  session.report->beside = report_json(report, name, unmet);
+  made(session, "sentences", report.sentences());
+  made(session, "unmet_requirements", unmet);
+  if (!session.json) std::cout << report_text(report, session.named(arguments.mesh), unmet);
   return unmet.empty() ? kDone : kNotMet;
 }
 
@@ -111,7 +115,8 @@ void add_validate(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "validate", "Judge a mesh: topology, self-intersections, distances");
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("MESH", arguments->mesh, "Mesh: .ply .obj .off .stl, also with .gz")->required();
+  command->add_option("MESH", arguments->mesh, "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard input")->required();
+  add_files(*command, session, {.inputs = {&arguments->mesh}, .takes_many = true});
   command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");
   command->add_flag("--certify", arguments->certify,
                     "Bound the Hausdorff distances to the reference for certain");
@@ -136,7 +141,7 @@ void add_validate(CLI::App& app, Session& session) {
                    "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "
                    "(default: three times the distance from the mesh to the reference)")
       ->check(CLI::PositiveNumber);
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_json_option(*command, session);
   command->callback([arguments, command, &session] {
     session.command = [arguments, command, &session] { return run_validate(*arguments, *command, session); };
   });

@@ -11,11 +11,14 @@
 #include "algorithms/thesis/thesis_volumes.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/output_path.h"
+#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/voxelizing.h"
 
 namespace hermesh::cli {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 struct Arguments {
   Paths paths;
@@ -76,6 +79,7 @@ PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& s
   if (request.all_attributes && file.attributes.empty() && file.attributes_left_out)
     drop_unreadable(request, path, session);
   request.triangle_numbers = std::move(file.triangle_numbers);
+  scale_points(file, session.scale);
   PolygonMesh mesh = about_file(path, [&] { return to_polygon_mesh(std::move(file)); });
   choose_diagonals(mesh);
   return mesh;
@@ -114,6 +118,9 @@ void write_outputs(const Arguments& arguments, VolumeRequest request, const Chos
   const VolumeOutputs outputs = outputs_by(chosen.voxelizer.name, input, request);
   if (voxelizing.like) out_of_frame(outputs.grids, frame, first);
   session.context.check();
+  Json names = Json::array();
+  for (const openvdb::GridBase::Ptr& grid : outputs.grids) names.push_back(grid->getName());
+  made(session, "grids", names);
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
   for (const openvdb::GridBase::Ptr& grid : outputs.grids)
     if (grid->getName() == "sdf")
@@ -129,6 +136,8 @@ int run_voxelize(const Arguments& arguments, Session& session) {
   const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
   const VolumeRequest request = requested(arguments);
   check_volume_output(arguments.paths.out);
+  if (request.hermite && session.writes_stream)
+    throw UsageError("the grid hermite is a second file, which the standard output cannot hold: name an output");
   if (request.hermite) check_writable(hermite_path(arguments.paths.out));
   if (knows_triangles(chosen.voxelizer.name)) {
     write_outputs(arguments, request, chosen, session);
@@ -147,7 +156,8 @@ void add_voxelize(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
-  add_paths(*command, arguments->paths, kMeshIn, "Volumes: .vdb");
+  add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, "Volumes: .vdb, or - for the standard output",
+            FileKind::volume, true);
   add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing, true);
   command->add_option(

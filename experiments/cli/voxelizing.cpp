@@ -1,5 +1,6 @@
 #include "experiments/cli/voxelizing.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <limits>
@@ -10,6 +11,9 @@
 #include "algorithms/core/quad_diagonals.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
+#include "experiments/cli/help/suggestions.h"
+#include "experiments/cli/pipeline/json_report.h"
+#include "experiments/cli/terminal_progress.h"
 #include "experiments/harness/harness.h"
 
 namespace hermesh::cli {
@@ -35,9 +39,13 @@ double voxel_size_for(const PolygonMesh& mesh, const VoxelizeArguments& argument
 
 }  // namespace
 
-void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out) {
+void add_paths(CLI::App& command, Session& session, Paths& paths, const std::string& in, FileKind in_kind, const std::string& out,
+               FileKind out_kind, bool many) {
   command.add_option("IN", paths.in, in)->required();
-  command.add_option("OUT", paths.out, out)->required();
+  // Many inputs have outputs in a folder, and then none is named here.
+  command.add_option("OUT", paths.out, out)->required(!many);
+  add_files(command, session,
+            {.inputs = {&paths.in}, .output = &paths.out, .in = in_kind, .out = out_kind, .takes_many = many});
 }
 
 CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
@@ -82,11 +90,19 @@ Options parse_options(const std::string& variant, const std::vector<OptionSpec>&
   for (const std::string& text : texts)
     if (const auto option = parse_option(text); !given.insert(option).second)
       throw Error("option '" + option.first + "' of " + variant + " is given twice");
+  // A name that is near to one that there is gets a suggestion; the others are listed by Options.
+  std::vector<std::string> names;
+  for (const OptionSpec& option : declared) names.push_back(option.name);
+  for (const auto& [name, value] : given)
+    if (std::ranges::find(names, name) == names.end())
+      if (const std::string meant = did_you_mean(name, names); !meant.empty())
+        throw Error(variant + " has no option '" + name + "'" + meant);
   return Options(variant, declared, given);
 }
 
 ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
   return as_usage([&] {
+    check_variant_name(all_voxelizers(), "voxelizer", arguments.voxelizer);
     const Voxelizer voxelizer = find_variant(all_voxelizers(), arguments.voxelizer);
     std::vector<std::string> options = arguments.options;
     if (arguments.signs) options.push_back("signs=" + *arguments.signs);
@@ -95,9 +111,17 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
 }
 
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options) {
-  PolygonMesh mesh = read_mesh(path, session.context, options);
+  MeshFile file = read_mesh_file(path, session.context, options);
+  scale_points(file, session.scale);
+  PolygonMesh mesh = about_file(path, [&] { return to_polygon_mesh(std::move(file)); });
   choose_diagonals(mesh);
   return mesh;
+}
+
+void scale_points(MeshFile& file, double factor) {
+  if (factor == 1.0) return;
+  for (Eigen::Vector3d& point : file.points) point *= factor;
+  if (file.origin) *file.origin *= factor;
 }
 
 VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
@@ -134,12 +158,18 @@ void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const
 }
 
 void print_summary(const Session& session, const std::string& line) {
+  if (session.log) session.log(line);
   if (session.quiet || session.json) return;
-  std::cout << line << '\n';
+  erase_progress_line();
+  std::cout << session.named(line) << '\n';
 }
 
-void print_voxelized(const Session& session, const std::string& file, const VoxelizationInput& input,
+void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
                      std::size_t active_voxels, const std::string& voxelizer, double seconds) {
+  made(session, "polygons", input.mesh.triangle_count());
+  made(session, "voxels", active_voxels);
+  made(session, "voxel_size", input.voxel_size);
+  made(session, "voxelizer", voxelizer);
   print_summary(session, "voxelized " + file + ": " + std::to_string(input.mesh.triangle_count()) +
                              " triangles, " + std::to_string(active_voxels) + " voxels of " +
                              text(input.voxel_size) + ", " + voxelizer + ", " + seconds_text(seconds));

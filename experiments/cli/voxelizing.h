@@ -27,7 +27,10 @@ struct VoxelizeArguments {
   std::vector<std::string> options;  ///< key=value
 };
 
-void add_paths(CLI::App& command, Paths& paths, const std::string& in, const std::string& out);
+/// Adds the input and the output, and registers them as files of these kinds (session.h); `many` lets the command run on
+/// many inputs.
+void add_paths(CLI::App& command, Session& session, Paths& paths, const std::string& in, FileKind in_kind, const std::string& out,
+               FileKind out_kind, bool many = false);
 /// Adds the options of VoxelizeArguments, with `with_like` also `--like`, which takes the lattice of a volume. Returns the
 /// group of those that say how large a voxel is, of which exactly one has to be given.
 CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
@@ -38,8 +41,12 @@ Options parse_options(const std::string& variant, const std::vector<OptionSpec>&
 /// Looks the voxelizer up and checks its options. @throws UsageError for a name or an option that there is not.
 ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments);
 
-/// Reads a mesh to voxelize: its quads are cut along the better diagonal. @throws Error if it cannot be read.
+/// Reads a mesh to voxelize, in world units (session.scale): its quads are cut along the better diagonal.
+/// @throws Error if it cannot be read.
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options = {});
+
+/// Multiplies all points, in double precision, so that nothing is rounded twice.
+void scale_points(MeshFile& file, double factor);
 
 /// What the chosen voxelizer gets, with the voxel size in world units that the arguments ask for.
 /// @throws Error where a resolution is asked of a mesh without extent.
@@ -66,10 +73,10 @@ class Stopwatch {
 };
 
 void print_summary(const Session& session, const std::string& line);
-void print_voxelized(const Session& session, const std::string& file, const VoxelizationInput& input,
+void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
                      std::size_t active_voxels, const std::string& voxelizer, double seconds);
 
-inline constexpr const char* kMeshIn = "Mesh: .ply .obj .off .stl, also with .gz";
-inline constexpr const char* kMeshOut = "Mesh: .ply .obj .off .stl";
+inline constexpr const char* kMeshIn = "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard input";
+inline constexpr const char* kMeshOut = "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard output";
 
 }  // namespace hermesh::cli
