@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
@@ -103,7 +104,10 @@ Json told_by(const ChildRun& child, const BatchItem& item) {
   std::string why = child.err();
   while (why.ends_with('\n')) why.pop_back();
   why = why.substr(why.rfind('\n') + 1);
-  if (!child.crash().empty()) why = "the program crashed (" + child.crash() + "); please report this file";
+  if (child.signal() == SIGKILL)
+    why = "the program was killed, most likely for want of memory: use larger voxels, or fewer --jobs";
+  else if (child.signal() != 0)
+    why = "the program crashed (" + std::string(strsignal(child.signal())) + "); please report this file";
   if (why.empty()) why = "the program ended with exit code " + std::to_string(child.exit_code());
   return {{"input", item.input},  {"output", item.output},
           {"status", "failed"},   {"exit_code", child.exit_code()},

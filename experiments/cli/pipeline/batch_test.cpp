@@ -161,6 +161,20 @@ TEST_F(BatchTest, CtrlCStopsAllAndLeavesNothingHalfWritten) {
   }
 }
 
+TEST_F(BatchTest, AProcessThatIsKilledIsOneFailure) {
+  const Outcome outcome = run_shell(
+      "$H remesh s1.off cube.off --out-dir clean --resolution 900 --json summary.jsonl & p=$!; "
+      "kill_child() { until kill -KILL $(cat /proc/$p/task/$p/children) 2> /dev/null; do sleep 0.05; done; }; "
+      "kill_child; sleep 0.3; kill_child; wait $p");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.out.find("0 of 2 done, 2 failed"), std::string::npos) << outcome.out;
+  EXPECT_EQ(count(outcome.err, "for want of memory"), 2u) << outcome.err;
+  const std::vector<Json> all = lines("summary.jsonl");
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].at("status"), "failed");
+  EXPECT_EQ(all[0].at("output"), "clean/s1.ply");
+}
+
 TEST_F(BatchTest, IsQuietAndLogged) {
   const Outcome outcome = run({"remesh", "s1.off", "bad1.ply", "--out-dir", "clean", "--voxel-size", "0.2",
                                "--quiet", "--log", "log"});

@@ -77,7 +77,7 @@ bool ChildRun::has_ended() {
   drain(out_end_, out_);
   drain(err_end_, err_);
   pid_ = -1;
-  if (WIFSIGNALED(status)) crash_ = strsignal(WTERMSIG(status));
+  if (WIFSIGNALED(status)) signal_ = WTERMSIG(status);
   if (WIFEXITED(status)) exit_code_ = WEXITSTATUS(status);
   return true;
 }

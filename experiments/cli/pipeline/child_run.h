@@ -23,8 +23,8 @@ class ChildRun {
   /// Asks it to end, without waiting.
   void ask_to_end();
 
-  int exit_code() const { return exit_code_; }         ///< −1 if a signal ended it
-  const std::string& crash() const { return crash_; }  ///< what the signal is called; empty without one
+  int exit_code() const { return exit_code_; }  ///< −1 if a signal ended it
+  int signal() const { return signal_; }        ///< that ended it; 0 without one
   const std::string& out() const { return out_; }
   const std::string& err() const { return err_; }
 
@@ -35,7 +35,8 @@ class ChildRun {
   pid_t pid_ = -1;
   int out_end_ = -1, err_end_ = -1;
   int exit_code_ = -1;
-  std::string out_, err_, crash_;
+  int signal_ = 0;
+  std::string out_, err_;
 };
 
 }  // namespace hermesh::cli
