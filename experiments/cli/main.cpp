@@ -53,7 +53,7 @@ int run_command(Session& session, CommandFiles* files) {
   // A batch counts its files, which is all of its progress.
   const bool batch = session.writes_json_itself;
   const TerminalProgress progress(session.context, !session.quiet,
-                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(session.command_name));
+                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(session.command_name + (session.command_line.find(" --error") == std::string::npos ? "" : " --error")));
   std::optional<LogFile> log;
   if (!session.log_file.empty()) log.emplace(session, session.log_file, session.command_line);
   int exit_code = kFailed;

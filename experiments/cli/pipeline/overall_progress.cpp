@@ -32,6 +32,18 @@ Plan plan_of(std::string_view command) {
     append(plan, kCollapse);
     append(plan, {{"write", 0.01}});
   }
+  if (command == "remesh --error") {
+    append(plan, {{"read", 0.04}});
+    // A rough mesh tells how large the voxels of the next one have to be.
+    for (int pass = 0; pass < 2; ++pass) {
+      append(plan, kVoxelize);
+      append(plan, kSample);
+      plan.insert(plan.end(), kCollapse.begin(), kCollapse.begin() + 7);
+      append(plan, {{"compare", 0.2}});
+    }
+    plan.insert(plan.end(), kCollapse.begin() + 7, kCollapse.end());
+    append(plan, {{"decimate", 0.2}, {"certify", 0.3}, {"prove", 0.5}, {"write", 0.01}});
+  }
   if (command == "combine") {
     append(plan, {{"read", 0.03}, {"read", 0.03}});
     for (int operand = 0; operand < 2; ++operand) {

@@ -15,7 +15,8 @@ struct PlannedStage {
 };
 
 /// The stages that a command usually has, in their order, some more than once. Weights are those of a scan of 70,000
-/// triangles at 150 voxels. Empty for commands that have no such order.
+/// triangles at 150 voxels. Empty for commands that have no such order. "remesh --error" is a command
+/// of its own here.
 std::vector<PlannedStage> plan_of(std::string_view command);
 
 /// Tells how much of a plan is done. The figure never falls, whatever stages come: one that is not planned, or comes

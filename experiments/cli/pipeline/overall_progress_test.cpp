@@ -51,6 +51,16 @@ TEST(OverallProgress, NeverFallsNorEndsBeforeTheLastStage) {
   EXPECT_NEAR(progress.update("write", 1.0), 1.0, 1e-12);
 }
 
+TEST(OverallProgress, ASecondPassIsPlanned) {
+  OverallProgress progress(plan_of("remesh --error"));
+  for (const char* stage : {"read", "triangles to blocks", "distances", "signs", "move points", "compare"})
+    progress.update(stage, 1.0);
+  const double first = progress.update("triangles to blocks", 0.0);
+  EXPECT_GT(first, 0.1);
+  EXPECT_LT(first, 0.5);
+  EXPECT_LT(progress.update("compare", 1.0), 0.6);
+}
+
 TEST(OverallProgress, APlanOfOneNamelessStageTakesAnyFraction) {
   OverallProgress progress({{"", 1.0}});
   EXPECT_EQ(progress.update("3 of 30 files", 0.1), 0.1);
