@@ -51,8 +51,8 @@ constexpr double kFirstLimit = 0.8, kLimitStep = 0.02;
 struct Surface {
   std::vector<Eigen::Vector3f> points;
   std::vector<Triangle> triangles;
-  std::vector<Triangle> caps;  ///< what closes holes
-  double cap_area = 0.0;
+  std::vector<Triangle> caps;         ///< what closes holes
+  double area = 0.0, cap_area = 0.0;  ///< of the polygons, and of the caps; world units²
 };
 
 double area(const std::vector<Eigen::Vector3f>& points, const Triangle& t) {
@@ -63,7 +63,7 @@ double area(const std::vector<Eigen::Vector3f>& points, const Triangle& t) {
 
 /// The polygons' surface as a voxelization found it. `turns` are those of orient_faces().
 Surface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turns, bool over_holes) {
-  Surface surface{std::move(boundary.points), {}, {}, 0.0};
+  Surface surface{std::move(boundary.points), {}, {}};
   for (std::size_t i = 0; i < boundary.triangles.size(); ++i) {
     const Triangle& t = boundary.triangles[i];
     if (boundary.ids[i] < 0) {
@@ -71,6 +71,7 @@ Surface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turn
       surface.cap_area += area(surface.points, t);
     } else if (turns.empty() || turns[static_cast<std::size_t>(boundary.ids[i])] != 0) {
       surface.triangles.push_back(t);
+      surface.area += area(surface.points, t);
     }
   }
   if (over_holes) surface.triangles.insert(surface.triangles.end(), surface.caps.begin(), surface.caps.end());
@@ -121,6 +122,7 @@ class BoundedRemesher {
   }
 
   BoundedMesh run() {
+    // By any other rule what is inside is not known away from the samples, and no polygon is free.
     if (options_.signs == SignRule::winding_number) {
       winding_.emplace(IndexSoup(mesh_, 1.0));
       turns_ = winding_->orientation().turns;
@@ -140,6 +142,7 @@ class BoundedRemesher {
     if (!made) return smaller(voxel_size);
     const Attempt& now = *made;
     result_.hole_area = now.surface.cap_area;
+    result_.left_out_area = std::max(0.0, area_ - now.surface.area);
     const SurfaceDistance surface(now.surface.points, now.surface.triangles);
     std::vector<double> apart;  // by point of the uniform mesh, about how far the surfaces are apart there
     const std::vector<Far> far = look(now, surface, apart);
@@ -158,11 +161,13 @@ class BoundedRemesher {
         voxelize(mesh_, {.voxel_size = voxel_size, .signs = options_.signs, .boundary = true}, context_);
     if (!volume.is_signed)
       throw Error(
-          "the polygons give no inside that a distance could be measured to (a note says why); give a sheet a "
+          "the polygons give no inside that a distance could be measured to (a note says why); give a sheet "
+          "a "
           "thickness with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
     const LevelSet level_set = make_level_set(volume.distance);
     FloatHermite hermite = sample_polygons(level_set, 0.0, mesh_, context_);
     if (hermite.crossings.empty()) return std::nullopt;
+    // Points in single precision are then those that such a file holds.
     if (options_.written_in_single) {
       hermite.placement.offset += hermite.placement.origin;
       hermite.placement.origin.setZero();
@@ -234,6 +239,7 @@ class BoundedRemesher {
 
   /// Collapses with what is left of the error, and the proof.
   bool collapse(const Attempt& now, const SurfaceDistance& surface, const std::vector<double>& apart) {
+    // A place of the mesh is then within the error by the triangle inequality, as far as `apart` is right.
     std::vector<float> tolerance(apart.size());
     for (std::size_t i = 0; i < apart.size(); ++i)
       tolerance[i] = float(std::max(0.0, (kUsed * options_.error - kUnseen * apart[i]) / now.voxel_size));
@@ -241,6 +247,7 @@ class BoundedRemesher {
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
       const CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
       far = prove(now, surface, coarse);
+      // Nothing is written but what was proved just now, as the file will hold it.
       if (far.empty()) {
         PolygonMesh& mesh = result_.mesh;
         mesh.origin = now.file.placement().origin;
@@ -412,7 +419,7 @@ class BoundedRemesher {
 
   /// Asks for smaller voxels where there was no mesh at all, from which all polygons are far.
   bool smaller(double voxel_size) {
-    const Surface all{mesh_.points, triangulated(mesh_), {}, 0.0};
+    const Surface all{mesh_.points, triangulated(mesh_), {}};
     std::vector<Far> far;
     for (std::uint32_t t = 0; t < all.triangles.size(); ++t)
       far.push_back({middle(all, t), std::numeric_limits<double>::infinity(), true, t});

@@ -61,6 +61,7 @@ struct BoundedMesh {
   double voxel_size = 0.0;        ///< world units
   int rounds = 0;                 ///< how often voxels or tolerances were made smaller
   double free_area = 0.0;         ///< area of polygons far from the mesh that bound nothing, world units²
+  double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first

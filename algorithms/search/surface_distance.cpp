@@ -56,6 +56,7 @@ class SurfaceDistance::Walk {
       const Eigen::Vector3d middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
       const NearestTriangle found = nearest(middle, piece.nearest);
       const double distance = std::sqrt(found.squared), radius = radius_about(middle, piece.corners);
+        // Nothing within twice the limit was found, or the middle itself is too far: no piece of it can hold.
       const bool is_far = found.triangle == TriangleTree::kNone || distance > limit_;
       if (!is_far && distance + radius <= limit_) {
         upper = std::max(upper, distance + radius);
@@ -108,6 +109,7 @@ class SurfaceDistance::Walk {
     return free_.is_free(piece);
   }
 
+  // Across its longest side, so that pieces do not become needles, whose radius would fall slowly.
   void halve(const Corners& piece, std::uint32_t nearest) {
     int i = 0;
     for (int side = 1; side < 3; ++side)
@@ -130,6 +132,7 @@ class SurfaceDistance::Walk {
 
 SurfaceDistance::SurfaceDistance(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
     : tree_(points, triangles, 1.0) {
+  // Only points that a triangle uses count: a scan may have stray ones far away.
   Bounds box;
   for (const Triangle& t : triangles)
     for (const std::uint32_t p : t) box.add(points[p].cast<double>());
@@ -161,6 +164,7 @@ DistanceFromSurface SurfaceDistance::hold(std::span<const Eigen::Vector3f> point
     result.free_area += free_area[block];
     result.far.insert(result.far.end(), far[block].begin(), far[block].end());
   }
+  // The limit was lowered by as much, so that this is still at most the limit.
   result.upper += rounding_;
   return result;
 }

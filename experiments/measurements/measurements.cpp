@@ -65,6 +65,7 @@ std::vector<std::string> case_choices() {
 std::span<const Measurement> all_measurements() {
   static const std::vector<Measurement> table = {normal_codes_measurement(),
                                                  lost_crossings_measurement(),
+                                                 bounded_measurement(),
                                                  hermite_memory_measurement(),
                                                  hermite_csg_measurement(),
                                                  hermite_speed_measurement(),

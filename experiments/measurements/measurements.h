@@ -108,6 +108,7 @@ std::vector<Json> run_measurement(const Experiment& experiment, const Tier& tier
 
 Measurement normal_codes_measurement();
 Measurement lost_crossings_measurement();
+Measurement bounded_measurement();
 Measurement hermite_memory_measurement();
 Measurement hermite_csg_measurement();
 Measurement hermite_speed_measurement();
