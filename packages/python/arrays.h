@@ -17,8 +17,8 @@ namespace hermesh::python {
 
 namespace py = pybind11;
 
-/// An array over memory that `owner`, which is kept by it, holds alive; nobody may write into it, since copies
-/// of a mesh share their arrays.
+/// An array over memory that `owner`, which is kept by it, holds alive; nobody may write into it, since
+/// copies of a mesh share their arrays.
 template <class T, class Owner>
 py::array view(std::span<const T> values, std::vector<py::ssize_t> shape, Owner owner) {
   const py::capsule keeper(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
@@ -35,8 +35,8 @@ py::array owning(std::vector<T>&& values, std::vector<py::ssize_t> shape) {
   return py::array_t<T>(std::move(shape), held->data(), keeper);
 }
 
-/// What was given as an array of numbers side by side, of its own type where `kinds` (numpy's letters, such as
-/// "f4 f8") names it and of the type `fallback` otherwise; not copied unless one of both asks for it.
+/// What was given as an array of numbers side by side, of its own type where `kinds` (numpy's letters, such
+/// as "f4 f8") names it and of the type `fallback` otherwise; not copied unless one of both asks for it.
 /// @throws Error where it is no array of numbers.
 inline py::array contiguous(const py::handle& given, const std::string& kinds, const char* fallback,
                             const std::string& what) {

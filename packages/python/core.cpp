@@ -1,5 +1,5 @@
-// The extension module hermesh._core: the public C++ functions but the judges, which are in another module for
-// the sake of their licence. What is pleasant to call is made of it in hermesh/__init__.py.
+// The extension module hermesh._core: the public C++ functions but the judges, which are in another module
+// for the sake of their licence. What is pleasant to call is made of it in hermesh/__init__.py.
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -89,6 +89,18 @@ Mesh make_mesh(const py::object& points, const py::object& triangles, const py::
   return single ? Mesh(f, t, q, attributes) : Mesh(d, t, q, attributes);
 }
 
+Mesh with_attributes(const Mesh& mesh, const py::dict& of_points, const py::dict& of_corners,
+                     const py::dict& of_polygons,
+                     const std::map<std::string, std::vector<std::string>>& labels) {
+  std::vector<Attribute> attributes;
+  std::vector<py::array> arrays;
+  add_attributes(of_points, AttributeDomain::point, labels, attributes, arrays);
+  add_attributes(of_corners, AttributeDomain::corner, labels, attributes, arrays);
+  add_attributes(of_polygons, AttributeDomain::polygon, labels, attributes, arrays);
+  const py::gil_scoped_release others_may_run;
+  return mesh.with_attributes(attributes);
+}
+
 py::array points_of(const Mesh& mesh) {
   return view(mesh.points(), {py::ssize_t(mesh.point_count()), 3}, mesh);
 }
@@ -127,24 +139,36 @@ py::array triangulated(const Mesh& mesh) {
 
 void bind_mesh(py::module_& m) {
   const py::dict none;
-  py::class_<Mesh>(m, "Mesh",
-                   "Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.\n\n"
-                   "Nobody changes a mesh once it is made. Its arrays are views of what it holds, not copies, and\n"
-                   "read-only: take `mesh.points.copy()` to write.")
+  py::class_<Mesh>(
+      m, "Mesh",
+      "Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.\n\n"
+      "Nobody changes a mesh once it is made. Its arrays are views of what it holds, not copies, and\n"
+      "read-only: take `mesh.points.copy()` to write.")
       .def(py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
            py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
            py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
            py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
            "A mesh of arrays, which are copied once.\n\n"
-           "points: (n, 3) of float32 or float64, world units; float64 keeps what single precision would lose\n"
+           "points: (n, 3) of float32 or float64, world units; float64 keeps what single precision would "
+           "lose\n"
            "    far from the origin (see `origin`).\n"
-           "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. How quads from\n"
+           "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. How quads "
+           "from\n"
            "    elsewhere are cut is not known: what samples polygons cuts each along its better diagonal.\n"
-           "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point, for\n"
-           "    each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of float32, or\n"
+           "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point, "
+           "for\n"
+           "    each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of float32, "
+           "or\n"
            "    one of whole numbers (-1 stands for none).\n"
            "labels: name of an attribute of whole numbers to the names of its values from 0 on.\n\n"
-           "Raises Error for an index out of range, a coordinate that is not finite, and shapes that do not fit.")
+           "Raises Error for an index out of range, a coordinate that is not finite, and shapes that do not "
+           "fit.")
+      .def(
+          "with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+          py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
+          py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
+          "A mesh of the same polygons with these attributes in place of their own, given as to Mesh(); all\n"
+          "arrays are copied. Raises Error for an attribute whose number of values does not fit.")
       .def_property_readonly("points", &points_of,
                              "(n, 3) float32, world units relative to `origin`; a read-only view.")
       .def_property_readonly(
@@ -156,7 +180,9 @@ void bind_mesh(py::module_& m) {
           "Where `points` have their zero, world units; (0, 0, 0) unless the mesh lies far from it.")
       .def(
           "world_points",
-          [](const Mesh& mesh) { return owning(mesh.world_points(), {py::ssize_t(mesh.point_count()), 3}); },
+          [](const Mesh& mesh) {
+            return owning(mesh.world_points(), {py::ssize_t(mesh.point_count()), 3});
+          },
           "(n, 3) float64, world units, in an array of the caller's own.")
       .def_property_readonly(
           "triangles",
@@ -166,8 +192,11 @@ void bind_mesh(py::module_& m) {
           "(m, 3) uint32, numbers of points; a read-only view.")
       .def_property_readonly(
           "quads",
-          [](const Mesh& mesh) { return view(mesh.quads(), {py::ssize_t(mesh.quad_count()), 4}, mesh); },
-          "(k, 4) uint32, numbers of points; a read-only view. A quad (a, b, c, d) of a mesh that hermesh made\n"
+          [](const Mesh& mesh) {
+            return view(mesh.quads(), {py::ssize_t(mesh.quad_count()), 4}, mesh);
+          },
+          "(k, 4) uint32, numbers of points; a read-only view. A quad (a, b, c, d) of a mesh that hermesh "
+          "made\n"
           "means the triangles abc and acd.")
       .def("triangulated", &triangulated,
            "(m + 2 k, 3) uint32: the triangles, then two for each quad, in an array of the caller's own.")
@@ -178,7 +207,8 @@ void bind_mesh(py::module_& m) {
           "corner_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::corner); },
           "Name to a read-only view, one row for each corner: three a triangle, then four a quad.")
       .def_property_readonly(
-          "polygon_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::polygon); },
+          "polygon_attributes",
+          [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::polygon); },
           "Name to a read-only view, one row for each triangle, then for each quad.")
       .def_property_readonly("labels", &labels_of,
                              "Name of an attribute of whole numbers to the names of its values from 0 on.")
@@ -245,26 +275,29 @@ py::array sampled(const Volume& volume, const py::object& places) {
 }
 
 void bind_volume(py::module_& m) {
-  py::class_<Volume>(m, "Volume",
-                     "A sparse grid of values with its placement, an OpenVDB grid inside.\n\n"
-                     "As a level set: signed distance in world units, negative inside, right within a narrow band\n"
-                     "and plus or minus `background` beyond. Nobody changes a volume once it is made.")
-      .def_static("from_numpy", &make_volume, py::arg("values"), py::kw_only(),
-                  py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
-                  py::arg("origin") = std::array<double, 3>{0, 0, 0}, py::arg("placement") = py::none(),
-                  py::arg("level_set") = false, py::arg("background") = py::none(), py::arg("name") = "",
-                  "A volume of a dense array.\n\n"
-                  "values: (nx, ny, nz), float32 (others are converted); values[x, y, z] is the sample with the\n"
-                  "    index lower + (x, y, z), which lies at origin + voxel_size * index, world units, or where\n"
-                  "    `placement`, (3, 4) or (4, 4), maps the index.\n"
-                  "level_set: True: signed distances in world units, negative inside, of which those nearer than\n"
-                  "    the background are kept. False: every sample counts as known, and the volume ends at its\n"
-                  "    box.\n"
-                  "background: the value beyond the samples; None: the greatest magnitude of a level set, else\n"
-                  "    just below the least value.\n\n"
-                  "Raises Error for values that are not finite and a placement that cannot be inverted.")
+  py::class_<Volume>(
+      m, "Volume",
+      "A sparse grid of values with its placement, an OpenVDB grid inside.\n\n"
+      "As a level set: signed distance in world units, negative inside, right within a narrow band\n"
+      "and plus or minus `background` beyond. Nobody changes a volume once it is made.")
+      .def_static(
+          "from_numpy", &make_volume, py::arg("values"), py::kw_only(),
+          py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
+          py::arg("origin") = std::array<double, 3>{0, 0, 0}, py::arg("placement") = py::none(),
+          py::arg("level_set") = false, py::arg("background") = py::none(), py::arg("name") = "",
+          "A volume of a dense array.\n\n"
+          "values: (nx, ny, nz), float32 (others are converted); values[x, y, z] is the sample with the\n"
+          "    index lower + (x, y, z), which lies at origin + voxel_size * index, world units, or where\n"
+          "    `placement`, (3, 4) or (4, 4), maps the index.\n"
+          "level_set: True: signed distances in world units, negative inside, of which those nearer than\n"
+          "    the background are kept. False: every sample counts as known, and the volume ends at its\n"
+          "    box.\n"
+          "background: the value beyond the samples; None: the greatest magnitude of a level set, else\n"
+          "    just below the least value.\n\n"
+          "Raises Error for values that are not finite and a placement that cannot be inverted.")
       .def("to_numpy", &dense_of, py::arg("lower") = py::none(), py::arg("dims") = py::none(),
-           "(nx, ny, nz) float32: the box of the active samples, whose first index is `lower`, or another box.")
+           "(nx, ny, nz) float32: the box of the active samples, whose first index is `lower`, or another "
+           "box.")
       .def("sample", &sampled, py::arg("places"),
            "(n,) float32: values at places, (n, 3), world units; trilinear between samples.")
       .def_property_readonly("name", &Volume::name)
@@ -328,13 +361,13 @@ void bind_options(py::module_& m) {
       .def_readwrite("voxelizer", &VoxelizeOptions::voxelizer)
       .def_readwrite("options", &VoxelizeOptions::options);
   py::class_<Frustum>(m, "Frustum", "What a camera sees: lengths in world units, the angle in degrees.")
-      .def(py::init([](std::array<double, 3> position, std::array<double, 3> look_at, std::array<double, 3> up,
-                       double angle, double aspect, double near, double far) {
-             return Frustum{position, look_at, up, angle, aspect, near, far};
-           }),
+      .def(py::init([](std::array<double, 3> position, std::array<double, 3> look_at,
+                       std::array<double, 3> up, double angle, double aspect, double near,
+                       double far) { return Frustum{position, look_at, up, angle, aspect, near, far}; }),
            py::kw_only(), py::arg("position") = std::array<double, 3>{0, 0, 0},
-           py::arg("look_at") = std::array<double, 3>{0, 0, -1}, py::arg("up") = std::array<double, 3>{0, 1, 0},
-           py::arg("angle") = 45.0, py::arg("aspect") = 1.0, py::arg("near") = 0.1, py::arg("far") = 100.0,
+           py::arg("look_at") = std::array<double, 3>{0, 0, -1},
+           py::arg("up") = std::array<double, 3>{0, 1, 0}, py::arg("angle") = 45.0, py::arg("aspect") = 1.0,
+           py::arg("near") = 0.1, py::arg("far") = 100.0,
            "angle: vertical, from the lower to the upper plane. aspect: width over height.")
       .def_readonly("position", &Frustum::position)
       .def_readonly("look_at", &Frustum::look_at)
@@ -379,10 +412,11 @@ void bind_options(py::module_& m) {
 
   py::class_<Piece>(m, "Piece", "One piece of a broken solid.")
       .def_readonly("name", &Piece::name)
-      .def_readonly("mesh", &Piece::mesh,
-                    "World units. Of the method labelled with polygon attributes `surface` (0 original, 1 cut) and\n"
-                    "`neighbour` (the number of the piece beyond, -1 none), a corner attribute `uv`, and those of\n"
-                    "the mesh that was broken.")
+      .def_readonly(
+          "mesh", &Piece::mesh,
+          "World units. Of the method labelled with polygon attributes `surface` (0 original, 1 cut) and\n"
+          "`neighbour` (the number of the piece beyond, -1 none), a corner attribute `uv`, and those of\n"
+          "the mesh that was broken.")
       .def_readonly("volume", &Piece::volume, "World units.")
       .def_readonly("area", &Piece::area, "World units.")
       .def_readonly("centre_of_mass", &Piece::centre_of_mass, "World units.")
@@ -448,36 +482,34 @@ void bind_functions(py::module_& m) {
   m.def("write_vdb", [](const std::filesystem::path& path, const std::vector<Volume>& volumes, Watch& watch) {
     watched(watch, [&](Context& context) { return write_vdb(path, volumes, context), true; });
   });
-  m.def("import_volume",
-        [](const std::filesystem::path& path, std::optional<std::int64_t> frame,
-           std::optional<std::array<std::int64_t, 3>> dims, const std::string& type,
-           std::optional<std::array<double, 3>> spacing, std::optional<std::uint64_t> offset,
-           std::optional<float> replace_nan, Watch& watch) {
-          ImportOptions options{.replace_nan = replace_nan, .frame = frame};
-          if (dims)
-            options.raw = RawSamples{.dims = *dims,
-                                     .type = type,
-                                     .spacing = spacing.value_or(std::array<double, 3>{1, 1, 1}),
-                                     .offset = offset.value_or(0)};
-          else if (!type.empty() || spacing || offset)
-            throw Error("type, spacing and offset say how raw samples lie: give dims, too");
-          return watched(watch, [&](Context& context) { return import_volume(path, options, context); });
-        });
+  m.def("import_volume", [](const std::filesystem::path& path, std::optional<std::int64_t> frame,
+                            std::optional<std::array<std::int64_t, 3>> dims, const std::string& type,
+                            std::optional<std::array<double, 3>> spacing, std::optional<std::uint64_t> offset,
+                            std::optional<float> replace_nan, Watch& watch) {
+    ImportOptions options{.replace_nan = replace_nan, .frame = frame};
+    if (dims)
+      options.raw = RawSamples{.dims = *dims,
+                               .type = type,
+                               .spacing = spacing.value_or(std::array<double, 3>{1, 1, 1}),
+                               .offset = offset.value_or(0)};
+    else if (!type.empty() || spacing || offset)
+      throw Error("type, spacing and offset say how raw samples lie: give dims, too");
+    return watched(watch, [&](Context& context) { return import_volume(path, options, context); });
+  });
   m.def("voxelize", [](const Mesh& mesh, const VoxelizeOptions& options, Watch& watch) {
     return watched(watch, [&](Context& context) { return voxelize(mesh, options, context); });
   });
   m.def("voxelize_grids", [](const Mesh& mesh, const std::string& grids, const VoxelizeOptions& options,
                              bool fog_exterior, Watch& watch) {
-    return watched(watch, [&](Context& context) {
-      return voxelize_grids(mesh, grids, options, context, fog_exterior);
-    });
+    return watched(
+        watch, [&](Context& context) { return voxelize_grids(mesh, grids, options, context, fog_exterior); });
   });
-  m.def("extract", [](const Volume& volume, const ExtractOptions& options, std::optional<Mesh> source,
-                      Watch& watch) {
-    return watched(watch, [&](Context& context) {
-      return extract(volume, options, context, source ? &*source : nullptr);
-    });
-  });
+  m.def("extract",
+        [](const Volume& volume, const ExtractOptions& options, std::optional<Mesh> source, Watch& watch) {
+          return watched(watch, [&](Context& context) {
+            return extract(volume, options, context, source ? &*source : nullptr);
+          });
+        });
   m.def("remesh", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
                      Watch& watch) {
     return watched(watch, [&](Context& context) { return remesh(mesh, voxelizing, extracting, context); });
@@ -485,9 +517,8 @@ void bind_functions(py::module_& m) {
   m.def("combine", [](const std::string& operation, const Mesh& a, const Mesh& b,
                       const VoxelizeOptions& voxelizing, const ExtractOptions& extracting, Watch& watch) {
     const Boolean boolean = boolean_of(operation);
-    return watched(watch, [&](Context& context) {
-      return combine(boolean, a, b, voxelizing, extracting, context);
-    });
+    return watched(watch,
+                   [&](Context& context) { return combine(boolean, a, b, voxelizing, extracting, context); });
   });
   m.def("fracture", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const FractureOptions& options,
                        Watch& watch) {

@@ -1,5 +1,5 @@
-// The extension module hermesh._validation: the judges. Their library is under GPL-3, and so is this module; it is loaded when
-// they are first called.
+// The extension module hermesh._validation: the judges. Their library is under GPL-3, and so is this module;
+// it is loaded when they are first called.
 #include <pybind11/stl.h>
 
 #include "hermesh/validate.h"
@@ -9,7 +9,8 @@ namespace hermesh::python {
 namespace {
 
 void bind_report(py::module_& m) {
-  py::class_<SurfaceDistances>(m, "SurfaceDistances", "Distances from samples of a surface to another, world units.")
+  py::class_<SurfaceDistances>(m, "SurfaceDistances",
+                               "Distances from samples of a surface to another, world units.")
       .def_readonly("max", &SurfaceDistances::max)
       .def_readonly("mean", &SurfaceDistances::mean)
       .def_readonly("rms", &SurfaceDistances::rms)
@@ -50,12 +51,14 @@ void bind_report(py::module_& m) {
       .def_readonly("from_reference", &Report::from_reference)
       .def_readonly("certified_to_reference", &Report::certified_to_reference)
       .def_readonly("certified_from_reference", &Report::certified_from_reference)
-      .def_readonly("solid", &Report::solid, "Compared with the reference's: \"same\", \"differs\" or \"unknown\".")
+      .def_readonly("solid", &Report::solid,
+                    "Compared with the reference's: \"same\", \"differs\" or \"unknown\".")
       .def_readonly("defects", &Report::defects, "Those there are, with places.")
       .def_readonly("sentences", &Report::sentences, "The verdict in words, most important first.")
       .def_readonly("json", &Report::json, "All of it and more as one JSON object.")
       .def(
-          "to_dict", [](const Report& report) { return py::module_::import("json").attr("loads")(report.json); },
+          "to_dict",
+          [](const Report& report) { return py::module_::import("json").attr("loads")(report.json); },
           "The object of `json` as a dict.")
       .def_property_readonly("closed", &Report::closed)
       .def_property_readonly("manifold", &Report::manifold)

@@ -24,9 +24,9 @@ namespace py = pybind11;
 
 /// What a call is given to be watched by, and what it has to say afterwards; one serves one call.
 struct Watch {
-  py::object progress;        ///< None or a callable of the stage's name and the share done, 0 to 1
-  py::object cancel;          ///< None or something with is_set(), such as threading.Event
-  std::optional<int> threads; ///< at most; none: all of the machine
+  py::object progress;         ///< None or a callable of the stage's name and the share done, 0 to 1
+  py::object cancel;           ///< None or something with is_set(), such as threading.Event
+  std::optional<int> threads;  ///< at most; none: all of the machine
   std::vector<std::string> notes = {};
   std::vector<std::pair<std::string, double>> stage_seconds = {}, figures = {};
 };
@@ -38,8 +38,8 @@ class Reports {
   /// before it, but for its beginning, so that no stage goes by unseen.
   void add(std::string_view stage, double fraction) {
     const std::lock_guard lock(mutex_);
-    const bool replaces = !waiting_.empty() && waiting_.back().first == stage &&
-                          waiting_.back().second > 0.0 && fraction > 0.0;
+    const bool replaces =
+        !waiting_.empty() && waiting_.back().first == stage && waiting_.back().second > 0.0 && fraction > 0.0;
     if (replaces)
       waiting_.back().second = fraction;
     else
@@ -64,8 +64,8 @@ class Reports {
   bool finished_ = false;
 };
 
-/// Runs work(Context&) for a Python function. Ctrl-C is asked for by the caller's thread and not in reports of
-/// progress, since the interpreter answers the question in its main thread alone, and since some stages do
+/// Runs work(Context&) for a Python function. Ctrl-C is asked for by the caller's thread and not in reports
+/// of progress, since the interpreter answers the question in its main thread alone, and since some stages do
 /// not report for seconds. What the callback or the signal raises, or Cancelled where the cancel object is
 /// set, ends the work and comes out once it has ended.
 template <class Work>

@@ -80,6 +80,9 @@ class Arrays(unittest.TestCase):
         np.testing.assert_allclose(mesh.corner_attributes["uv"], uv, atol=1e-7)
         self.assertEqual(mesh.labels, {"part": ["a", "b"]})
         self.assertTrue(np.shares_memory(mesh.point_attributes["normal"], mesh.point_attributes["normal"]))
+        height = hermesh.Mesh(points, None, quads).with_attributes(point_attributes={"height": points[:, 2]})
+        np.testing.assert_array_equal(height.point_attributes["height"], points[:, 2])
+        self.assertEqual(list(mesh.with_attributes().point_attributes), [])
 
     def test_that_are_no_mesh_are_refused(self):
         points, triangles = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]

@@ -113,7 +113,7 @@ class Control(unittest.TestCase):
 
     def test_notes_are_warnings_or_go_to_the_log(self):
         points, quads = cube()
-        thin = points * [1, 1, 0.01], quads  # a plate of a tenth of a voxel
+        thin = points * [1, 1, 0.01] + [0, 0, 0.03], quads  # a plate between two layers of samples
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             hermesh.voxelize(thin, voxel_size=0.1)

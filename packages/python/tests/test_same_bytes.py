@@ -69,17 +69,17 @@ class SameBytes(unittest.TestCase):
             self.assertEqual(theirs.read_bytes(), ours.read_bytes())
 
     def test_of_fracture(self):
-        log = hermesh.Log()
-        fracture = hermesh.fracture(self.torus, "chunks:6", resolution=40, seed=3, min_volume=10, impact=(1, 0, 0), log=log)
+        fracture = hermesh.fracture(self.torus, "chunks:6", resolution=40, seed=3, min_volume=10, impact=(1, 0, 0))
         pieces = self.folder / "pieces"
         self.program("fracture", self.torus, pieces, "--resolution", 40, "--cutters", "chunks:6", "--seed", 3, "--min-volume", 10,
                      "--impact", 1, 0, 0, "--no-picture")
         files = sorted(pieces.glob("*.ply"))
-        self.assertEqual([f.stem for f in files], sorted(piece.name for piece in fracture.pieces))
-        for piece in fracture.pieces:
+        self.assertEqual(len(files), len(fracture))
+        self.assertGreaterEqual(len(files), 6)
+        for file, piece in zip(files, fracture.pieces):
             ours = self.folder / "piece.ply"
             piece.mesh.write(ours)
-            self.assertEqual((pieces / (piece.name + ".ply")).read_bytes(), ours.read_bytes())
+            self.assertEqual(file.read_bytes(), ours.read_bytes(), file)
 
     def test_of_import(self):
         samples = np.random.default_rng(1).integers(-1000, 2000, (6, 7, 8), dtype=np.int16)
