@@ -1,5 +1,6 @@
 """Arrays in, arrays out: what is copied, which types are taken, what is refused."""
 
+import time
 import tracemalloc
 import types
 import unittest
@@ -8,6 +9,12 @@ import numpy as np
 from shapes import cube, torus, volume_of
 
 import hermesh
+
+
+def most_memory():
+    """Bytes that this process has had resident at most."""
+    with open("/proc/self/status", encoding="ascii") as status:
+        return next(1024 * int(line.split()[1]) for line in status if line.startswith("VmHWM"))
 
 
 class Arrays(unittest.TestCase):
@@ -46,6 +53,17 @@ class Arrays(unittest.TestCase):
             self.assertEqual(len(views[1]), 160_000)
             # numpy tells tracemalloc of every array that it allocates; one of the triangles alone has 1.9 MB.
             self.assertLess(peak, 100_000)
+
+    def test_of_a_million_triangles_are_copied_once(self):
+        points, triangles = torus(around=1000, across=500)
+        size = points.nbytes + triangles.nbytes
+        before, begun = most_memory(), time.process_time()
+        mesh = hermesh.Mesh(points, triangles)
+        views = [(mesh.points, mesh.triangles) for _ in range(100)]
+        self.assertLess(time.process_time() - begun, 2.0)
+        self.assertEqual(views[99][1].shape, (1_000_000, 3))
+        # 17 MiB a copy; what the allocator takes beyond is small beside that.
+        self.assertLess(most_memory() - before, 1.3 * size)
 
     def test_of_every_type_of_number_make_the_same_mesh(self):
         points, triangles = torus()

@@ -1,6 +1,8 @@
 """Progress, cancelling, threads, notes, errors."""
 
+import ast
 import os
+import pathlib
 import subprocess
 import sys
 import threading
@@ -170,6 +172,22 @@ class Control(unittest.TestCase):
         self.assertTrue(methods["manifold-dual-contouring"].manifold)
         self.assertIn("tolerance", [option.name for option in methods["manifold-dual-contouring"].options])
         self.assertIn("hermesh", [method.name for method in hermesh.voxelizers()])
+
+    def test_type_hints_name_what_there_is(self):
+        from hermesh import _core, _validation
+        for module in (_core, _validation):
+            file = pathlib.Path(hermesh.__file__).with_name(module.__name__.split(".")[1] + ".pyi")
+            stubs = ast.parse(file.read_text(encoding="utf-8"))
+            named = {node.name: node for node in stubs.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+            there = {name for name in vars(module) if not name.startswith("_")}
+            self.assertEqual(set(named), there)
+            for name, node in named.items():
+                if not isinstance(node, ast.ClassDef) or name in ("Error", "Cancelled"):
+                    continue
+                members = {m.name if isinstance(m, ast.FunctionDef) else m.target.id for m in node.body
+                           if isinstance(m, (ast.FunctionDef, ast.AnnAssign))}
+                public = {m for m in vars(getattr(module, name)) if not m.startswith("_")}
+                self.assertEqual({m for m in members if not m.startswith("_")}, public, name)
 
     def test_every_function_says_what_it_does(self):
         for name in hermesh.__all__:
