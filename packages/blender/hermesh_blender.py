@@ -147,6 +147,7 @@ class Operator:
             return self.execute(context)
         if not self.begin(context):
             return {"CANCELLED"}
+        self.shown = ""
         self.timer = context.window_manager.event_timer_add(0.05, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -158,7 +159,10 @@ class Operator:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self.work.thread.is_alive():
-            context.workspace.status_text_set(f"hermesh: {self.work.said[0]} {100 * self.work.said[1]:.0f} %  (Escape cancels)")
+            text = f"hermesh: {self.work.said[0]} {100 * self.work.said[1]:.0f} %  (Escape cancels)"
+            if text != self.shown:  # for Blender draws its window anew each time
+                context.workspace.status_text_set(text)
+                self.shown = text
             return {"RUNNING_MODAL"}
         context.window_manager.event_timer_remove(self.timer)
         context.workspace.status_text_set(None)
