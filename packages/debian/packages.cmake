@@ -70,6 +70,18 @@ endforeach()
 if(TARGET hermesh_python)
   hermesh_package(python python3-hermesh python "polygons to sparse volumes and back - Python module" "${what}
 This package holds the Python module, with volumes and meshes as numpy arrays.")
+  # Extension modules are for the version of Python that they are built for.
+  execute_process(COMMAND ${PYTHON_EXECUTABLE} -c "import sys; print(*sys.version_info[:2]); print(sys.version_info[1] + 1)"
+    OUTPUT_VARIABLE python_version COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX MATCHALL "[0-9]+" python_version "${python_version}")
+  list(GET python_version 0 major)
+  list(GET python_version 1 minor)
+  list(GET python_version 2 next)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "python3 (>= ${major}.${minor}), python3 (<< ${major}.${next}), python3-numpy, libhermesh1 ${same}")
+  if(HERMESH_BUILD_VALIDATION)
+    string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", libhermesh-validation1 ${same}")
+  endif()
 endif()
 set(CPACK_COMPONENTS_ALL ${hermesh_components})
 include(CPack)

@@ -1,0 +1,545 @@
+// The extension module hermesh._core: the public C++ functions but the judges, which are in another module
+// for the sake of their licence. What is pleasant to call is made of it in hermesh/__init__.py.
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "hermesh/hermesh.h"
+#include "packages/python/arrays.h"
+#include "packages/python/watch.h"
+
+namespace hermesh::python {
+namespace {
+
+// ---- Meshes.
+
+/// Three or four numbers of points a polygon, as numpy has them. Arrays of 32 bits are taken as they are:
+/// numbers below 0 are looked for first, for as unsigned ones they would be others.
+py::array polygon_array(const py::object& given, py::ssize_t corners, const std::string& what) {
+  if (given.is_none()) return py::array_t<std::uint32_t>(0);
+  const py::module_ numpy = py::module_::import("numpy");
+  py::array array = contiguous(given, "i4 u4 i8 u8", "i8", what + "s");
+  if (numpy.attr("asarray")(given).attr("dtype").attr("kind").cast<std::string>() == "f" && array.size() > 0)
+    throw Error("the array of " + what + "s must hold whole numbers");
+  check_rows(array, corners, what + "s");
+  const bool is_signed = array.dtype().kind() == 'i';
+  if (array.size() > 0 && (is_signed || array.itemsize() == 8)) {
+    const py::object least = array.attr("min")(), greatest = array.attr("max")();
+    const bool below = py::int_(least) < py::int_(0);
+    if (below || py::int_(greatest) > py::int_(0xffffffffu)) {
+      const py::object bad = below ? least : greatest;
+      const py::object where = numpy.attr("argmax")(array.attr("__eq__")(bad));
+      throw Error(what + " number " + std::to_string(where.cast<py::ssize_t>() / corners) +
+                  " refers to point " + py::str(bad).cast<std::string>() +
+                  ", which no mesh has: points count from 0, to 4294967295 at most");
+    }
+  }
+  if (array.itemsize() == 8) return array.attr("astype")("u4");
+  return array.attr("view")("u4");
+}
+
+/// Attributes of one domain from a dict of arrays; `arrays` keeps them alive.
+void add_attributes(const py::dict& given, AttributeDomain domain,
+                    const std::map<std::string, std::vector<std::string>>& labels,
+                    std::vector<Attribute>& attributes, std::vector<py::array>& arrays) {
+  for (const auto& [key, value] : given) {
+    Attribute attribute;
+    attribute.name = py::str(key).cast<std::string>();
+    attribute.domain = domain;
+    const py::array numbers = py::module_::import("numpy").attr("asarray")(value);
+    const bool whole = numbers.dtype().kind() == 'i' || numbers.dtype().kind() == 'u';
+    const bool one = numbers.ndim() == 1 || (numbers.ndim() == 2 && numbers.shape(1) == 1);
+    const std::string what = "the attribute '" + attribute.name + "'";
+    if (numbers.ndim() != 1 && numbers.ndim() != 2)
+      throw Error("the array of " + what + " must have the shape (n,) or (n, components)");
+    // Whole numbers of several components, such as colours of 8 bits, are numbers like others.
+    const bool as_integers = whole && one;
+    const py::array array = contiguous(value, as_integers ? "i4" : "f4", as_integers ? "i4" : "f4", what);
+    attribute.components = numbers.ndim() == 1 ? 1 : int(numbers.shape(1));
+    if (as_integers)
+      attribute.integers = span_of<std::int32_t>(array);
+    else
+      attribute.floats = span_of<float>(array);
+    if (const auto names = labels.find(attribute.name); names != labels.end())
+      attribute.labels = names->second;
+    arrays.push_back(array);
+    attributes.push_back(std::move(attribute));
+  }
+}
+
+Mesh make_mesh(const py::object& points, const py::object& triangles, const py::object& quads,
+               const py::dict& of_points, const py::dict& of_corners, const py::dict& of_polygons,
+               const std::map<std::string, std::vector<std::string>>& labels) {
+  const py::array places = contiguous(points, "f4 f8", "f8", "points");
+  check_rows(places, 3, "points");
+  const py::array three = polygon_array(triangles, 3, "triangle");
+  const py::array four = polygon_array(quads, 4, "quad");
+  std::vector<Attribute> attributes;
+  std::vector<py::array> arrays;
+  add_attributes(of_points, AttributeDomain::point, labels, attributes, arrays);
+  add_attributes(of_corners, AttributeDomain::corner, labels, attributes, arrays);
+  add_attributes(of_polygons, AttributeDomain::polygon, labels, attributes, arrays);
+  const auto t = span_of<std::uint32_t>(three), q = span_of<std::uint32_t>(four);
+  const bool single = places.itemsize() == 4;
+  const auto f = single ? span_of<float>(places) : std::span<const float>();
+  const auto d = single ? std::span<const double>() : span_of<double>(places);
+  const py::gil_scoped_release others_may_run;
+  return single ? Mesh(f, t, q, attributes) : Mesh(d, t, q, attributes);
+}
+
+Mesh with_attributes(const Mesh& mesh, const py::dict& of_points, const py::dict& of_corners,
+                     const py::dict& of_polygons,
+                     const std::map<std::string, std::vector<std::string>>& labels) {
+  std::vector<Attribute> attributes;
+  std::vector<py::array> arrays;
+  add_attributes(of_points, AttributeDomain::point, labels, attributes, arrays);
+  add_attributes(of_corners, AttributeDomain::corner, labels, attributes, arrays);
+  add_attributes(of_polygons, AttributeDomain::polygon, labels, attributes, arrays);
+  const py::gil_scoped_release others_may_run;
+  return mesh.with_attributes(attributes);
+}
+
+py::array points_of(const Mesh& mesh) {
+  return view(mesh.points(), {py::ssize_t(mesh.point_count()), 3}, mesh);
+}
+
+py::dict attributes_of(const Mesh& mesh, AttributeDomain domain) {
+  py::dict arrays;
+  for (const Attribute& attribute : mesh.attributes()) {
+    if (attribute.domain != domain) continue;
+    const auto array = [&](auto values) {
+      std::vector<py::ssize_t> shape = {py::ssize_t(values.size()) / attribute.components};
+      if (attribute.components > 1) shape.push_back(attribute.components);
+      return view(values, std::move(shape), mesh);
+    };
+    arrays[py::str(attribute.name)] =
+        attribute.integers.empty() ? array(attribute.floats) : array(attribute.integers);
+  }
+  return arrays;
+}
+
+std::map<std::string, std::vector<std::string>> labels_of(const Mesh& mesh) {
+  std::map<std::string, std::vector<std::string>> labels;
+  for (const Attribute& attribute : mesh.attributes())
+    if (!attribute.labels.empty()) labels[attribute.name] = attribute.labels;
+  return labels;
+}
+
+/// The triangles, then two for each quad: abc and acd.
+py::array triangulated(const Mesh& mesh) {
+  std::vector<std::uint32_t> all(mesh.triangles().begin(), mesh.triangles().end());
+  all.reserve(all.size() + 6 * mesh.quad_count());
+  for (std::size_t i = 0; i < mesh.quads().size(); i += 4)
+    for (const int corner : {0, 1, 2, 0, 2, 3}) all.push_back(mesh.quads()[i + corner]);
+  const py::ssize_t rows = py::ssize_t(all.size() / 3);
+  return owning(std::move(all), {rows, 3});
+}
+
+void bind_mesh(py::module_& m) {
+  const py::dict none;
+  py::class_<Mesh>(
+      m, "Mesh",
+      "Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.\n\n"
+      "Nobody changes a mesh once it is made. Its arrays are views of what it holds, not copies, and\n"
+      "read-only: take `mesh.points.copy()` to write.")
+      .def(py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
+           py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
+           py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
+           py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
+           "A mesh of arrays, which are copied once.\n\n"
+           "points: (n, 3) of float32 or float64, world units; float64 keeps what single precision would "
+           "lose\n"
+           "    far from the origin (see `origin`).\n"
+           "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. How quads "
+           "from\n"
+           "    elsewhere are cut is not known: what samples polygons cuts each along its better diagonal.\n"
+           "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point, "
+           "for\n"
+           "    each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of float32, "
+           "or\n"
+           "    one of whole numbers (-1 stands for none).\n"
+           "labels: name of an attribute of whole numbers to the names of its values from 0 on.\n\n"
+           "Raises Error for an index out of range, a coordinate that is not finite, and shapes that do not "
+           "fit.")
+      .def(
+          "with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+          py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
+          py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
+          "A mesh of the same polygons with these attributes in place of their own, given as to Mesh(); all\n"
+          "arrays are copied. Raises Error for an attribute whose number of values does not fit.")
+      .def_property_readonly("points", &points_of,
+                             "(n, 3) float32, world units relative to `origin`; a read-only view.")
+      .def_property_readonly(
+          "origin",
+          [](const Mesh& mesh) {
+            const std::array<double, 3> o = mesh.origin();
+            return py::make_tuple(o[0], o[1], o[2]);
+          },
+          "Where `points` have their zero, world units; (0, 0, 0) unless the mesh lies far from it.")
+      .def(
+          "world_points",
+          [](const Mesh& mesh) {
+            return owning(mesh.world_points(), {py::ssize_t(mesh.point_count()), 3});
+          },
+          "(n, 3) float64, world units, in an array of the caller's own.")
+      .def_property_readonly(
+          "triangles",
+          [](const Mesh& mesh) {
+            return view(mesh.triangles(), {py::ssize_t(mesh.triangle_count()), 3}, mesh);
+          },
+          "(m, 3) uint32, numbers of points; a read-only view.")
+      .def_property_readonly(
+          "quads",
+          [](const Mesh& mesh) {
+            return view(mesh.quads(), {py::ssize_t(mesh.quad_count()), 4}, mesh);
+          },
+          "(k, 4) uint32, numbers of points; a read-only view. A quad (a, b, c, d) of a mesh that hermesh "
+          "made\n"
+          "means the triangles abc and acd.")
+      .def("triangulated", &triangulated,
+           "(m + 2 k, 3) uint32: the triangles, then two for each quad, in an array of the caller's own.")
+      .def_property_readonly(
+          "point_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::point); },
+          "Name to a read-only view, one row for each point.")
+      .def_property_readonly(
+          "corner_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::corner); },
+          "Name to a read-only view, one row for each corner: three a triangle, then four a quad.")
+      .def_property_readonly(
+          "polygon_attributes",
+          [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::polygon); },
+          "Name to a read-only view, one row for each triangle, then for each quad.")
+      .def_property_readonly("labels", &labels_of,
+                             "Name of an attribute of whole numbers to the names of its values from 0 on.")
+      .def("__repr__", [](const Mesh& mesh) {
+        return "<hermesh.Mesh of " + std::to_string(mesh.point_count()) + " points, " +
+               std::to_string(mesh.triangle_count()) + " triangles, " + std::to_string(mesh.quad_count()) +
+               " quads>";
+      });
+}
+
+// ---- Volumes.
+
+Volume make_volume(const py::object& values, std::array<int, 3> lower, double voxel_size,
+                   std::array<double, 3> origin, const py::object& placement, bool level_set,
+                   std::optional<float> background, const std::string& name) {
+  const py::array array = contiguous(values, "f4", "f4", "samples");
+  if (array.ndim() != 3)
+    throw Error("the array of samples must have three dimensions, not " + std::to_string(array.ndim()));
+  DenseOptions options{.lower = lower, .level_set = level_set, .background = background, .name = name};
+  if (placement.is_none()) {
+    if (!(voxel_size > 0.0) || !std::isfinite(voxel_size))
+      throw Error("the voxel size must be a finite number above 0");
+    options.placement = Placement::uniform(voxel_size, origin);
+  } else {
+    const py::array map = contiguous(placement, "f8", "f8", "the placement");
+    const bool fits = map.ndim() == 2 && (map.shape(0) == 3 || map.shape(0) == 4) && map.shape(1) == 4;
+    if (!fits) throw Error("the placement must have the shape (3, 4) or (4, 4)");
+    std::copy_n(span_of<double>(map).begin(), 12, &options.placement.rows[0][0]);
+    const auto last = span_of<double>(map).subspan(12);
+    if (!last.empty() && (last[0] != 0.0 || last[1] != 0.0 || last[2] != 0.0 || last[3] != 1.0))
+      throw Error("the last row of a placement must be 0, 0, 0, 1");
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    if (array.shape(axis) > 0x7fffffff) throw Error("a box of samples has fewer than 2^31 on each side");
+  const std::array<int, 3> dims = {int(array.shape(0)), int(array.shape(1)), int(array.shape(2))};
+  if (array.size() == 0) throw Error("the array of samples is empty");
+  const auto samples = span_of<float>(array);
+  const py::gil_scoped_release others_may_run;
+  return Volume::from_dense(samples, dims, options);
+}
+
+py::array dense_of(const Volume& volume, std::optional<std::array<int, 3>> lower,
+                   std::optional<std::array<int, 3>> dims) {
+  if (lower.has_value() != dims.has_value()) throw Error("give both lower and dims, or none of them");
+  DenseVolume dense;
+  {
+    const py::gil_scoped_release others_may_run;
+    dense = lower ? volume.to_dense(*lower, *dims) : volume.to_dense();
+  }
+  return owning(std::move(dense.values), {dense.dims[0], dense.dims[1], dense.dims[2]});
+}
+
+py::array sampled(const Volume& volume, const py::object& places) {
+  const py::array array = contiguous(places, "f8", "f8", "places");
+  check_rows(array, 3, "places");
+  std::vector<float> values;
+  {
+    const auto numbers = span_of<double>(array);
+    const py::gil_scoped_release others_may_run;
+    values = volume.sample(numbers);
+  }
+  const py::ssize_t count = py::ssize_t(values.size());
+  return owning(std::move(values), {count});
+}
+
+void bind_volume(py::module_& m) {
+  py::class_<Volume>(
+      m, "Volume",
+      "A sparse grid of values with its placement, an OpenVDB grid inside.\n\n"
+      "As a level set: signed distance in world units, negative inside, right within a narrow band\n"
+      "and plus or minus `background` beyond. Nobody changes a volume once it is made.")
+      .def_static(
+          "from_numpy", &make_volume, py::arg("values"), py::kw_only(),
+          py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
+          py::arg("origin") = std::array<double, 3>{0, 0, 0}, py::arg("placement") = py::none(),
+          py::arg("level_set") = false, py::arg("background") = py::none(), py::arg("name") = "",
+          "A volume of a dense array.\n\n"
+          "values: (nx, ny, nz), float32 (others are converted); values[x, y, z] is the sample with the\n"
+          "    index lower + (x, y, z), which lies at origin + voxel_size * index, world units, or where\n"
+          "    `placement`, (3, 4) or (4, 4), maps the index.\n"
+          "level_set: True: signed distances in world units, negative inside, of which those nearer than\n"
+          "    the background are kept. False: every sample counts as known, and the volume ends at its\n"
+          "    box.\n"
+          "background: the value beyond the samples; None: the greatest magnitude of a level set, else\n"
+          "    just below the least value.\n\n"
+          "Raises Error for values that are not finite and a placement that cannot be inverted.")
+      .def("to_numpy", &dense_of, py::arg("lower") = py::none(), py::arg("dims") = py::none(),
+           "(nx, ny, nz) float32: the box of the active samples, whose first index is `lower`, or another "
+           "box.")
+      .def("sample", &sampled, py::arg("places"),
+           "(n,) float32: values at places, (n, 3), world units; trilinear between samples.")
+      .def_property_readonly("name", &Volume::name)
+      .def("with_name", &Volume::with_name, py::arg("name"), "The same samples under another name.")
+      .def_property_readonly("value_type", &Volume::value_type, "\"float\", \"int32\", \"vec3s\", ...")
+      .def_property_readonly("is_level_set", &Volume::is_level_set)
+      .def_property_readonly(
+          "placement",
+          [](const Volume& volume) {
+            const Placement placement = volume.placement();
+            std::vector<double> map(16, 0.0);
+            std::copy_n(&placement.rows[0][0], 12, map.begin());
+            map[15] = 1.0;
+            return owning(std::move(map), {4, 4});
+          },
+          "(4, 4) float64: maps the index (i, j, k, 1) of a sample to its place, world units.")
+      .def_property_readonly("voxel_size", &Volume::voxel_size, "World units; cube root of a voxel's volume.")
+      .def_property_readonly("background", &Volume::background,
+                             "The value beyond the samples; world units in a level set.")
+      .def_property_readonly("value_range", &Volume::value_range, "Least and greatest value of the samples.")
+      .def_property_readonly("active_voxels", &Volume::active_voxels)
+      .def_property_readonly("memory_bytes", &Volume::memory_bytes)
+      .def_property_readonly(
+          "lower",
+          [](const Volume& volume) {
+            const std::array<int, 3> lower = volume.lower();
+            return py::make_tuple(lower[0], lower[1], lower[2]);
+          },
+          "Least indices of active samples.")
+      .def_property_readonly(
+          "dims",
+          [](const Volume& volume) {
+            const std::array<int, 3> dims = volume.dims();
+            return py::make_tuple(dims[0], dims[1], dims[2]);
+          },
+          "Sides of the box of the active samples, in samples.")
+      .def("__repr__", [](const Volume& volume) {
+        return "<hermesh.Volume '" + volume.name() + "' of " + std::to_string(volume.active_voxels()) +
+               " active samples, type " + volume.value_type() + ">";
+      });
+}
+
+// ---- Options and results.
+
+void bind_options(py::module_& m) {
+  py::class_<Watch>(m, "Watch", "What a call is watched by, and its notes, times and figures afterwards.")
+      .def(py::init([](py::object progress, py::object cancel, std::optional<int> threads) {
+             return Watch{std::move(progress), std::move(cancel), threads};
+           }),
+           py::arg("progress"), py::arg("cancel"), py::arg("threads"))
+      .def_readonly("notes", &Watch::notes)
+      .def_readonly("stage_seconds", &Watch::stage_seconds)
+      .def_readonly("figures", &Watch::figures);
+  py::class_<VoxelizeOptions>(m, "VoxelizeOptions")
+      .def(py::init<>())
+      .def_readwrite("resolution", &VoxelizeOptions::resolution)
+      .def_readwrite("voxel_size", &VoxelizeOptions::voxel_size)
+      .def_readwrite("like", &VoxelizeOptions::like)
+      .def_readwrite("exterior_band", &VoxelizeOptions::exterior_band)
+      .def_readwrite("interior_band", &VoxelizeOptions::interior_band)
+      .def_readwrite("voxelizer", &VoxelizeOptions::voxelizer)
+      .def_readwrite("options", &VoxelizeOptions::options);
+  py::class_<Frustum>(m, "Frustum", "What a camera sees: lengths in world units, the angle in degrees.")
+      .def(py::init([](std::array<double, 3> position, std::array<double, 3> look_at,
+                       std::array<double, 3> up, double angle, double aspect, double near,
+                       double far) { return Frustum{position, look_at, up, angle, aspect, near, far}; }),
+           py::kw_only(), py::arg("position") = std::array<double, 3>{0, 0, 0},
+           py::arg("look_at") = std::array<double, 3>{0, 0, -1},
+           py::arg("up") = std::array<double, 3>{0, 1, 0}, py::arg("angle") = 45.0, py::arg("aspect") = 1.0,
+           py::arg("near") = 0.1, py::arg("far") = 100.0,
+           "angle: vertical, from the lower to the upper plane. aspect: width over height.")
+      .def_readonly("position", &Frustum::position)
+      .def_readonly("look_at", &Frustum::look_at)
+      .def_readonly("up", &Frustum::up)
+      .def_readonly("angle", &Frustum::angle)
+      .def_readonly("aspect", &Frustum::aspect)
+      .def_readonly("near", &Frustum::near)
+      .def_readonly("far", &Frustum::far);
+  py::class_<ExtractOptions>(m, "ExtractOptions")
+      .def(py::init<>())
+      .def_readwrite("extractor", &ExtractOptions::extractor)
+      .def_readwrite("options", &ExtractOptions::options)
+      .def_readwrite("isovalue", &ExtractOptions::isovalue)
+      .def_readwrite("ends", &ExtractOptions::ends)
+      .def_readwrite("mask", &ExtractOptions::mask)
+      .def_readwrite("frustum", &ExtractOptions::frustum)
+      .def_readwrite("frustum_resolution", &ExtractOptions::frustum_resolution)
+      .def_readwrite("outside", &ExtractOptions::outside)
+      .def_readwrite("tolerance_grid", &ExtractOptions::tolerance_grid)
+      .def_readwrite("written_in_single", &ExtractOptions::written_in_single);
+  py::class_<CutterMesh>(m, "CutterMesh")
+      .def(py::init([](std::string name, const Mesh& mesh, std::size_t copies) {
+             return CutterMesh{std::move(name), mesh, copies};
+           }),
+           py::arg("name"), py::arg("mesh"), py::arg("copies"));
+  py::class_<FractureOptions>(m, "FractureOptions")
+      .def(py::init<>())
+      .def_readwrite("cutters", &FractureOptions::cutters)
+      .def_readwrite("meshes", &FractureOptions::meshes)
+      .def_readwrite("seed", &FractureOptions::seed)
+      .def_readwrite("roughness", &FractureOptions::roughness)
+      .def_readwrite("impact", &FractureOptions::impact)
+      .def_readwrite("impact_radius", &FractureOptions::impact_radius)
+      .def_readwrite("density", &FractureOptions::density)
+      .def_readwrite("mesh_scale", &FractureOptions::mesh_scale)
+      .def_readwrite("method", &FractureOptions::method)
+      .def_readwrite("tolerance", &FractureOptions::tolerance)
+      .def_readwrite("rule", &FractureOptions::rule)
+      .def_readwrite("min_volume", &FractureOptions::min_volume)
+      .def_readwrite("split", &FractureOptions::split)
+      .def_readwrite("hermite", &FractureOptions::hermite);
+
+  py::class_<Piece>(m, "Piece", "One piece of a broken solid.")
+      .def_readonly("name", &Piece::name)
+      .def_readonly(
+          "mesh", &Piece::mesh,
+          "World units. Of the method labelled with polygon attributes `surface` (0 original, 1 cut) and\n"
+          "`neighbour` (the number of the piece beyond, -1 none), a corner attribute `uv`, and those of\n"
+          "the mesh that was broken.")
+      .def_readonly("volume", &Piece::volume, "World units.")
+      .def_readonly("area", &Piece::area, "World units.")
+      .def_readonly("centre_of_mass", &Piece::centre_of_mass, "World units.")
+      .def_property_readonly(
+          "inertia",
+          [](const Piece& piece) {
+            return owning(std::vector<double>(piece.inertia.begin(), piece.inertia.end()), {3, 3});
+          },
+          "(3, 3) float64, about the centre of mass at density 1.")
+      .def_readonly("neighbours", &Piece::neighbours,
+                    "Number of a neighbour, from 1, to the triangles and the area of the seam with it.")
+      .def("__repr__", [](const Piece& piece) { return "<hermesh.Piece '" + piece.name + "'>"; });
+  py::class_<Fracture>(m, "Fracture", "A solid in pieces; piece number n is pieces[n - 1].")
+      .def_readonly("pieces", &Fracture::pieces)
+      .def_readonly("seconds", &Fracture::seconds, "Seconds of the method itself.")
+      .def("__len__", [](const Fracture& fracture) { return fracture.pieces.size(); })
+      .def("__repr__", [](const Fracture& fracture) {
+        return "<hermesh.Fracture of " + std::to_string(fracture.pieces.size()) + " pieces>";
+      });
+
+  py::class_<OptionInfo>(m, "OptionInfo", "An option of a method.")
+      .def_readonly("name", &OptionInfo::name)
+      .def_readonly("fallback", &OptionInfo::fallback, "The value when none is given.")
+      .def_readonly("help", &OptionInfo::help)
+      .def_readonly("choices", &OptionInfo::choices, "Empty: a number from minimum to maximum.")
+      .def_readonly("minimum", &OptionInfo::minimum)
+      .def_readonly("maximum", &OptionInfo::maximum)
+      .def("__repr__", [](const OptionInfo& option) { return option.name + "=" + option.fallback; });
+  py::class_<MethodInfo>(m, "MethodInfo", "A method, and what an extractor's mesh is for every input.")
+      .def_readonly("name", &MethodInfo::name)
+      .def_readonly("summary", &MethodInfo::summary)
+      .def_readonly("closed", &MethodInfo::closed)
+      .def_readonly("manifold", &MethodInfo::manifold)
+      .def_readonly("oriented", &MethodInfo::oriented)
+      .def_readonly("free_of_self_intersection", &MethodInfo::free_of_self_intersection)
+      .def_readonly("options", &MethodInfo::options)
+      .def("__repr__", [](const MethodInfo& method) { return method.name + ": " + method.summary; });
+}
+
+// ---- Functions.
+
+Boolean boolean_of(const std::string& operation) {
+  if (operation == "union") return Boolean::union_of;
+  if (operation == "intersection") return Boolean::intersection;
+  if (operation == "difference") return Boolean::difference;
+  throw Error("the operation is union, intersection or difference, not '" + operation + "'");
+}
+
+void bind_functions(py::module_& m) {
+  m.def("version", &version);
+  m.def("extractors", &extractors, "The extractors that there are, with their options.");
+  m.def("voxelizers", &voxelizers, "The voxelizers that there are, with their options.");
+  m.def("read_mesh", [](const std::filesystem::path& path, bool attributes, Watch& watch) {
+    return watched(watch, [&](Context& context) { return read_mesh(path, context, attributes); });
+  });
+  m.def("write_mesh", [](const std::filesystem::path& path, const Mesh& mesh, Watch& watch) {
+    watched(watch, [&](Context& context) { return write_mesh(path, mesh, context), true; });
+  });
+  m.def("read_vdb", [](const std::filesystem::path& path, const std::string& grid, Watch& watch) {
+    return watched(watch, [&](Context& context) { return read_vdb(path, context, grid); });
+  });
+  m.def("grid_names", &grid_names, py::arg("path"), "Names of the grids of a .vdb file.");
+  m.def("write_vdb", [](const std::filesystem::path& path, const std::vector<Volume>& volumes, Watch& watch) {
+    watched(watch, [&](Context& context) { return write_vdb(path, volumes, context), true; });
+  });
+  m.def("import_volume", [](const std::filesystem::path& path, std::optional<std::int64_t> frame,
+                            std::optional<std::array<std::int64_t, 3>> dims, const std::string& type,
+                            std::optional<std::array<double, 3>> spacing, std::optional<std::uint64_t> offset,
+                            std::optional<float> replace_nan, Watch& watch) {
+    ImportOptions options{.replace_nan = replace_nan, .frame = frame};
+    if (dims)
+      options.raw = RawSamples{.dims = *dims,
+                               .type = type,
+                               .spacing = spacing.value_or(std::array<double, 3>{1, 1, 1}),
+                               .offset = offset.value_or(0)};
+    else if (!type.empty() || spacing || offset)
+      throw Error("type, spacing and offset say how raw samples lie: give dims, too");
+    return watched(watch, [&](Context& context) { return import_volume(path, options, context); });
+  });
+  m.def("voxelize", [](const Mesh& mesh, const VoxelizeOptions& options, Watch& watch) {
+    return watched(watch, [&](Context& context) { return voxelize(mesh, options, context); });
+  });
+  m.def("voxelize_grids", [](const Mesh& mesh, const std::string& grids, const VoxelizeOptions& options,
+                             bool fog_exterior, Watch& watch) {
+    return watched(
+        watch, [&](Context& context) { return voxelize_grids(mesh, grids, options, context, fog_exterior); });
+  });
+  m.def("extract",
+        [](const Volume& volume, const ExtractOptions& options, std::optional<Mesh> source, Watch& watch) {
+          return watched(watch, [&](Context& context) {
+            return extract(volume, options, context, source ? &*source : nullptr);
+          });
+        });
+  m.def("remesh", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
+                     Watch& watch) {
+    return watched(watch, [&](Context& context) { return remesh(mesh, voxelizing, extracting, context); });
+  });
+  m.def("combine", [](const std::string& operation, const Mesh& a, const Mesh& b,
+                      const VoxelizeOptions& voxelizing, const ExtractOptions& extracting, Watch& watch) {
+    const Boolean boolean = boolean_of(operation);
+    return watched(watch,
+                   [&](Context& context) { return combine(boolean, a, b, voxelizing, extracting, context); });
+  });
+  m.def("fracture", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const FractureOptions& options,
+                       Watch& watch) {
+    return watched(watch, [&](Context& context) { return fracture(mesh, voxelizing, options, context); });
+  });
+  m.def("fracture_volume", [](const Volume& volume, const FractureOptions& options, Watch& watch) {
+    return watched(watch, [&](Context& context) { return fracture(volume, options, context); });
+  });
+}
+
+}  // namespace
+}  // namespace hermesh::python
+
+PYBIND11_MODULE(_core, m) {
+  namespace py = pybind11;
+  m.doc() = "Bindings of the public C++ functions; use the package hermesh.";
+  // Both translate what any extension module of this process throws, the judges' included.
+  py::register_exception<hermesh::Error>(m, "Error", PyExc_RuntimeError).attr("__module__") = "hermesh";
+  py::register_exception<hermesh::Cancelled>(m, "Cancelled", PyExc_Exception).attr("__module__") = "hermesh";
+  hermesh::python::bind_mesh(m);
+  hermesh::python::bind_volume(m);
+  hermesh::python::bind_options(m);
+  hermesh::python::bind_functions(m);
+}

@@ -1,0 +1,36 @@
+"""Two meshes of one part are compared with it: triangles, certified distances, topology."""
+
+import shapes
+
+import hermesh
+
+path = shapes.model("fandisk.obj")
+if path:
+    part = hermesh.read_mesh(path)
+else:
+    # A block with a groove, cut out of it by a torus.
+    block = shapes.box((-1.2, -1.2, -0.5), (1.2, 1.2, 0.0))
+    part = hermesh.combine("difference", block, shapes.torus(0.8, 0.25), resolution=200, tolerance=0.02)
+
+size = max(part.points.max(axis=0) - part.points.min(axis=0))
+meshes = {
+    "marching cubes": hermesh.remesh(part, resolution=100, extractor="marching-cubes"),
+    "manifold dual contouring": hermesh.remesh(part, resolution=100, tolerance=0.1),
+}
+print(f"{'mesh':26} triangles  to the part [voxels]  from the part [voxels]  watertight  solid")
+for name, mesh in meshes.items():
+    report = hermesh.validate(mesh, reference=part, certify=True, samples=50_000)
+    to, back = report.certified_to_reference, report.certified_from_reference
+    voxel = size / 100
+    print(f"{name:26} {len(mesh.triangulated()):9}  {to.lower / voxel:.3f} to {to.upper / voxel:.3f}"
+          f"         {back.lower / voxel:.3f} to {back.upper / voxel:.3f}           {str(report.watertight):10}  {report.solid}")
+
+# Without models it prints
+#   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
+#   marching cubes                 66652  0.664 to 0.672         1.154 to 1.169           True        same
+#   manifold dual contouring        1286  0.116 to 0.130         0.108 to 0.123           True        same
+
+# With that of $HERMESH_DATA it prints
+#   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
+#   marching cubes                 51080  0.579 to 0.584         0.858 to 0.873           True        same
+#   manifold dual contouring         522  0.208 to 0.221         0.100 to 0.114           True        same

@@ -1,0 +1,75 @@
+"""What a call of the module costs beside the program, in time and in memory: cost.py MESH RESOLUTION [REPETITIONS]
+
+Each is a process of its own, which reads the mesh, remeshes it and writes the result; they take turns. $HERMESH_PROGRAM is the
+program, $PYTHONPATH has the module. Prints the seconds of the work itself, those of the whole process and the peaks of resident
+memory; the arrays of both meshes together are what one copy of them would take. Load on the machine is seen in both alike.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+
+import hermesh
+
+mesh, resolution = sys.argv[1], int(sys.argv[2])
+repetitions = int(sys.argv[3]) if len(sys.argv) > 3 else 5
+
+MODULE = """
+import json, sys, time
+import hermesh
+log = hermesh.Log()
+scan = hermesh.read_mesh(sys.argv[1], log=log)
+points, triangles, origin = scan.points, scan.triangles, scan.origin
+begun = time.perf_counter()
+clean = hermesh.remesh(scan, resolution=int(sys.argv[2]), log=log)
+seconds = time.perf_counter() - begun
+arrays = clean.points, clean.triangles, clean.quads
+clean.write(sys.argv[3], log=log)
+size = sum(a.nbytes for a in (points, triangles, *arrays))
+print(json.dumps({"call": seconds, "array_bytes": size}))
+"""
+
+
+def run(command):
+    """Seconds and peak of memory in MiB of a process, and what it prints."""
+    process = subprocess.Popen(["/usr/bin/env", "time", "-f", "%e %U %S %M", *command], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    out, err = process.communicate()
+    if process.returncode != 0:
+        sys.exit(err)
+    elapsed, user, system, peak = err.strip().splitlines()[-1].split()
+    return float(elapsed), float(user) + float(system), int(peak) / 1024, out
+
+
+
+with tempfile.TemporaryDirectory() as folder:
+    theirs, ours = os.path.join(folder, "program.ply"), os.path.join(folder, "module.ply")
+    program = [os.environ["HERMESH_PROGRAM"], "remesh", mesh, theirs, "--resolution", str(resolution), "--json"]
+    module = [sys.executable, "-c", MODULE, mesh, str(resolution), ours]
+    # What either costs before it does anything.
+    starts = {"program": [run([os.environ["HERMESH_PROGRAM"], "--version"]) for _ in range(3)],
+              "module": [run([sys.executable, "-c", "import hermesh"]) for _ in range(3)]}
+    rows = {"program": [], "module": []}
+    for _ in range(repetitions):
+        for name, command in (("program", program), ("module", module)):
+            rows[name].append(run(command))
+    with open(theirs, "rb") as a, open(ours, "rb") as b:
+        print("bytes:", "the same" if a.read() == b.read() else "DIFFERENT")
+    for name, row in rows.items():
+        print(f"{name:8} elapsed {' '.join(f'{r[0]:.2f}' for r in row)} s, median {statistics.median(r[0] for r in row):.2f};"
+              f" CPU median {statistics.median(r[1] for r in row):.2f} s; peak {min(r[2] for r in row):.0f} to"
+              f" {max(r[2] for r in row):.0f} MiB")
+    # On a machine that others use, too, the least of each says most.
+    least = {name: [min(r[i] for r in row) - min(r[i] for r in starts[name]) for i in range(3)] for name, row in rows.items()}
+    for name, (elapsed, cpu, peak) in least.items():
+        begin = [min(r[i] for r in starts[name]) for i in range(3)]
+        print(f"{name:8} start {begin[0]:.2f} s, {begin[1]:.2f} s of CPU, {begin[2]:.0f} MiB;"
+              f" beyond the start {elapsed:.2f} s, {cpu:.2f} s of CPU, {peak:.1f} MiB")
+    ours, theirs = least["module"], least["program"]
+    print(f"module over program, beyond the starts: elapsed {100 * (ours[0] / theirs[0] - 1):+.1f} %,"
+          f" CPU {100 * (ours[1] / theirs[1] - 1):+.1f} %, peak {ours[2] - theirs[2]:+.1f} MiB")
+    size = json.loads(rows["module"][0][3])["array_bytes"] / 2**20
+    print(f"one copy of the arrays of both meshes: {size:.1f} MiB")

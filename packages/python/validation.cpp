@@ -1,0 +1,114 @@
+// The extension module hermesh._validation: the judges. Their library is under GPL-3, and so is this module;
+// it is loaded when they are first called.
+#include <pybind11/stl.h>
+
+#include "hermesh/validate.h"
+#include "packages/python/watch.h"
+
+namespace hermesh::python {
+namespace {
+
+void bind_report(py::module_& m) {
+  py::class_<SurfaceDistances>(m, "SurfaceDistances",
+                               "Distances from samples of a surface to another, world units.")
+      .def_readonly("max", &SurfaceDistances::max)
+      .def_readonly("mean", &SurfaceDistances::mean)
+      .def_readonly("rms", &SurfaceDistances::rms)
+      .def_readonly("worst", &SurfaceDistances::worst, "The place of the greatest.");
+  py::class_<HausdorffBracket>(m, "HausdorffBracket",
+                               "A certified bracket of a one-sided Hausdorff distance, world units.")
+      .def_readonly("lower", &HausdorffBracket::lower)
+      .def_readonly("upper", &HausdorffBracket::upper);
+  py::class_<DefectPlace>(m, "DefectPlace")
+      .def_readonly("point", &DefectPlace::point, "World units.")
+      .def_readonly("polygons", &DefectPlace::polygons,
+                    "The polygons, triangles first, then quads; the second is -1 where there is one.");
+  py::class_<Defect>(m, "Defect")
+      .def_readonly("name", &Defect::name, "boundary_edges, ..., self_intersecting_pairs")
+      .def_readonly("count", &Defect::count)
+      .def_readonly("places", &Defect::places, "Those of the first ten.")
+      .def("__repr__", [](const Defect& defect) { return std::to_string(defect.count) + " " + defect.name; });
+  py::class_<Report>(m, "Report", "What the judges say of a mesh. str() of it is the verdict in words.")
+      .def_readonly("points", &Report::points)
+      .def_readonly("triangles", &Report::triangles)
+      .def_readonly("quads", &Report::quads)
+      .def_readonly("boundary_edges", &Report::boundary_edges)
+      .def_readonly("non_manifold_edges", &Report::non_manifold_edges)
+      .def_readonly("non_manifold_vertices", &Report::non_manifold_vertices)
+      .def_readonly("inconsistent_edges", &Report::inconsistent_edges)
+      .def_readonly("degenerate_polygons", &Report::degenerate_polygons)
+      .def_readonly("duplicate_polygons", &Report::duplicate_polygons)
+      .def_readonly("isolated_points", &Report::isolated_points)
+      .def_readonly("components", &Report::components)
+      .def_readonly("euler_characteristic", &Report::euler_characteristic)
+      .def_readonly("genus", &Report::genus, "None unless the mesh is closed, manifold and oriented.")
+      .def_readonly("self_intersecting_pairs", &Report::self_intersecting_pairs, "None where nobody looked.")
+      .def_readonly("volume", &Report::volume, "World units.")
+      .def_readonly("area", &Report::area, "World units.")
+      .def_readonly("smallest_angle", &Report::smallest_angle, "Degrees.")
+      .def_readonly("worst_aspect", &Report::worst_aspect, "1 for the equilateral triangle.")
+      .def_readonly("to_reference", &Report::to_reference)
+      .def_readonly("from_reference", &Report::from_reference)
+      .def_readonly("certified_to_reference", &Report::certified_to_reference)
+      .def_readonly("certified_from_reference", &Report::certified_from_reference)
+      .def_readonly("solid", &Report::solid,
+                    "Compared with the reference's: \"same\", \"differs\" or \"unknown\".")
+      .def_readonly("defects", &Report::defects, "Those there are, with places.")
+      .def_readonly("sentences", &Report::sentences, "The verdict in words, most important first.")
+      .def_readonly("json", &Report::json, "All of it and more as one JSON object.")
+      .def(
+          "to_dict",
+          [](const Report& report) { return py::module_::import("json").attr("loads")(report.json); },
+          "The object of `json` as a dict.")
+      .def_property_readonly("closed", &Report::closed)
+      .def_property_readonly("manifold", &Report::manifold)
+      .def_property_readonly("oriented", &Report::oriented)
+      .def_property_readonly("watertight", &Report::watertight,
+                             "Closed, manifold, oriented and free of self-intersections.")
+      .def("__str__", [](const Report& report) {
+        std::string all;
+        for (const std::string& sentence : report.sentences) all += (all.empty() ? "" : "\n") + sentence;
+        return all;
+      });
+  py::class_<FractureReport>(m, "FractureReport", "Whether the pieces of a fracture fit one another.")
+      .def_readonly("consistent", &FractureReport::consistent,
+                    "Whether each piece is right by itself, and all fit without gap or overlap.")
+      .def_readonly("pieces", &FractureReport::pieces)
+      .def_readonly("triangles", &FractureReport::triangles)
+      .def_readonly("seam_triangles", &FractureReport::seam_triangles)
+      .def_readonly("unmatched_cut", &FractureReport::unmatched_cut)
+      .def_readonly("intersecting_pairs", &FractureReport::intersecting_pairs)
+      .def_readonly("broken_pieces", &FractureReport::broken_pieces)
+      .def_readonly("pieces_volume", &FractureReport::pieces_volume, "World units.")
+      .def_readonly("sentences", &FractureReport::sentences);
+}
+
+Report judged(const Mesh& mesh, const std::optional<Mesh>& reference, const std::optional<Mesh>& features,
+              bool self_intersections, bool libraries, bool certify, std::int64_t samples, double dihedral,
+              double voxel_size, Watch& watch) {
+  const ValidateOptions options{.reference = reference ? &*reference : nullptr,
+                                .features = features ? &*features : nullptr,
+                                .self_intersections = self_intersections,
+                                .libraries = libraries,
+                                .certify = certify,
+                                .samples = samples,
+                                .dihedral = dihedral,
+                                .voxel_size = voxel_size};
+  return watched(watch, [&](Context& context) { return validate(mesh, options, context); });
+}
+
+}  // namespace
+}  // namespace hermesh::python
+
+PYBIND11_MODULE(_validation, m) {
+  namespace py = pybind11;
+  m.doc() = "Bindings of the judges; use the package hermesh.";
+  // The types of meshes and exceptions are those of the other module.
+  py::module_::import("hermesh._core");
+  hermesh::python::bind_report(m);
+  m.def("validate", &hermesh::python::judged);
+  m.def("validate_fracture", [](const std::vector<hermesh::Mesh>& pieces, hermesh::python::Watch& watch) {
+    return hermesh::python::watched(
+        watch, [&](hermesh::Context& context) { return hermesh::validate_fracture(pieces, context); });
+  });
+}
