@@ -128,6 +128,7 @@ class BoundedRemesher {
       turns_ = winding_->orientation().turns;
     }
     result_.error = options_.error;
+    result_.over_holes = options_.over_holes;
     result_.voxel_size = std::min(kFirstVoxel * options_.error, longest_ / kFewestVoxels);
     while (!try_at(result_.voxel_size) && result_.unmet.empty()) ++result_.rounds;
     if (!result_.unmet.empty()) result_.mesh = {};
@@ -448,6 +449,7 @@ class BoundedRemesher {
     std::sort(thick.begin(), thick.end());
     const double thinnest =
         thick.empty() ? std::numeric_limits<double>::infinity() : thick[thick.size() / 20].first;
+    // Voxels that are as thick as the thinnest wall show it wherever samples fall into it, or nearly.
     const bool is_thin = std::isfinite(thinnest), too_thin = is_thin && kThinVoxels * thinnest < smallest;
     if (is_thin) factor = std::clamp(kVoxelOfThickness * thinnest / voxel_size, 0.2, 0.7);
     if (!too_thin && voxel_size > 1.1 * smallest) {
@@ -547,6 +549,8 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
       too_small = now.error;
     }
     if (too_small >= 0.5 * extent) break;
+    // The law of inverse proportion, within what earlier tries leave open; where it leads out of that, their
+    // middle.
     double next = now.error * std::clamp(count / (0.95 * double(triangles)), 0.1, 10.0);
     if (next <= too_small || next >= enough)
       next = std::isfinite(enough) ? std::sqrt(too_small * enough) : 2.0 * too_small;
@@ -557,6 +561,20 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
     throw Error("no mesh with at most " + std::to_string(triangles) +
                 " triangles was found that is within half of the polygons' extent of them; allow more");
   return std::move(*best);
+}
+
+std::vector<std::string> notes(const BoundedMesh& made) {
+  std::vector<std::string> result;
+  if (made.free_area > 0.0)
+    result.push_back("polygons of " + text(made.free_area) +
+                     " in all, as area, have the same on both sides, by winding numbers at places a 16th of "
+                     "the error apart, "
+                     "and were taken to bound nothing");
+  if (made.hole_area > 0.0 && made.over_holes)
+    result.push_back("holes of " + text(made.hole_area) +
+                     " in all, as area, were closed, where the bound is to the surface on which the winding "
+                     "number is 1/2");
+  return result;
 }
 
 std::string explanation(const BoundedMesh& refused) {

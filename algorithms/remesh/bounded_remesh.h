@@ -62,6 +62,7 @@ struct BoundedMesh {
   int rounds = 0;                 ///< how often voxels or tolerances were made smaller
   double free_area = 0.0;         ///< area of polygons far from the mesh that bound nothing, world units²
   double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
+  bool over_holes = false;        ///< as it was asked for
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first
@@ -81,6 +82,10 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
 /// @throws Error where no error as large as half of the polygons' extent gives so few; as bounded_remesh()
 BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
                              const BoundedRemeshOptions& options, RunContext& context);
+
+/// Sentences on what of a bound that was reached is not as one would think: polygons that count for nothing,
+/// and holes.
+std::vector<std::string> notes(const BoundedMesh& made);
 
 /// A sentence that says where and why the bound is not reached, and what to do. There is an unmet place.
 std::string explanation(const BoundedMesh& refused);

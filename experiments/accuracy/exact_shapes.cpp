@@ -307,11 +307,14 @@ class Cube final : public ExactShape {
 class Gyroid final : public ExactShape {
  public:
   SurfacePlace nearest(const Vector3d& p) const override {
-    // Newton's method finds one of the places where the way to p is normal to the surface, so it starts from several.
+    // Newton's method finds one of the places where the way to p is normal to the surface, so it starts from
+    // several.
     std::optional<Vector3d> best;
-    for (int start = 0; start < 7; ++start) {
+    for (int start = 0; start < 7 || (!best && start < kMostStarts); ++start) {
       Vector3d from = p;
-      if (start > 0) from[(start - 1) / 2] += start % 2 == 0 ? kStart : -kStart;
+      // Along the axes; and where that finds none, farther and farther away.
+      if (start > 0)
+        from[(start - 1) / 2 % 3] += (start % 2 == 0 ? kStart : -kStart) * double(1 + (start - 1) / 6);
       const std::optional<Vector3d> found = foot(p, from);
       if (found && (!best || (*found - p).squaredNorm() < (*best - p).squaredNorm())) best = found;
     }
@@ -344,7 +347,9 @@ class Gyroid final : public ExactShape {
     return std::max(sheet, ball);
   }
   double exact_within() const override { return kExact; }
-  double bounded_distance(const Vector3d& p) const override { return std::max(value(p) / kSteepest, p.norm() - kBall); }
+  double bounded_distance(const Vector3d& p) const override {
+    return std::max(value(p) / kSteepest, p.norm() - kBall);
+  }
   std::optional<double> area() const override { return std::nullopt; }
   std::optional<double> volume() const override { return std::nullopt; }
   Vector3d half_size() const override { return Vector3d::Constant(kBall); }
@@ -352,13 +357,14 @@ class Gyroid final : public ExactShape {
   PolygonMesh facets(double) const override { return {}; }
 
  private:
-  /// A place q of the surface with q - p + m ∇g(q) = 0, or none: a first guess from the gradient at `start`, then Newton's
-  /// method for all four unknowns, which doubles the digits in each step.
+  /// A place q of the surface with q - p + m ∇g(q) = 0, or none: a first guess from the gradient at `start`,
+  /// then Newton's method for all four unknowns, which doubles the digits in each step.
   static std::optional<Vector3d> foot(const Vector3d& p, const Vector3d& start) {
     Vector3d q = start;
     for (int i = 0; i < 3; ++i) q -= value(q) / std::max(gradient(q).squaredNorm(), 0.1) * gradient(q);
     double m = (p - q).dot(gradient(q)) / gradient(q).squaredNorm();
-    for (int i = 0; i < 20; ++i) {
+    double last = 1.0;
+    for (int i = 0; i < 30; ++i) {
       const Vector3d slope = gradient(q);
       Eigen::Matrix4d system = Eigen::Matrix4d::Zero();
       system.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() + m * hessian(q);
@@ -370,8 +376,12 @@ class Gyroid final : public ExactShape {
       q += step.head<3>();
       m += step[3];
       if (!q.allFinite()) return std::nullopt;
-      if (step.norm() < 1e-13) return q;
+      last = step.norm();
+      if (last < 1e-13) return q;
     }
+    // Near the centre of a curvature the system is nearly singular, and rounding keeps the steps from
+    // becoming smaller.
+    if (last < 1e-9 && std::abs(value(q)) < 1e-12) return q;
     return std::nullopt;
   }
 
@@ -395,6 +405,7 @@ class Gyroid final : public ExactShape {
   }
   static constexpr double kScale = 2.0, kBall = 1.25;
   static constexpr double kStart = 0.2;  ///< how far from a point Newton's method starts, too
+  static constexpr int kMostStarts = 31;
   /// Each component of the gradient, kScale (cos a cos b − sin c sin a), is at most √2 kScale, so its length
   /// √6 kScale.
   static constexpr double kSteepest = 2.0 * std::numbers::sqrt2 * std::numbers::sqrt3;

@@ -113,19 +113,9 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   session.context.figure("voxel_size", made.voxel_size);
   session.context.figure("triangles", double(made.mesh.triangle_count()));
   session.context.figure("rounds", made.rounds);
-  if (made.free_area > 0.0) {
-    session.context.figure("area_that_bounds_nothing", made.free_area);
-    session.context.note("polygons of " + text(made.free_area) +
-                         " in all, as area, have the same on both sides, by winding "
-                         "numbers at places a 16th of the error apart, and were taken to bound nothing");
-  }
-  if (made.hole_area > 0.0) {
-    session.context.figure("hole_area", made.hole_area);
-    if (arguments.over_holes)
-      session.context.note("holes of " + text(made.hole_area) +
-                           " in all were closed, where the bound is to the surface on "
-                           "which the winding number is 1/2");
-  }
+  if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
+  if (made.hole_area > 0.0) session.context.figure("hole_area", made.hole_area);
+  for (const std::string& note : notes(made)) session.context.note(note);
   print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "proved: the mesh is within " + text(made.to_surface) +

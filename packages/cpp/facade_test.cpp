@@ -509,6 +509,21 @@ TEST_F(AsTheProgram, Remeshes) {
   expect_same("program.ply", "library.ply");
 }
 
+TEST_F(AsTheProgram, RemeshesWithinAnError) {
+  hermesh::write_mesh(path("in.ply"), torus(), context_);
+  program({"remesh", "in.ply", "program.ply", "--error", "0.03"});
+  const hermesh::BoundedRemesh made = hermesh::remesh_within(torus(), {.error = 0.03}, context_);
+  hermesh::write_mesh(path("library.ply"), made.mesh, context_);
+  expect_same("program.ply", "library.ply");
+  EXPECT_LE(made.to_polygons, 0.03);
+  EXPECT_LE(made.from_polygons, 0.03);
+  const hermesh::BoundedRemesh few = hermesh::remesh_within(torus(), {.triangles = 300}, context_);
+  EXPECT_LE(few.mesh.triangle_count(), 300u);
+  EXPECT_THROW(hermesh::remesh_within(torus(), {}, context_), Error);
+  EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .triangles = 10}, context_), Error);
+  EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .signs = "unsigned"}, context_), Error);
+}
+
 TEST_F(AsTheProgram, VoxelizesAndExtracts) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
   program({"voxelize", "in.ply", "program.vdb", "--resolution", "40"});

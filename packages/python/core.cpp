@@ -514,6 +514,23 @@ void bind_functions(py::module_& m) {
                      Watch& watch) {
     return watched(watch, [&](Context& context) { return remesh(mesh, voxelizing, extracting, context); });
   });
+  m.def("remesh_within",
+        [](const Mesh& mesh, std::optional<double> error, std::optional<std::size_t> triangles,
+           const std::string& signs, bool over_holes, double smallest_voxel, double limit_points,
+           bool written_in_single, Watch& watch) {
+          const BoundedRemesh made = watched(watch, [&](Context& context) {
+            return remesh_within(mesh,
+                                 {.error = error,
+                                  .triangles = triangles,
+                                  .signs = signs,
+                                  .over_holes = over_holes,
+                                  .smallest_voxel = smallest_voxel,
+                                  .most_points = limit_points,
+                                  .written_in_single = written_in_single},
+                                 context);
+          });
+          return py::make_tuple(made.mesh, made.error, made.to_polygons, made.from_polygons, made.voxel_size);
+        });
   m.def("combine", [](const std::string& operation, const Mesh& a, const Mesh& b,
                       const VoxelizeOptions& voxelizing, const ExtractOptions& extracting, Watch& watch) {
     const Boolean boolean = boolean_of(operation);

@@ -25,7 +25,7 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Protocol, Union
+from typing import Any, NamedTuple, Protocol, Union
 
 import numpy as np
 
@@ -35,9 +35,9 @@ from ._core import (Cancelled, Error, Fracture, Frustum, Mesh, MethodInfo, Optio
 
 __version__: str = _core.version()
 __all__ = [
-    "Cancelled", "Error", "Fracture", "Frustum", "Log", "Mesh", "MethodInfo", "Note", "OptionInfo", "Piece", "Volume", "as_mesh",
+    "BoundedRemesh", "Cancelled", "Error", "Fracture", "Frustum", "Log", "Mesh", "MethodInfo", "Note", "OptionInfo", "Piece", "Volume", "as_mesh",
     "combine", "extract", "extractors", "fracture", "from_pyopenvdb", "grid_names", "import_volume", "read_mesh", "read_vdb",
-    "remesh", "to_meshio", "to_pyopenvdb", "to_trimesh", "validate", "validate_fracture", "voxelize", "voxelize_grids",
+    "remesh", "remesh_within", "to_meshio", "to_pyopenvdb", "to_trimesh", "validate", "validate_fracture", "voxelize", "voxelize_grids",
     "voxelizers", "write_mesh", "write_vdb"
 ]
 for _class in (Fracture, Frustum, Mesh, MethodInfo, OptionInfo, Piece, Volume):
@@ -402,6 +402,31 @@ def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float |
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.remesh(mesh, voxelizing, extracting, watch)
+
+
+class BoundedRemesh(NamedTuple):
+    """A mesh with the distances that are proved of it, world units."""
+    mesh: Mesh
+    error: float  # that was asked for or, for a budget, found
+    to_polygons: float  # no place of the mesh is farther from the boundary of the polygons' solid
+    from_polygons: float  # no place of that is farther from the mesh
+    voxel_size: float
+
+
+def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int | None = None, signs: str = "winding-number",
+                  over_holes: bool = False, smallest_voxel: float = 0.0, limit_points: float = 3e7,
+                  written_in_single: bool = False, progress: Progress | None = None, cancel: _IsSet | None = None,
+                  threads: int | None = None, log: Log | None = None) -> BoundedRemesh:
+    """A mesh within `error` (world units) of the boundary of the polygons' solid, both ways, which is proved; or with so many
+    `triangles` at most, at the smallest error that was found for them. Closed, manifold and free of self-intersection.
+
+    over_holes lets it close holes, where no polygon is near. smallest_voxel (world units, 0 for an eighth of the error) and
+    limit_points say when to give up; then hermesh.Error says where and why.
+    """
+    mesh = as_mesh(mesh)
+    with _Watching(progress, cancel, threads, log) as watch:
+        return BoundedRemesh(*_core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel, limit_points,
+                                                  written_in_single, watch))
 
 
 def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None = None, voxel_size: float | None = None,

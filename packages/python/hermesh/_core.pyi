@@ -296,6 +296,11 @@ def remesh(mesh: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, 
     ...
 
 
+def remesh_within(mesh: Mesh, error: float | None, triangles: int | None, signs: str, over_holes: bool, smallest_voxel: float,
+                  limit_points: float, written_in_single: bool, watch: Watch, /) -> tuple[Mesh, float, float, float, float]:
+    ...
+
+
 def combine(operation: str, a: Mesh, b: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, watch: Watch, /) -> Mesh:
     ...
 

@@ -47,6 +47,13 @@ class SameBytes(unittest.TestCase):
         self.compare(hermesh.remesh(self.torus, resolution=40, extractor="certified-octree", flatness=0.2, threads=1), ".ply",
                      "remesh", self.torus, "--resolution", 40, "--extractor", "certified-octree", "-o", "flatness=0.2")
 
+    def test_of_remesh_within(self):
+        made = hermesh.remesh_within(self.torus, error=0.03)
+        self.compare(made.mesh, ".ply", "remesh", self.torus, "--error", 0.03)
+        self.assertLessEqual(max(made.to_polygons, made.from_polygons), 0.03)
+        with self.assertRaises(hermesh.Error):
+            hermesh.remesh_within(self.torus)
+
     def test_of_quads(self):
         self.compare(hermesh.remesh(cube(1.0, (0.5, 0, -0.5)), resolution=30, extractor="dual-contouring"), ".ply", "remesh",
                      self.cube, "--resolution", 30, "--extractor", "dual-contouring")

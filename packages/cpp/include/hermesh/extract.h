@@ -71,6 +71,33 @@ HERMESH_API Mesh extract(const Solid& solid, const ExtractOptions& options, Cont
 HERMESH_API Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
                         Context& context);
 
+/// What a mesh is to keep to; what `hermesh remesh --error` and `--triangles` take. Exactly one of the first
+/// two is given.
+struct BoundOptions {
+  std::optional<double> error = {};  ///< two-sided distance from the polygons' solid at most, world units
+  std::optional<std::size_t> triangles =
+      {};  ///< at most, at the smallest error that was found for them; at least 4
+  std::string signs = "winding-number";  ///< or "flood-fill" or "auto": what is inside
+  bool over_holes = false;               ///< whether holes may be closed, where no polygon is near
+  double smallest_voxel = 0.0;           ///< world units; 0: an eighth of the error
+  double most_points = 3e7;              ///< of the finest mesh
+  bool written_in_single = false;        ///< as in ExtractOptions
+};
+
+/// A mesh with the distances that are proved of it, world units.
+struct BoundedRemesh {
+  Mesh mesh;
+  double error = 0.0;          ///< that was asked for or, for a budget, found
+  double to_polygons = 0.0;    ///< no place of the mesh is farther from the boundary of the polygons' solid
+  double from_polygons = 0.0;  ///< no place of that is farther from the mesh
+  double voxel_size = 0.0;
+};
+
+/// A mesh that is closed, manifold and free of self-intersection, with few triangles and a proved distance
+/// from the polygons.
+/// @throws Error where the bound is not reached: the sentence says where and why; Cancelled.
+HERMESH_API BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Context& context);
+
 /// The union, intersection or difference of two meshes' solids: both on one lattice, with their exact
 /// crossings, which keep the curves where their surfaces meet. A resolution counts along the larger one. What
 /// is lost between samples is a note.
