@@ -16,6 +16,7 @@
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/search/surface_distance.h"
 #include "algorithms/voxelization/inside/oriented_winding.h"
 #include "algorithms/voxelization/voxelize.h"
@@ -32,6 +33,8 @@ constexpr double kFirstVoxel = 1.5, kSmallestVoxel = 0.125;
 constexpr double kFewestVoxels = 16.0;
 /// A tolerance that was lowered below this many voxels is of no more use.
 constexpr double kLeastTolerance = 0.02;
+/// Memory that a point of the uniform mesh takes until it is written, bytes.
+constexpr double kBytesOfPoint = 400.0;
 /// How often tolerances are lowered before voxels are made smaller.
 constexpr int kLowerings = 3;
 constexpr float kLowering = 0.4f;
@@ -432,7 +435,9 @@ class BoundedRemesher {
   double smallest_voxel() const {
     const double allowed =
         options_.smallest_voxel > 0.0 ? options_.smallest_voxel : kSmallestVoxel * options_.error;
-    return std::max(allowed, std::sqrt(1.5 * area_ / options_.most_points));
+    // What the machine has left is a limit, too, whatever is allowed.
+    const double room = double(available_memory().value_or(std::uint64_t(1) << 62)) / kBytesOfPoint;
+    return std::max(allowed, std::sqrt(1.5 * area_ / std::min(options_.most_points, room)));
   }
 
   /// Asks for smaller voxels: as small as what is far is thin, or `factor` of what they were where nothing

@@ -33,8 +33,8 @@ struct BoundedRemeshOptions {
   /// Whether the mesh may close holes, where no polygon is to be near: over them it is bound to the surface
   /// on which the winding number is ½, as found at the voxel size.
   bool over_holes = false;
-  /// Points of the uniform mesh at most, so that voxels do not become smaller without end. Each takes some
-  /// 300 bytes.
+  /// Points of the uniform mesh at most, so that voxels do not become smaller without end; each takes some
+  /// 300 bytes, and there are no more than the available memory holds.
   double most_points = 3e7;
   double smallest_voxel = 0.0;     ///< world units: none is smaller; 0: an eighth of the error
   bool written_in_single = false;  ///< as in ExtractionInput
