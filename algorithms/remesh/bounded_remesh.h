@@ -72,13 +72,18 @@ struct BoundedMesh {
 /// at most `options.error`, with few triangles; or the places that keep it from being one. The same bytes for
 /// every number of threads.
 /// @param mesh any polygons, quads cut as they are to be
+/// @param options what is asked for
+/// @param context told of progress, and asked whether to stop
 /// @throws Error where the polygons give no inside, or as voxelize() does; Cancelled
 BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context);
 
 /// The mesh of bounded_remesh() with the smallest error that was found for which there are at most
 /// `triangles` triangles; `options.error` is not looked at. Errors are tried until nine tenths of the
 /// triangles are used, twelve at most.
+/// @param mesh as in bounded_remesh()
 /// @param triangles at least 4
+/// @param options as in bounded_remesh(), but for the error
+/// @param context told of progress, and asked whether to stop
 /// @throws Error where no error as large as half of the polygons' extent gives so few; as bounded_remesh()
 BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
                              const BoundedRemeshOptions& options, RunContext& context);

@@ -57,6 +57,7 @@ class SurfaceDistance {
   /// @param offset of their origin from the soup's
   /// @param triangles numbers of their points
   /// @param limit greater than 0
+  /// @param context asked whether to stop
   /// @param free tells which pieces need not be near, in the frame of the points
   /// @throws Cancelled
   DistanceFromSurface hold(std::span<const Eigen::Vector3f> points, const Eigen::Vector3d& offset,
