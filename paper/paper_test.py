@@ -239,7 +239,7 @@ class Waiting(Case):
                  "| pairs | left out | effect | 95 % interval | predicted | falsified if | verdict |\n| --- |\n" + self.line + "\n")
         values = {"order": 1.97, "order_within": 1, "size": 48, "triangles": 100, "error_max": 0.1, "times_optimum": 2.2}
         columns = [{"name": name, "header": name, "meaning": name} for name in values]
-        self.put("order", [{**head, "experiment": "order", "case": {"name": subject}, "variant": {"name": label, "label": label},
+        self.put("order_sphere", [{**head, "experiment": "order", "case": {"name": subject}, "variant": {"name": label, "label": label},
                             "table": {"columns": columns}, "values": values}
                            for subject, label in [("sphere", "dual optimal, level set: rms"), ("sphere", "dual optimal, level set: max"),
                                                   ("optimum", "sphere, manifold 0.1, 48")]])
