@@ -6,7 +6,6 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
@@ -166,8 +165,8 @@ class BoundedRemesher {
     if (!volume.is_signed)
       throw Error(
           "the polygons give no inside that a distance could be measured to (a note says why); give a sheet "
-          "a "
-          "thickness with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
+          "a thickness "
+          "with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
     const LevelSet level_set = make_level_set(volume.distance);
     FloatHermite hermite = sample_polygons(level_set, 0.0, mesh_, context_);
     if (hermite.crossings.empty()) return std::nullopt;
@@ -335,18 +334,19 @@ class BoundedRemesher {
     // Of the uniform mesh those triangles are asked that the failing ones stand for, or are near to.
     std::vector<Triangle> of_surface, of_uniform;
     std::vector<std::uint8_t> taken(now.fine.triangles().size(), 0);
-    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
+    const SurfaceDistance to_uniform(now.file_points, now.fine.triangles());
     for (const Far& f : far) {
       if (f.of_surface) {
         of_surface.push_back(now.surface.triangles[f.triangle]);
         continue;
       }
       const Eigen::Vector3d reach = Eigen::Vector3d::Constant(now.voxel_size);
-      uniform.for_each_near(f.place - now.offset - reach, f.place - now.offset + reach, [&](std::uint32_t t) {
-        if (!std::exchange(taken[t], 1)) of_uniform.push_back(now.fine.triangles()[t]);
-      });
+      to_uniform.tree().for_each_near(f.place - now.offset - reach, f.place - now.offset + reach,
+                                      [&](std::uint32_t t) {
+                                        if (!std::exchange(taken[t], 1))
+                                          of_uniform.push_back(now.fine.triangles()[t]);
+                                      });
     }
-    const SurfaceDistance to_uniform(now.file_points, now.fine.triangles());
     return !surface.hold(now.file_points, now.offset, of_uniform, options_.error, context_).far.empty() ||
            !to_uniform
                 .hold(now.surface.points, -now.offset, of_surface, options_.error, context_, free_pieces())
@@ -513,12 +513,6 @@ class BoundedRemesher {
   BoundedMesh result_;
 };
 
-std::string text(double value) {
-  std::ostringstream stream;
-  stream << value;
-  return stream.str();
-}
-
 }  // namespace
 
 BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options,
@@ -527,81 +521,6 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
     throw Error("the error must be a finite number above 0");
   if (mesh.empty()) throw Error("there are no polygons to remesh");
   return BoundedRemesher(mesh, options, context).run();
-}
-
-BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
-                             const BoundedRemeshOptions& options, RunContext& context) {
-  constexpr int kTries = 12;
-  const double extent = bounds(mesh).size().norm();
-  // On a smooth surface the triangles are in inverse proportion to the error; a sphere's 0.01 of the extent
-  // needs some hundreds.
-  BoundedRemeshOptions now = options;
-  now.error = std::clamp(3.0 * extent / double(triangles), 1e-5 * extent, 0.1 * extent);
-  double too_small = 0.0, enough = std::numeric_limits<double>::infinity();
-  std::optional<BoundedMesh> best;
-  for (int i = 0; i < kTries; ++i) {
-    BoundedMesh made = bounded_remesh(mesh, now, context);
-    if (!made.unmet.empty()) {
-      if (best) break;
-      return made;
-    }
-    const double count = double(made.mesh.triangle_count());
-    if (count <= double(triangles)) {
-      enough = now.error;
-      best = std::move(made);
-      if (count >= 0.9 * double(triangles)) break;
-    } else {
-      too_small = now.error;
-    }
-    if (too_small >= 0.5 * extent) break;
-    // The law of inverse proportion, within what earlier tries leave open; where it leads out of that, their
-    // middle.
-    double next = now.error * std::clamp(count / (0.95 * double(triangles)), 0.1, 10.0);
-    if (next <= too_small || next >= enough)
-      next = std::isfinite(enough) ? std::sqrt(too_small * enough) : 2.0 * too_small;
-    if (too_small > 0.0 && enough / too_small < 1.02) break;
-    now.error = std::min(next, 0.5 * extent);
-  }
-  if (!best)
-    throw Error("no mesh with at most " + std::to_string(triangles) +
-                " triangles was found that is within half of the polygons' extent of them; allow more");
-  return std::move(*best);
-}
-
-std::vector<std::string> notes(const BoundedMesh& made) {
-  std::vector<std::string> result;
-  if (made.free_area > 0.0)
-    result.push_back("polygons of " + text(made.free_area) +
-                     " in all, as area, have the same on both sides, by winding numbers at places a 16th of "
-                     "the error apart, "
-                     "and were taken to bound nothing");
-  if (made.hole_area > 0.0 && made.over_holes)
-    result.push_back("holes of " + text(made.hole_area) +
-                     " in all, as area, were closed, where the bound is to the surface on which the winding "
-                     "number is 1/2");
-  return result;
-}
-
-std::string explanation(const BoundedMesh& refused) {
-  const UnmetPlace& first = refused.unmet.front();
-  std::ostringstream place;
-  place << "(" << first.place.x() << ", " << first.place.y() << ", " << first.place.z() << ")";
-  const std::string at = "the error of " + text(refused.error) + " is not kept at " + place.str() + ": ";
-  const std::string distance = std::isfinite(first.distance)
-                                   ? " the surfaces are at least " + text(first.distance) + " apart there"
-                                   : std::string(" nothing of the polygons shows");
-  switch (first.why) {
-    case Unmet::hole:
-      return at + "the polygons have a hole there, which has to be closed;" + distance +
-             "; give --over-holes to let the bound hold elsewhere";
-    case Unmet::thin:
-      break;
-  }
-  const std::string what = refused.thickness > 0.0 ? "a wall or gap of " + text(refused.thickness) +
-                                                         " there is too thin for voxels of "
-                                                   : "something there is too small for voxels of ";
-  return at + what + text(refused.voxel_size) + ", the smallest that may be;" + distance +
-         "; raise the error, or allow smaller ones with --smallest-voxel and --limit-points";
 }
 
 }  // namespace hermesh
