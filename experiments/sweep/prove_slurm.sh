@@ -34,6 +34,10 @@ in_the_middle() {
 }
 job_of() { squeue --noheader --format='%A %j' | awk -v name="hermesh-shard-$1" '$2 == name { print $1 }'; }
 
+# What an earlier proof left is taken away; a folder with anything else in it was not meant.
+if [ -n "$(ls -A "$out" 2>/dev/null)" ] && [ ! -e "$out/whole.txt" ]; then
+  fail "'$out' has files that no proof made; name a folder that is not there, or an empty one"
+fi
 rm -rf "$out"
 mkdir -p "$out"
 out=$(cd "$out" && pwd)
