@@ -7,13 +7,6 @@
 namespace hermesh {
 namespace {
 
-/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the isovalue 0
-/// alone, for nowhere else does the surface that is asked for lie on the polygons.
-bool wants_polygons(const ExtractionInput& input) {
-  const std::string& source = input.options.text("hermite");
-  return source == "exact" || (source == "auto" && (input.source || input.hermite) && input.isovalue == 0.0);
-}
-
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
   // Who voxelized the input may have exact crossings at hand; then nothing is sampled.
@@ -46,6 +39,12 @@ std::vector<std::string> normal_code_names() {
 }
 
 }  // namespace
+
+bool wants_polygons(const ExtractionInput& input) {
+  const std::string& source = input.options.text("hermite");
+  // Asked for by name they are wanted even where there are none, so that who samples can say what is missing.
+  return source == "exact" || (source == "auto" && (input.source || input.hermite) && input.isovalue == 0.0);
+}
 
 const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std::string& asked,
                                         const std::string& instead) {

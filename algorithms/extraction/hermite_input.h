@@ -14,6 +14,10 @@ namespace hermesh {
 /// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
 std::vector<OptionSpec> hermite_options();
 
+/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the isovalue 0
+/// alone, for nowhere else does the surface that is asked for lie on the polygons.
+bool wants_polygons(const ExtractionInput& input);
+
 /// The polygons, where a variant `asked` for what only they have; `instead` is the option to do without.
 /// @throws Error if they are not there, or if they do not lie at the isovalue, which is so only at 0.
 const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std::string& asked,

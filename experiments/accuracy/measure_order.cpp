@@ -48,6 +48,7 @@ const std::vector<VariantOfOrder>& variants() {
   static const std::vector<VariantOfOrder> table = {
       {"marching-cubes", "marching-cubes", {}, false, false},
       {"dual average", "dual-contouring", {{"placement", "average"}}, true, false},
+      {"dual", "dual-contouring", {}, true, true},
       {"dual optimal", "dual-contouring", {{"placement", "optimal"}}, true, true},
       {"adaptive 0",
        "adaptive-dual-contouring",
@@ -368,7 +369,7 @@ class Measurer {
     for (const double size : sizes_) {
       if (size < kSmallestForOptimum || (!slow_ && size < sizes_.back())) continue;
       const double voxel = 1.0 / size;
-      std::map<const AdaptiveVariant*, std::vector<std::array<double, 2>>> found;
+      std::map<const AdaptiveVariant*, std::vector<std::pair<std::size_t, DistancesToSurface>>> found;
       std::map<const AdaptiveVariant*, std::string> failures;
       for (std::size_t offset = 0; offset < kOffsets.size(); ++offset) {
         const PlacedShape truth = placed(shape, voxel, offset);
@@ -383,7 +384,7 @@ class Measurer {
                 .hermite = &hermite};
             const PolygonMesh mesh = extract(level_set, nullptr, recipe, child).mesh;
             found[variant].push_back(
-                {double(mesh.triangle_count()), largest_distance(mesh, truth, 0.5 * voxel, child)});
+                {mesh.triangle_count(), distances_to_surface(mesh, truth, 0.5 * voxel, child)});
           });
           if (failure) failures[variant] = *failure;
         }
@@ -393,13 +394,19 @@ class Measurer {
         if (failures.contains(variant)) {
           row.broken.push_back(failures.at(variant));
         } else {
-          std::vector<double> triangles, errors, times;
-          for (const auto& [count, error] : found.at(variant))
-            triangles.push_back(count), errors.push_back(error / voxel),
-                times.push_back(count * error / *optimum);
+          std::vector<double> triangles, max, rms, mean, times;
+          for (const auto& [count, distances] : found.at(variant)) {
+            triangles.push_back(double(count));
+            max.push_back(distances.max / voxel);
+            rms.push_back(distances.rms / voxel);
+            mean.push_back(distances.mean / voxel);
+            times.push_back(double(count) * distances.max / *optimum);
+          }
           row.values = {{"size", size},
                         {"triangles", mean_of(triangles)},
-                        {"error_max", mean_of(errors)},
+                        {"error_max", mean_of(max)},
+                        {"error_rms", mean_of(rms)},
+                        {"error_mean", mean_of(mean)},
                         {"times_optimum", mean_of(times)},
                         {"times_optimum_min", std::ranges::min(times)},
                         {"times_optimum_max", std::ranges::max(times)}};
@@ -509,6 +516,8 @@ Measurement order_measurement() {
                     {{"size", "R/h", "voxels in the unit of length"},
                      {"triangles", "triangles", "of the mesh, mean over three places"},
                      {"error_max", "max [vx]", "largest distance from the mesh to the surface, mean"},
+                     {"error_rms", "rms [vx]", "distance from the mesh to the surface, root mean square, mean"},
+                     {"error_mean", "mean [vx]", "signed distance from the mesh to the surface, positive outside, mean"},
                      {"times_optimum", "÷ optimum",
                       "triangles over the fewest that have the mesh's own largest error, mean"},
                      {"times_optimum_min", "from", "smallest of the three places"},

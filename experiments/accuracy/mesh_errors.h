@@ -41,14 +41,18 @@ struct MeshErrors {
 };
 
 /// Measures a mesh. `length`: of pieces into which long triangles are cut before distances are taken at the
-/// corners, the middles of the sides and in the middle of each piece (the rule that is exact for cubic
-/// polynomials), and how densely the surface and its creases are sampled; the voxel size is a good one. The
+/// corners, the middles of the sides and inside of each piece (squares by the rule that is exact for polynomials of
+/// degree 5), and how densely the surface and its creases are sampled; the voxel size is a good one. The
 /// same result at any number of threads.
 /// @throws Error for a mesh without a triangle where the shape is described; Cancelled.
 MeshErrors mesh_errors(const PolygonMesh& mesh, const PlacedShape& shape, double length, RunContext& context);
 
-/// The largest distance from the mesh to the surface alone, as Quantity::kMax.
-double largest_distance(const PolygonMesh& mesh, const PlacedShape& shape, double length,
-                        const RunContext& context);
+/// Distances from the mesh to the surface alone, world units, over the mesh's area.
+struct DistancesToSurface {
+  double rms = 0, max = 0;  ///< as Quantity::kRms and kMax
+  double mean = 0;          ///< positive outside
+};
+DistancesToSurface distances_to_surface(const PolygonMesh& mesh, const PlacedShape& shape, double length,
+                                        const RunContext& context);
 
 }  // namespace hermesh

@@ -151,6 +151,7 @@ int run_fracture_command(const Arguments& given, const CLI::App& command, Sessio
     arguments.choices.impact = Eigen::Vector3d(arguments.impact[0], arguments.impact[1], arguments.impact[2]);
   if (arguments.rule == "repaired") arguments.method.rule = ThesisFractureOptions::Rule::repaired;
   arguments.method.options.split = !arguments.no_split;
+  arguments.method.options.placement.linear_crossings = arguments.hermite == "level-set" || is_volume(arguments.paths.in);
   arguments.method.options.least_samples = static_cast<std::uint64_t>(arguments.least_volume);
   { const AtomicFolder reserved(arguments.paths.out); }
   if (!arguments.density.empty())

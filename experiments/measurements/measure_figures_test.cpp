@@ -123,7 +123,7 @@ TEST(ThreadsMeasurement, ComparesWithOneThread) {
             double(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
 }
 
-TEST(SlowFigure91Measurement, TheOracleAgreesWithItself) {
+TEST(Slow, TheOracleOfFigure91AgreesWithItself) {
   const std::vector<Json> rows =
       rows_of("figure-9-1", {{"resolution", "20"}, {"pixels", "0"}}, "clean-up/openscad, exact");
   ASSERT_EQ(rows.size(), 1u);

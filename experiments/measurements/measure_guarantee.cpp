@@ -526,7 +526,7 @@ Measurement guarantee_measurement() {
             "of the adaptive meshes, in voxels",
             {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8", "2.5 4 8 14"}},
            {"extractor", kGuaranteed, "whose promises are judged", {kGuaranteed, kOctree}},
-           {"placement", "optimal", "option of the extractor", {"optimal", "average"}},
+           {"placement", "unbiased", "option of the extractor", {"unbiased", "optimal", "average"}},
            {"largest_cube", "8", "option of the extractor", {"8", "4", "2"}},
            {"representation", "sparse-float", "option of the extractor", {"sparse-float", "sparse"}},
            {"judge", "yes", "whether meshes are judged, or made for their digests alone", {"yes", "no"}},

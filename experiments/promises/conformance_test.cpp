@@ -147,7 +147,7 @@ TEST_P(Conformance, All256PatternsOfACell) {
 
 TEST_P(Conformance, RandomPatternsOfTwoCellsAnAxis) {
   std::mt19937 random(2);
-  expect_on_noise(proves() ? 24 : 40, 5, [&](int per_axis) {
+  expect_on_noise(proves() ? 12 : 20, 5, [&](int per_axis) {
     return patterns(
         per_axis, 3, [&](int) { return static_cast<std::uint32_t>(random()) & ((1u << 27) - 1); }, 3);
   });
@@ -156,7 +156,7 @@ TEST_P(Conformance, RandomPatternsOfTwoCellsAnAxis) {
 TEST_P(Conformance, WhiteNoise) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
-  expect_on_noise(64, 14, [&](int n) {
+  expect_on_noise(40, 14, [&](int n) {
     return make_volume({n, n, n}, 1.0f, [&](int, int, int) { return value(random); });
   });
 }

@@ -242,8 +242,9 @@ TEST(LatticeSolids, AreWholeInEachOctantAndAxisOrder) {
   const std::vector<Turn> all = turns();
   ASSERT_EQ(all.size(), 24u);
   for (const Solid& solid : solids())
-    for (unsigned i = 0; i < all.size(); ++i) {
-      check(solid, all[i], i % 8, 5.0, i == 7);
+    // Each third turn: all octants. `Slow` has all turns in all of them.
+    for (unsigned i = 0; i < all.size(); i += 3) {
+      check(solid, all[i], i % 8, 5.0, i == 6);
       if (HasFailure()) return;
     }
 }

@@ -57,7 +57,8 @@ std::array<double, 9> by_rows(const Eigen::Matrix3d& matrix) {
   return rows;
 }
 
-Fracture broken(const FloatHermite& hermite, const PolygonMesh* source, const FractureOptions& options,
+/// `polygons`: those that were sampled; null where the object is a volume.
+Fracture broken(const FloatHermite& hermite, const PolygonMesh* polygons, const FractureOptions& options,
                 RunContext& context) {
   if (hermite.leaves.empty())
     throw hermesh::Error("the object has no inside at this size of voxel, so there is nothing to break");
@@ -89,10 +90,11 @@ Fracture broken(const FloatHermite& hermite, const PolygonMesh* source, const Fr
   if (options.method == "labelled") {
     hermesh::FractureOptions labelled;
     labelled.tolerance = options.tolerance;
+    labelled.placement.linear_crossings = !polygons || options.hermite == "level-set";
     labelled.split = options.split;
     labelled.least_samples = static_cast<std::uint64_t>(options.min_volume);
     const LabelledFracture fracture =
-        labelled_pieces(hermite, *cutters.cutters, labelled, source, hand_over, context);
+        labelled_pieces(hermite, *cutters.cutters, labelled, polygons, hand_over, context);
     for (const CutterRecord& record : fracture.cutters)
       if (record.state != CutterRecord::State::cuts) context.note(record.name + " " + in_words(record.state));
   } else {

@@ -41,9 +41,9 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
 }
 
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
-  ManifoldDualContouringOptions options{.uniform = read_dual_contouring_options(input.options)};
+  ManifoldDualContouringOptions options{.uniform = read_dual_contouring_options(input)};
   return contour_certified(input, "manifold-dual-contouring",
-                           options.uniform.placement == DualContouringOptions::Placement::optimal,
+                           options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
                              options.tolerance = tolerance;
                              return manifold_dual_contouring(grid, options, input.field, input.context);

@@ -54,9 +54,9 @@ PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptio
 PolygonMesh certified_octree(const ExtractionInput& input) {
   CertifiedOctreeOptions options{.flatness = input.options.number("flatness"),
                                  .largest_cube = std::stoi(input.options.text("largest_cube")),
-                                 .uniform = read_placement_options(input.options)};
+                                 .uniform = read_placement_options(input)};
   return contour_certified(input, "certified-octree",
-                           options.uniform.placement == DualContouringOptions::Placement::optimal,
+                           options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
                              options.tolerance = tolerance;
                              return certified_octree(grid, options, input.field, input.context);

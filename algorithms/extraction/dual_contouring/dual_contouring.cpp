@@ -12,14 +12,12 @@
 namespace hermesh {
 namespace {
 
-/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never
-/// coincide.
+/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never coincide.
 constexpr double kCellMargin = 1.0 / 1024.0;
 
-/// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and
-/// root mean square: next to a feature that passes outside. On a turned cube 0.1 keeps the largest error at
-/// 0.1 voxel; letting every minimiser go makes it zero, but nearly doubles the self-intersections of a scan,
-/// whose minimisers leave for nothing.
+/// A point leaves its cell where the best place within it lies this far off the planes, in voxels and root mean square: next
+/// to a feature that passes outside. Letting every minimiser go nearly doubles the self-intersections of a scan, whose
+/// minimisers leave for nothing.
 constexpr double kWorthLeaving = 0.1;
 
 /// What one block adds to the mesh, and where in it.
@@ -143,7 +141,7 @@ class Contourer {
       const std::uint32_t point = outputs_[b].point_in(sample);
       positions_[point] = options_.placement == DualContouringOptions::Placement::average
                               ? qef.mass_point()
-                              : place_optimally(qef, corner, options_);
+                              : place_by_planes(qef, corner, options_);
       // Rounded once, at the end: up to here everything is relative to the placement's base.
       mesh.points[point] = placement.local(positions_[point]).cast<float>();
     });
@@ -216,16 +214,27 @@ class Contourer {
 
 }  // namespace
 
-Eigen::Vector3d place_optimally(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options) {
+double DualContouringOptions::smooth_share() const {
+  if (placement != Placement::unbiased) return 1.0;
+  return linear_crossings ? Qef::kShareOfLinear : Qef::kShareOfExact;
+}
+
+Eigen::Vector3d place_by_planes(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options) {
+  const Eigen::Vector3d free = qef.minimiser(options.truncation), mass = qef.mass_point();
+  const double share = qef.share_of_minimiser(options.smooth_share(), options.truncation);
+  const double from_centre = (free - corner - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
+  // What lies on a plane of the lattice comes out on it. A level set's crossings there are rounded to both sides of it.
+  const double inside = options.linear_crossings ? 0.5 - kCellMargin : 0.5;
+  if (from_centre <= inside) return mass + share * (free - mass);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
   const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
-  // Within the cell first. Only where that place is far off the planes (a sum over them, so that the threshold is one,
-  // too), the free minimiser is looked at, and taken if it lies within reach.
   const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options.truncation);
-  if (options.reach <= 0 || qef.error(held) <= kWorthLeaving * kWorthLeaving * qef.planes()) return held;
-  const Eigen::Vector3d free = qef.minimiser(options.truncation);
-  const Eigen::Vector3d from_centre = free - corner - Eigen::Vector3d::Constant(0.5);
-  return from_centre.cwiseAbs().maxCoeff() <= 0.5 + options.reach ? free : held;
+  const bool leaves = qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes() ||
+                      (!options.linear_crossings && qef.planes_meet(free, held));
+  if (options.reach > 0 && leaves && from_centre <= 0.5 + options.reach) return free;
+  // Both ends of the way lie in the cell, so whatever is between them does.
+  const Eigen::Vector3d start = mass.cwiseMax(lower).cwiseMin(upper);
+  return start + share * (held - start);
 }
 
 PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
@@ -233,49 +242,53 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
   return Contourer(grid, options).run(context);
 }
 
-DualContouringOptions read_placement_options(const Options& given) {
+DualContouringOptions read_placement_options(const ExtractionInput& input) {
+  using Placement = DualContouringOptions::Placement;
+  const Options& given = input.options;
   DualContouringOptions options;
-  if (given.is("placement", "average")) options.placement = DualContouringOptions::Placement::average;
+  options.linear_crossings = !wants_polygons(input);
+  if (given.is("placement", "optimal")) options.placement = Placement::optimal;
+  if (given.is("placement", "average")) options.placement = Placement::average;
   options.truncation = given.number("truncation");
   return options;
 }
 
-DualContouringOptions read_dual_contouring_options(const Options& given) {
-  DualContouringOptions options = read_placement_options(given);
-  options.reach = given.number("reach");
+DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
+  DualContouringOptions options = read_placement_options(input);
+  options.reach = input.options.number("reach");
   return options;
 }
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
-  const DualContouringOptions options = read_dual_contouring_options(input.options);
+  const DualContouringOptions options = read_dual_contouring_options(input);
   // Crossings that nobody else wants are best found a leaf at a time and not kept. The polygons
   // are the same but for rounding.
   if (from_level_set_alone(input) && can_contour_level_set(options))
     return contour_level_set(input.level_set, input.isovalue, options, input.context);
-  const bool needs_normals = options.placement == DualContouringOptions::Placement::optimal;
-  const FloatHermite hermite = hermite_input(input, "dual-contouring", needs_normals);
+  const FloatHermite hermite = hermite_input(input, "dual-contouring", options.needs_normals());
   return dual_contouring(view_of(hermite, input.context), options, input.context);
 }
 
 std::vector<OptionSpec> dual_contouring_options() {
   std::vector<OptionSpec> options = {
       {.name = "placement",
-       .fallback = "optimal",
-       .help = "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes "
-               "the mean of its crossings",
-       .choices = {"optimal", "average"}},
+       .fallback = "unbiased",
+       .help = "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features; 'unbiased' does so, too, "
+               "but takes back by how much that lies outside of smooth surfaces; 'average' takes the mean of its "
+               "crossings",
+       .choices = {"unbiased", "optimal", "average"}},
       {.name = "truncation",
        .fallback = "0.1",
        .help = "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
                "features",
        .maximum = 1.0,
-       .only_with = {"placement=optimal"}},
+       .only_with = {"placement=unbiased|optimal"}},
       {.name = "reach",
        .fallback = "1",
        .help = "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
                "the surface less",
        .maximum = 1e6,
-       .only_with = {"placement=optimal"}}};
+       .only_with = {"placement=unbiased|optimal"}}};
   const std::vector<OptionSpec> of_hermite = hermite_options();
   options.insert(options.begin() + 1, of_hermite.begin(), of_hermite.end());
   return options;

@@ -49,7 +49,7 @@ class Plain final : public leaf_kernels::PlainCode {
     for (int i = 0; i < count; ++i)
       qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(), Eigen::Vector3f(planes[i].normal).cast<double>());
     // Planes are relative to the cell's centre, so that its first corner is at −½.
-    const Eigen::Vector3d found = place_optimally(qef, Eigen::Vector3d::Constant(-0.5), options_);
+    const Eigen::Vector3d found = place_by_planes(qef, Eigen::Vector3d::Constant(-0.5), options_);
     for (int k = 0; k < 3; ++k) place[k] = static_cast<float>(found[k]);
   }
 
@@ -165,7 +165,7 @@ class LevelSetContourer {
       for (int i = 0; i < count; ++i) __builtin_prefetch(values + stride * i);
     };
     constexpr int kLine = 16;  // samples
-    const bool stencils = options_.placement == DualContouringOptions::Placement::optimal;
+    const bool stencils = options_.placement != DualContouringOptions::Placement::average;
     lines(static_cast<std::int32_t>(leaf), 0, kLine, 32);
     lines(upper_[leaf][1], 0, kLine, stencils ? 8 : 4);  // the first layers along x
     lines(upper_[leaf][2], 0, 64, 8);                    // the first rows along y
@@ -200,6 +200,7 @@ class LevelSetContourer {
       for (int column = 0; column < 3; ++column) rules.linear[row][column] = placement_.linear(row, column);
     rules.truncation = static_cast<float>(options_.truncation);
     rules.reach = static_cast<float>(options_.reach);
+    rules.smooth_share = static_cast<float>(options_.smooth_share());
     rules.plain = &plain;
     // Which cells share a vector depends on the threads. That changes no byte, because
     // lanes know nothing of each other.
@@ -218,7 +219,7 @@ class LevelSetContourer {
   void place(std::size_t leaf, const leaf_kernels::PlaceRules& rules, leaf_kernels::PlaceOutput output,
              leaf_kernels::LaterCells& later) {
     const LeafCells& cells = cells_[leaf];
-    const bool optimal = options_.placement == DualContouringOptions::Placement::optimal;
+    const bool optimal = options_.placement != DualContouringOptions::Placement::average;
     leaf_kernels::PlaceInput input{};
     input.rules = &rules;
     input.signs = upper_signs(upper_[leaf]);

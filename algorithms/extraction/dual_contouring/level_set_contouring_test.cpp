@@ -120,8 +120,8 @@ class Correspondence {
 /// planes equally well, but for a share of cells at the threshold to being let out.
 void expect_same_polygons(const LevelSet& volume, double isovalue, Placement placement, std::size_t at_least,
                           double share) {
-  SCOPED_TRACE(placement == Placement::average ? "average" : "optimal");
-  const DualContouringOptions options{.placement = placement};
+  SCOPED_TRACE(placement == Placement::average ? "average" : placement == Placement::optimal ? "optimal" : "unbiased");
+  const DualContouringOptions options{.placement = placement, .linear_crossings = true};
   const PolygonMesh general = by_hermite_data(volume, isovalue, options), fast = straight(volume, isovalue, options);
   ASSERT_EQ(fast.points.size(), general.points.size());
   ASSERT_EQ(fast.quads.size(), general.quads.size());
@@ -157,7 +157,8 @@ void expect_same_polygons(const LevelSet& volume, double isovalue, Placement pla
 
 void expect_same_polygons(const LevelSet& volume, double isovalue, std::size_t at_least, double share = 0.01) {
   expect_same_polygons(volume, isovalue, Placement::average, at_least, 0.0005);
-  expect_same_polygons(volume, isovalue, Placement::optimal, at_least, share);
+  for (const Placement placement : {Placement::unbiased, Placement::optimal})
+    expect_same_polygons(volume, isovalue, placement, at_least, share);
 }
 
 FloatGrid::Ptr sphere(float radius, openvdb::Vec3f centre, float half_width = 3.0f) {
@@ -313,8 +314,8 @@ TEST_F(LevelSetContouringTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount)
   for (const LevelSet& volume : {make_level_set(sphere(50.0f, {0.1f, 0.2f, 0.3f})),
                                  make_level_set(turned_cube()), make_level_set(checkerboard()),
                                  make_level_set(cube(1.0f, false, value, [&] { return random() % 3 != 0; }))})
-    for (const Placement placement : {Placement::average, Placement::optimal}) {
-      const DualContouringOptions options{.placement = placement};
+    for (const Placement placement : {Placement::average, Placement::unbiased, Placement::optimal}) {
+      const DualContouringOptions options{.placement = placement, .linear_crossings = true};
       const PolygonMesh expected = straight(volume, 0.0, options);
       for (const SimdLevel level : available_simd_levels()) {
         setenv("HERMESH_SIMD", std::string(name(level)).c_str(), 1);

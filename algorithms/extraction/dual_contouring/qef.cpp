@@ -41,6 +41,25 @@ bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const
   return ata_.trace() - value < 0.5 * truncation * truncation * value;
 }
 
+bool Qef::planes_meet(const Eigen::Vector3d& free, const Eigen::Vector3d& held) const {
+  // All but the first test are of sums of squares: a sum bounds its largest term, so no plane is farther than the root.
+  const double least = error(free), there = error(held);
+  return turned() >= kFeature && least <= kMeet * kMeet && there > kApart * kApart && there > 100.0 * least;
+}
+
+double Qef::turned() const {
+  // Of a symmetric matrix the squared Frobenius norm is the sum of the squared eigenvalues, and the trace is their sum.
+  const double squared = ata_.trace() * ata_.trace();
+  return 0.5 * (squared - ata_.squaredNorm()) / squared;
+}
+
+double Qef::share_of_minimiser(double smooth, double truncation) const {
+  const double cut = truncation * truncation;
+  if (!(turned() < cut)) return 1.0;
+  const double x = std::max(0.0, (turned() / cut - kSmoothBelow) / (1.0 - kSmoothBelow));
+  return smooth + (1.0 - smooth) * x * x * (3.0 - 2.0 * x);
+}
+
 Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncation) const {
   Eigen::Vector3d axis;
   double value;

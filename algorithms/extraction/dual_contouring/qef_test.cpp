@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
+#include <initializer_list>
 #include <random>
 
 namespace hermesh {
@@ -59,6 +61,47 @@ TEST(Qef, WithinTheBoxNoSampledPointIsBetter) {
       ASSERT_LE(qef.error(best), qef.error(other) + 1e-9);
     }
   }
+}
+
+/// Planes of the bowl z = k (x² + y²) / 2 at places (x, y).
+Qef bowl(double k, std::initializer_list<std::array<double, 2>> places) {
+  Qef qef(Vector3d::Zero());
+  for (const auto& [x, y] : places)
+    qef.add_plane(Vector3d(x, y, 0.5 * k * (x * x + y * y)), Vector3d(-k * x, -k * y, 1).normalized());
+  return qef;
+}
+
+TEST(Qef, MassPointAndMinimiserLieAsFarOffACurvedSurfaceToBothSides) {
+  const double k = 0.01;
+  const Qef qef = bowl(k, {{0.5, 0.4}, {-0.5, 0.3}, {-0.1, -0.5}, {0.3, -0.5}, {0.5, 0.1}});
+  const auto above = [&](const Vector3d& x) { return x.z() - 0.5 * k * x.head<2>().squaredNorm(); };
+  const Vector3d mass = qef.mass_point(), least = qef.minimiser(0.1);
+  EXPECT_GT(above(mass), 0.001);
+  EXPECT_NEAR(above(least), -above(mass), 0.02 * above(mass));
+  EXPECT_NEAR(above(0.5 * (mass + least)), 0.0, 0.01 * above(mass));
+}
+
+TEST(Qef, TheShareRisesFromSmoothSurfacesToFeatures) {
+  const double smooth = Qef::kShareOfExact;
+  // Four corners of a square of side 1 about the axis: the sum of the products of two eigenvalues over the square of their
+  // sum is k² / 2 for small k, which is 0.7 of the truncation's square at k = 0.118.
+  const auto share = [&](double k) {
+    return bowl(k, {{0.5, 0.5}, {-0.5, 0.5}, {-0.5, -0.5}, {0.5, -0.5}}).share_of_minimiser(smooth, 0.1);
+  };
+  EXPECT_DOUBLE_EQ(share(0.0), smooth);
+  EXPECT_DOUBLE_EQ(share(0.118), smooth);
+  EXPECT_GT(share(0.121), smooth);
+  EXPECT_DOUBLE_EQ(share(0.15), 1.0);
+  for (double k = 0.0; k < 0.2; k += 0.001) {
+    EXPECT_GE(share(k + 0.001), share(k));
+    EXPECT_LT(share(k + 0.001), share(k) + 0.02);
+  }
+  // An edge, seen by one plane of five.
+  Qef edge(Vector3d::Zero());
+  for (int i = 0; i < 4; ++i) edge.add_plane(Vector3d(0.1 * i, 0, 0), Vector3d::UnitZ());
+  edge.add_plane(Vector3d(0.4, 0, -0.2), Vector3d::UnitX());
+  EXPECT_EQ(edge.share_of_minimiser(smooth, 0.1), 1.0);
+  EXPECT_EQ(edge.share_of_minimiser(smooth, 0.0), 1.0);
 }
 
 }  // namespace

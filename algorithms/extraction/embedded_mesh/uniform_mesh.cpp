@@ -228,6 +228,7 @@ class Contourer {
       // they may not, any error will do.
       kernels_.place_flat(plain,
                           {.truncation = static_cast<float>(options_.truncation),
+                           .smooth_share = static_cast<float>(options_.smooth_share()),
                            .margin = static_cast<float>(cells_.margin()),
                            .most_error = static_cast<float>(reach_ > 0 ? kWorthLeaving * kWorthLeaving : 1e6),
                            .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
@@ -281,24 +282,30 @@ class Contourer {
     return best_place(block, cell, qef, corner);
   }
 
-  /// The place within the cell, margin() off its faces, with the least error. If even that is far from the planes, as
-  /// beside a sharp feature that passes outside, the free minimiser is aimed at.
+  /// The place within the cell, margin() off its faces, with the least error, drawn back on smooth surfaces. If even that is
+  /// far from the planes, as beside a sharp feature that passes outside, or if these meet elsewhere, the free minimiser is
+  /// aimed at.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
+    const Vector3d free = qef.minimiser(options_.truncation), mass = qef.mass_point().cwiseMax(lower).cwiseMin(upper);
+    const double share = qef.share_of_minimiser(options_.smooth_share(), options_.truncation);
     // To clamp the minimiser is cheap, and mostly good enough; the search over faces, edges and corners is not.
-    const Vector3d nearest = qef.minimiser(options_.truncation).cwiseMax(lower).cwiseMin(upper);
-    if (qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return nearest;
+    const Vector3d nearest = free.cwiseMax(lower).cwiseMin(upper);
+    // From a level set planes never meet exactly, and whether they nearly do is chance.
+    const bool meet = reach_ > 0 && !options_.linear_crossings && qef.planes_meet(free, nearest);
+    if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return mass + share * (nearest - mass);
     const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
-    if (reach_ > 0 && qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes()) {
+    if (reach_ > 0 && (qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes() ||
+                       (meet && qef.planes_meet(free, held)))) {
       const auto is_near = [&](const Vector3d& p) {
         return (p - corner - Vector3d::Constant(0.5)).cwiseAbs().maxCoeff() <= 0.5 + reach_;
       };
       // Where minima form a line or a plane, the one next to the place in the cell needs the shorter move.
-      const Vector3d free = qef.minimiser(options_.truncation), nearer = qef.minimiser_near(held, options_.truncation);
+      const Vector3d nearer = qef.minimiser_near(held, options_.truncation);
       if (is_near(free)) targets_[block].push_back({cell, free, is_near(nearer) ? nearer : free});
     }
-    return held;
+    return mass + share * (held - mass);
   }
 
   /// Lets points leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their points move

@@ -57,40 +57,41 @@ void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
     }
 }
 
-/// A test whether a block can hold a voxel within reach of a triangle, by the triangle's plane and the planes through
-/// its edges: a large triangle's box has many blocks that are not near the triangle.
+/// A test whether a block can hold a voxel within reach of a triangle: a large triangle's box has many blocks that are not
+/// near the triangle. Block and triangle are seen along the triangle's normal and the outward normals of its edges. Whatever
+/// these are, what is farther apart than the reach along one of them is so in space: the normal of a triangle whose corners
+/// lie on a line but for rounding is noise, and costs blocks that are looked into for nothing.
 class TriangleSlab {
  public:
   explicit TriangleSlab(const TriangleCorners& c) {
     const Eigen::Map<const Eigen::Vector3d> p0(c.data()), p1(c.data() + 3), p2(c.data() + 6);
     const Eigen::Vector3d normal = (p1 - p0).cross(p2 - p0);
-    // Without an area there are no planes, and every block near the box passes.
-    if (!(normal.squaredNorm() > 0)) return;
-    add(normal.normalized(), p0);
-    for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) {
-      const Eigen::Vector3d outward = (b - a).cross(normal);
-      if (outward.squaredNorm() > 0) add(outward.normalized(), a);
-    }
+    const auto add = [&](const Eigen::Vector3d& direction) {
+      if (!(direction.squaredNorm() > 0)) return;
+      const Eigen::Vector3d n = direction.normalized();
+      const double along[3] = {n.dot(p0), n.dot(p1), n.dot(p2)};
+      normal_[count_] = n;
+      lowest_[count_] = std::min({along[0], along[1], along[2]});
+      highest_[count_] = std::max({along[0], along[1], along[2]});
+      // Half the extent of a block's voxels along the normal, and some for rounding.
+      radius_[count_] = 3.5 * n.cwiseAbs().sum() + 1e-6;
+      ++count_;
+    };
+    add(normal);
+    for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) add((b - a).cross(normal));
   }
   bool near(const BlockAt& block, double reach) const {
     const Eigen::Vector3d centre(block[0] * 8.0 + 3.5, block[1] * 8.0 + 3.5, block[2] * 8.0 + 3.5);
     for (int i = 0; i < count_; ++i) {
-      const double d = normal_[i].dot(centre) - offset_[i];
-      if ((i == 0 ? std::abs(d) : d) > reach + radius_[i]) return false;
+      const double at = normal_[i].dot(centre);
+      if (std::max(at - highest_[i], lowest_[i] - at) > reach + radius_[i]) return false;
     }
     return true;
   }
 
  private:
-  void add(const Eigen::Vector3d& normal, const Eigen::Vector3d& point) {
-    normal_[count_] = normal;
-    offset_[count_] = normal.dot(point);
-    // Half the extent of a block's voxels along the normal, and some for rounding.
-    radius_[count_] = 3.5 * normal.cwiseAbs().sum() + 1e-6;
-    ++count_;
-  }
   Eigen::Vector3d normal_[4];
-  double offset_[4], radius_[4];
+  double lowest_[4], highest_[4], radius_[4];
   int count_ = 0;
 };
 

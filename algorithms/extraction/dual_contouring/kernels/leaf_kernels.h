@@ -57,8 +57,9 @@ class PlainCode {
 /// What places are found by, for all leaves alike.
 struct PlaceRules {
   double linear[3][3];  ///< voxels to mesh, by row
-  /// For optimal placement alone.
+  /// For placement by planes alone.
   float truncation, reach;  ///< as in DualContouringOptions; the truncation is no less than kLeastTruncation
+  float smooth_share;       ///< DualContouringOptions::smooth_share()
   const PlainCode* plain;
 };
 
@@ -88,8 +89,9 @@ struct PlainCells {
 };
 /// What PlaceFlat takes for flat enough.
 struct FlatPlaces {
-  float truncation;  ///< no less than kLeastTruncation
-  float margin;      ///< places are so far off the cell's faces
+  float truncation;    ///< no less than kLeastTruncation
+  float smooth_share;  ///< DualContouringOptions::smooth_share()
+  float margin;        ///< places are so far off the cell's faces
   /// Square of the distance from the planes, root mean square, where the minimiser lies within the cell, and
   /// where it is held there.
   float most_error, most_error_held;
@@ -122,7 +124,7 @@ struct LaterCells {
 
 /// Places each cell at the mean of its crossings.
 using PlaceAverage = void(const PlaceInput& input, const PlaceOutput& output);
-/// Places each cell at the minimiser of its quadratic error function, as dual_contouring() does, or adds it to `later`,
+/// Places each cell by the minimiser of its quadratic error function, as dual_contouring() does, or adds it to `later`,
 /// which has less than kEnough cells before.
 using PlaceOptimal = void(const PlaceInput& input, const PlaceOutput& output, LaterCells& later);
 /// Places the later cells, and forgets them.
@@ -141,7 +143,7 @@ struct ConnectInput {
   bool mirrors;          ///< turns the quads about
 };
 
-/// Places each cell at the minimiser of its quadratic error function, held within the cell. `place` gets the
+/// Places each cell by the minimiser of its quadratic error function, held within the cell. `place` gets the
 /// coordinates by axis, in voxels from the cell's first corner, and has room for kLargestVector more. `placed` is 0
 /// where the cell is another case: more than one large eigenvalue, or too large an error.
 using PlaceFlat = void(const PlainCells& cells, const FlatPlaces& flat, float* const* place,
