@@ -286,7 +286,7 @@ void Damage::toml(int count) {
   });
 }
 
-TEST_F(Damage, Volumes) { foreign(300), own(100), hermite(150), nifti(200), raw(200); }
+TEST_F(Damage, Volumes) { foreign(150), own(60), hermite(80), nifti(100), raw(100); }
 TEST_F(Damage, Experiments) { toml(100); }
 
 constexpr int kMany = 5000;
