@@ -45,7 +45,7 @@ struct RunSettings {
   std::string filter;          ///< only cells whose "case/resolution/variant" contains this text
   Overrides overrides = {};
   /// Whether cells that `out` has rows of are not made again: of the same cell, settings, program (by the hash of its file)
-  /// and data (by their hash).
+  /// and data (by their hash). Groups with outside programs are always made again.
   bool resume = false;
   /// The program that works on the cells, and its limits, which come before those of the file; none: they are worked on in
   /// this process, which does not survive the crash of one.

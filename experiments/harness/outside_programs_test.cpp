@@ -31,7 +31,7 @@ class OutsidePrograms : public testing::Test {
 
   /// The exit code of a run of these variants on a box of side 1 at resolution 8, so that a voxel is an
   /// eighth.
-  int run(const std::string& variants) {
+  int run(const std::string& variants, bool resume = false) {
     std::ofstream(folder_ / "toy.toml")
         << "question = \"why?\"\nvoxelizers = [\"openvdb\"]\ncolumns = [\"triangles\"]\nvariants = ["
         << variants
@@ -42,7 +42,9 @@ class OutsidePrograms : public testing::Test {
     tables.load = [](const std::string& name, RunContext&) {
       return LoadedCase{name, unit_box(), "generated", "0123456789abcdef"};
     };
-    return run_experiment({folder_ / "toy.toml", "quick", folder_ / "out", ""}, tables, context_, said_);
+    RunSettings settings{folder_ / "toy.toml", "quick", folder_ / "out", ""};
+    settings.resume = resume;
+    return run_experiment(settings, tables, context_, said_);
   }
   /// The peers of that filter on a small torus.
   int run_peers(const std::string& filter) {
@@ -165,6 +167,18 @@ TEST(Slow, PeersMakeMeshesOrSayWhatTheyLack) {
   }
   fs::remove_all(folder);
   EXPECT_GE(labels.size(), 20U);
+}
+
+TEST_F(OutsidePrograms, AreRunAgainForNobodyKnowsWhetherTheyAreWhatTheyWere) {
+  const std::string command = "{ label = \"mine\", command = \"cp " + (folder_ / "mesh.obj").string() + " {out.obj}\" }";
+  const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n", faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  std::ofstream(folder_ / "mesh.obj") << points << faces;
+  ASSERT_EQ(run(command), 0);
+  EXPECT_EQ(rows().at("mine").at("triangle_count"), 4);
+  std::ofstream(folder_ / "mesh.obj") << points << "v 0.2 0.2 0.2\n"
+                                      << "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 5\nf 3 4 5\nf 4 2 5\n";
+  ASSERT_EQ(run(command, true), 0);
+  EXPECT_EQ(rows().at("mine").at("triangle_count"), 6);
 }
 
 }  // namespace

@@ -67,7 +67,8 @@ std::string markdown(const Comparison& comparison) {
                      std::to_string(comparison.count(State::kRenamed)) + " renamed, " +
                      std::to_string(comparison.count(State::kNew)) + " new.\n";
   if (values(comparison) == 0)
-    text += "\nNothing was compared, which proves nothing: do the rows belong together?\n";
+    text += "\nNothing was compared, which proves nothing: do the rows belong together? Cells are matched by the experiment, which "
+            "is its file's name, by tier, case, resolution and variant.\n";
   const auto section = [&](const std::string& title, const std::vector<std::string>& lines) {
     if (lines.empty()) return;
     text += "\n### " + title + "\n";
