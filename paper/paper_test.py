@@ -237,11 +237,13 @@ class Waiting(Case):
         self.line = "| b | a | triangles | ratio | lower | 2 | 4 | 0 | 4 | 4 to 4 | ≥ 3 | high < 2 | undecided |"
         self.put("ablation_made_up", rows, "## ablation_made_up (full): ?\n\n| level | against | column | measure | better | models "
                  "| pairs | left out | effect | 95 % interval | predicted | falsified if | verdict |\n| --- |\n" + self.line + "\n")
-        values = {"order": 1.97, "order_within": 1, "size": 48, "triangles": 100, "error_max": 0.1, "times_optimum": 2.2}
+        values = {"order": 1.97, "order_within": 1, "size": 48, "triangles": 100, "error_max": 0.1, "times_optimum": 2.2, "error_fine": 0.001}
         columns = [{"name": name, "header": name, "meaning": name} for name in values]
         self.put("order_sphere", [{**head, "experiment": "order", "case": {"name": subject}, "variant": {"name": label, "label": label},
                             "table": {"columns": columns}, "values": values}
                            for subject, label in [("sphere", "dual optimal, level set: rms"), ("sphere", "dual optimal, level set: max"),
+                                                  ("sphere", "dual optimal, level set: volume"), ("sphere", "dual, level set: rms"),
+                                                  ("sphere", "dual, level set: volume"),
                                                   ("optimum", "sphere, manifold 0.1, 48")]])
         # The table is of some of the models alone.
         peers = [{**row, "case": {**row["case"], "name": "nefertiti"}} for row in
