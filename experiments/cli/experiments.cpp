@@ -264,7 +264,7 @@ void add_claims(CLI::App& app, Session& session) {
       });
       if (claims.empty())
         throw Error(arguments->of.empty() ? "no claim's id contains \"" + arguments->id + "\""
-                                          : "there is no claim on " + arguments->of + "; names are like figure_9_8");
+                                          : "there is no claim on '" + arguments->of + "'; names are like figure_9_8 or 'figure 9.8'");
       RowDatabase rows;
       rows.add_folders(arguments->results);
       bool fine = true;

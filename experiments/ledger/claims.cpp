@@ -3,6 +3,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -242,7 +243,10 @@ std::vector<Claim> read_claims(const std::filesystem::path& path) {
   return claims;
 }
 
-bool is_of(const Claim& claim, const std::string& number) {
+bool is_of(const Claim& claim, const std::string& spelt) {
+  std::string number = spelt;
+  for (char& c : number)
+    c = c == ' ' || c == '.' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   static const std::regex kNamed("(table|figure)s? ([0-9]+)\\.([0-9]+)(?: (to|and) ([0-9]+)\\.([0-9]+))?");
   for (std::sregex_iterator found(claim.place.begin(), claim.place.end(), kNamed), end; found != end; ++found) {
     const auto text = [&](int group) { return (*found)[group].str(); };

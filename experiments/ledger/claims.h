@@ -41,7 +41,7 @@ struct Judged {
 /// one without a doctored row.
 std::vector<Claim> read_claims(const std::filesystem::path& path);
 
-/// Whether the claim's place names a table or figure: "figure_9_9" is in "figures 9.8 to 9.10".
+/// Whether the claim's place names a table or figure: "figure_9_9", or "Figure 9.9", is in "figures 9.8 to 9.10".
 bool is_of(const Claim& claim, const std::string& number);
 
 /// Evaluates one claim on the rows. A claim of the verdict `contradicted` needs two sentences that explain it, and is

@@ -83,6 +83,8 @@ TEST(Claims, APlaceNamesTablesAndFigures) {
   EXPECT_TRUE(is("table 9.1, implied", "table_9_1"));
   EXPECT_FALSE(is("figure 9.15", "figure_9_1"));
   EXPECT_FALSE(is("section 9.1", "table_9_1"));
+  EXPECT_TRUE(is("table 9.2", "Table 9.2"));
+  EXPECT_FALSE(is("table 9.2", "9.2"));
 }
 
 TEST(RowDatabase, HasTheColumnsOfReportsInTheirUnits) {
