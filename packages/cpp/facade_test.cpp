@@ -1,5 +1,4 @@
-// The public functions: values computed by hand, the same bytes as the program for the same options,
-// cancelling, errors.
+// The public functions: values computed by hand, cancelling, errors.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -7,12 +6,11 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <numbers>
 
-#include "experiments/cli/process_for_tests.h"
 #include "hermesh/hermesh.h"
 #include "hermesh/openvdb.h"
 #include "hermesh/validate.h"
+#include "packages/cpp/meshes_for_tests.h"
 
 namespace {
 
@@ -25,51 +23,7 @@ using hermesh::Mesh;
 using hermesh::Placement;
 using hermesh::Volume;
 using hermesh::VoxelizeOptions;
-
-/// The six faces of an axis-aligned cube of that side with its lowest corner there, as quads.
-Mesh cube(double side, std::array<double, 3> lower = {0, 0, 0}) {
-  std::vector<double> points;
-  for (int i = 0; i < 8; ++i)
-    for (int axis = 0; axis < 3; ++axis) points.push_back(lower[axis] + side * (i >> axis & 1));
-  const std::vector<std::uint32_t> quads = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4,
-                                            2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
-  return Mesh(std::span<const double>(points), {}, quads);
-}
-
-/// A torus about the z axis, of triangles.
-Mesh torus(double large = 1.0, double small = 0.4, int around = 48, int across = 24) {
-  std::vector<float> points;
-  std::vector<std::uint32_t> triangles;
-  const double turn = 2.0 * std::numbers::pi;
-  for (int i = 0; i < around; ++i)
-    for (int j = 0; j < across; ++j) {
-      const double u = turn * i / around, v = turn * j / across, r = large + small * std::cos(v);
-      for (const double x : {r * std::cos(u), r * std::sin(u), small * std::sin(v)})
-        points.push_back(float(x));
-      const auto at = [&](int a, int b) { return std::uint32_t((a % around) * across + b % across); };
-      for (const std::uint32_t corner :
-           {at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)})
-        triangles.push_back(corner);
-    }
-  return Mesh(std::span<const float>(points), triangles);
-}
-
-VoxelizeOptions at_resolution(int resolution) { return {.resolution = resolution}; }
-
-/// The sentence of the Error that `work` throws; empty if it throws none.
-template <class Work>
-std::string complaint(Work work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
+using namespace hermesh_tests;
 
 // ---- Arrays.
 
@@ -469,140 +423,6 @@ TEST(PublicOptions, ListsMethods) {
   EXPECT_TRUE(names.contains("marching-cubes") && names.contains("dual-contouring"));
   EXPECT_EQ(hermesh::voxelizers().front().name, "hermesh");
   EXPECT_STREQ(hermesh::version(), HERMESH_VERSION_STRING);
-}
-
-// ---- The same bytes as the program.
-
-class AsTheProgram : public hermesh::cli::ProgramTest {
- protected:
-  /// Runs the program, which must succeed.
-  void program(const std::vector<std::string>& arguments) {
-    const hermesh::cli::Outcome outcome = run(arguments);
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  }
-  void expect_same(const std::string& a, const std::string& b) {
-    const std::string first = read(a);
-    ASSERT_FALSE(first.empty());
-    EXPECT_EQ(first == read(b), true) << a << " and " << b << " differ";
-  }
-  Context context_;
-};
-
-TEST_F(AsTheProgram, Remeshes) {
-  // Quads of a file are cut along their better diagonal, by the library as by the program.
-  for (const Mesh& mesh : {torus(), cube(1.0)}) {
-    hermesh::write_mesh(path("in.ply"), mesh, context_);
-    for (const std::string extractor :
-         {"manifold-dual-contouring", "certified-octree", "marching-cubes", "dual-contouring"}) {
-      program({"remesh", "in.ply", "program.ply", "--resolution", "40", "--extractor", extractor});
-      const Mesh made = hermesh::remesh(mesh, at_resolution(40), {.extractor = extractor}, context_);
-      hermesh::write_mesh(path("library.ply"), made, context_);
-      expect_same("program.ply", "library.ply");
-    }
-  }
-  program({"remesh", "in.ply", "program.ply", "--voxel-size", "0.03", "-o", "tolerance=0.3", "--signs",
-           "winding-number"});
-  hermesh::ThreadLimit one(1);
-  const Mesh made = hermesh::remesh(cube(1.0), {.voxel_size = 0.03, .options = {{"signs", "winding-number"}}},
-                                    {.options = {{"tolerance", "0.3"}}}, context_);
-  hermesh::write_mesh(path("library.ply"), made, context_);
-  expect_same("program.ply", "library.ply");
-}
-
-TEST_F(AsTheProgram, RemeshesWithinAnError) {
-  hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"remesh", "in.ply", "program.ply", "--error", "0.03"});
-  const hermesh::BoundedRemesh made = hermesh::remesh_within(torus(), {.error = 0.03}, context_);
-  hermesh::write_mesh(path("library.ply"), made.mesh, context_);
-  expect_same("program.ply", "library.ply");
-  EXPECT_LE(made.to_polygons, 0.03);
-  EXPECT_LE(made.from_polygons, 0.03);
-  const hermesh::BoundedRemesh few = hermesh::remesh_within(torus(), {.triangles = 300}, context_);
-  EXPECT_LE(few.mesh.triangle_count(), 300u);
-  EXPECT_THROW(hermesh::remesh_within(torus(), {}, context_), Error);
-  EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .triangles = 10}, context_), Error);
-  EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .signs = "unsigned"}, context_), Error);
-}
-
-TEST_F(AsTheProgram, VoxelizesAndExtracts) {
-  hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"voxelize", "in.ply", "program.vdb", "--resolution", "40"});
-  const Volume volume = hermesh::voxelize(torus(), at_resolution(40), context_);
-  hermesh::write_vdb(path("library.vdb"), volume, context_);
-  expect_same("program.vdb", "library.vdb");
-  program({"voxelize", "in.ply", "program.vdb", "--resolution", "40", "--grids", "sdf,fog,closest-point"});
-  const std::vector<Volume> volumes =
-      hermesh::voxelize_grids(torus(), "sdf,fog,closest-point", at_resolution(40), context_);
-  hermesh::write_vdb(path("library.vdb"), volumes, context_);
-  expect_same("program.vdb", "library.vdb");
-  EXPECT_EQ(hermesh::grid_names(path("library.vdb")),
-            (std::vector<std::string>{"closest-point", "fog", "sdf"}));
-
-  program({"extract", "program.vdb", "program.ply", "--grid", "fog", "--isovalue", "0.5", "--extractor",
-           "marching-cubes"});
-  const Volume fog = hermesh::read_vdb(path("library.vdb"), context_, "fog");
-  const Mesh mesh = hermesh::extract(fog, {.extractor = "marching-cubes", .isovalue = 0.5}, context_);
-  hermesh::write_mesh(path("library.ply"), mesh, context_);
-  expect_same("program.ply", "library.ply");
-}
-
-TEST_F(AsTheProgram, Combines) {
-  const Mesh a = torus(), b = cube(1.0, {0.2, -0.5, -0.5});
-  hermesh::write_mesh(path("a.ply"), a, context_);
-  hermesh::write_mesh(path("b.ply"), b, context_);
-  program({"combine", "difference", "a.ply", "b.ply", "program.ply", "--resolution", "40"});
-  const Mesh mesh = hermesh::combine(Boolean::difference, a, b, at_resolution(40), {}, context_);
-  hermesh::write_mesh(path("library.ply"), mesh, context_);
-  expect_same("program.ply", "library.ply");
-}
-
-TEST_F(AsTheProgram, Breaks) {
-  hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"fracture", "in.ply", "pieces", "--resolution", "40", "--cutters", "chunks:5", "--seed", "3",
-           "--no-picture"});
-  hermesh::FractureOptions options;
-  options.cutters = "chunks:5";
-  options.seed = 3;
-  const hermesh::Fracture fracture = hermesh::fracture(torus(), at_resolution(40), options, context_);
-  std::set<std::string> written;
-  for (const auto& entry : std::filesystem::directory_iterator(path("pieces")))
-    if (entry.path().extension() == ".ply") written.insert(entry.path().filename().string());
-  ASSERT_EQ(written.size(), fracture.pieces.size());
-  std::size_t number = 0;
-  for (const std::string& name : written) {
-    hermesh::write_mesh(path("library.ply"), fracture.pieces[number++].mesh, context_);
-    expect_same("pieces/" + name, "library.ply");
-  }
-}
-
-TEST_F(AsTheProgram, Judges) {
-  hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"validate", "in.ply", "--json"});
-  const std::string of_program = run({"validate", "in.ply", "--json"}).out;
-  const std::string json = hermesh::validate(torus(), {}, context_).json;
-  // The program adds the file and the requirements; every line of ours is in its text.
-  std::istringstream lines(json);
-  int counted = 0;
-  for (std::string line; std::getline(lines, line); ++counted) {
-    if (line.ends_with(",")) line.pop_back();
-    EXPECT_TRUE(contains(of_program, line)) << line;
-  }
-  EXPECT_GT(counted, 30);
-}
-
-TEST_F(AsTheProgram, ImportsRawSamples) {
-  std::string bytes;
-  for (int i = 0; i < 4 * 5 * 6; ++i) bytes.push_back(char(i));
-  write("in.raw", bytes);
-  program({"import", "in.raw", "program.vdb", "--dims", "4,5,6", "--type", "uint8", "--spacing", "1,1,2"});
-  const Volume volume = hermesh::import_volume(
-      path("in.raw"), {.raw = hermesh::RawSamples{.dims = {4, 5, 6}, .type = "uint8", .spacing = {1, 1, 2}}},
-      context_);
-  hermesh::write_vdb(path("library.vdb"), volume, context_);
-  expect_same("program.vdb", "library.vdb");
-  // x is fastest in the file, z in an array.
-  EXPECT_EQ(volume.to_dense().values[1], 20.0f);
-  EXPECT_EQ(volume.dims(), (std::array<int, 3>{4, 5, 6}));
 }
 
 }  // namespace

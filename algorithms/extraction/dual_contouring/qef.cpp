@@ -55,8 +55,9 @@ double Qef::turned() const {
 
 double Qef::share_of_minimiser(double smooth, double truncation) const {
   const double cut = truncation * truncation;
-  if (!(turned() < cut)) return 1.0;
-  const double x = std::max(0.0, (turned() / cut - kSmoothBelow) / (1.0 - kSmoothBelow));
+  const double here = turned();
+  if (!(here < cut)) return 1.0;
+  const double x = std::max(0.0, (here / cut - kSmoothBelow) / (1.0 - kSmoothBelow));
   return smooth + (1.0 - smooth) * x * x * (3.0 - 2.0 * x);
 }
 
