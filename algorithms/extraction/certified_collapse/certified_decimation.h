@@ -5,7 +5,8 @@
 // cheapest first (decimation.h).
 // *Prove*: the mesh that results (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that
 // it was made of, at last into single points; so this ends, at worst with the fine mesh.
-// Once boldly, by the quadrics alone, which does most of the work in a small part of the time; then with care, once or more.
+// Collapses come boldly first, by the quadrics alone and shy of the tolerance, which does much of the work in a small part of the
+// time; then with care; and once the proof has taken sets back with care again, around these alone.
 #pragma once
 
 #include <Eigen/Core>

@@ -126,11 +126,10 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
     if (way >= 1.0) return true;
     const double within = std::min(mesh_.tolerance[c[exit]], mesh_.tolerance[c[j]]);
     if (std::abs(normal.dot(q - way * along)) * height > within) return false;
-    const std::uint32_t next = fine.across(t, exit), corner = c[j];
+    const std::uint32_t next = fine.side_across(t, exit);
     if (next == FineMesh::kNone) return false;
-    const Triangle& n = fine.triangles()[next];
-    entry = n[0] == corner ? 0 : n[1] == corner ? 1 : 2;
-    t = next;
+    t = next / 3;
+    entry = static_cast<int>(next % 3);
   }
   return false;
 }

@@ -151,11 +151,9 @@ void CubeCollapse::merge_vertices() {
   going.gone = true;
   local_.merge_corners(collapse_.going, collapse_.v);
 
-  const double most = q.a.trace() * double(tolerance) * double(tolerance);
   joins_.push_back({.going = going.global,
                     .node = {.first = staying.global,
                              .merges = true,
-                             .error = static_cast<float>(q(Vector3d::Zero()) / (most + 1e-30)),
                              .place = collapse_.x,
                              .quadric = mesh_.quadrics[staying.global]}});
 }

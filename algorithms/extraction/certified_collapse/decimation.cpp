@@ -12,6 +12,7 @@
 #include "algorithms/extraction/certified_collapse/cube_decimation.h"
 #include "algorithms/extraction/certified_collapse/cube_mesh.h"
 #include "algorithms/extraction/contact/triangle_grid.h"
+#include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
 namespace {
@@ -19,9 +20,11 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kFirstSide = 32.0;  ///< voxels: some thousand triangles, which fit a core's cache
-/// Share of a cube's side by which the cubes of a round are displaced, so that no two rounds have borders in common.
+/// Share of a cube's side by which the cubes of a round are displaced, so that no two rounds have borders in
+/// common.
 constexpr double kDisplacement = 0.382;
-/// Longest edge that a round makes, as a share of the side: what lies at a border must not fall far behind the rest.
+/// Longest edge that a round makes, as a share of the side: what lies at a border must not fall far behind
+/// the rest.
 constexpr double kLongestEdge = 0.25;
 
 /// A triangle in one of the cubes that its box touches.
@@ -57,7 +60,8 @@ class Round {
     tbb::parallel_for(std::size_t{0}, cube_count(), [&](std::size_t c) {
       context.check();
       const auto cube = static_cast<std::uint32_t>(c);
-      joins[c] = decimate_cube(mesh_, kind, file, cube_of(cube), triangles_of(cube), numbers_.local(), context);
+      joins[c] =
+          decimate_cube(mesh_, kind, file, cube_of(cube), triangles_of(cube), numbers_.local(), context);
     });
     return joins;
   }
@@ -75,9 +79,8 @@ class Round {
     // Count, scan, fill; the sort makes the order whole.
     const std::size_t n = mesh_.triangles.size();
     std::vector<std::uint64_t> counts(n);
-    parallel_blocks(n, context, [&](std::size_t t) {
-      for_each_cube(t, [&](std::uint64_t) { ++counts[t]; });
-    });
+    parallel_blocks(n, context,
+                    [&](std::size_t t) { for_each_cube(t, [&](std::uint64_t) { ++counts[t]; }); });
     entries_.resize(exclusive_scan(counts, "triangles"));
     parallel_blocks(n, context, [&](std::size_t t) {
       std::size_t at = counts[t];
@@ -100,14 +103,15 @@ class Round {
   DecimatedMesh& mesh_;
   const double side_;
   const Vector3d start_;
-  std::vector<Entry> entries_;             ///< ascending by cube
-  std::vector<std::uint32_t> triangles_;   ///< triangles of the entries, in their order
-  std::vector<std::size_t> first_;         ///< first entry of each cube, and the end
+  std::vector<Entry> entries_;            ///< ascending by cube
+  std::vector<std::uint32_t> triangles_;  ///< triangles of the entries, in their order
+  std::vector<std::size_t> first_;        ///< first entry of each cube, and the end
   // As large as the whole mesh, so there is one for each thread and not one for each cube.
   tbb::enumerable_thread_specific<CubeNumbers> numbers_;
 };
 
-/// Drops the triangles that are gone, in order. Samples keep their lists, which hang on the triangles that stay.
+/// Drops the triangles that are gone, in order. Samples keep their lists, which hang on the triangles that
+/// stay.
 void forget_the_dead(DecimatedMesh& mesh) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -123,17 +127,25 @@ void forget_the_dead(DecimatedMesh& mesh) {
 }
 
 /// Attaches every sample to a triangle near it, but for those that are points where they were.
-void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged, const RunContext& context) {
+void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged,
+                    const RunContext& context) {
   std::vector<std::uint32_t> nearest(mesh.unmoved.size(), kNoTriangle);
   parallel_blocks(nearest.size(), context, [&](std::size_t i) {
     const auto sample = static_cast<std::uint32_t>(i);
     if (mesh.unmoved[sample]) return;
+    // A part all of whose points have gone into two has no triangle left; the proof brings it back.
+    const std::uint32_t point = merged.number[forest.leader(sample)];
+    if (point == MergeForest::kNone) return;
     const Vector3d& p = mesh.fine->points()[sample];
+    const std::uint32_t start = merged.mesh->around(point).front();
+    // Found from the point that the sample went into. A nearer triangle may be missed: what is promised rests
+    // on merge_proof.h alone, and not on what is attached here. So one that is near enough will do.
+    nearest[i] = merged.mesh->walk(start, p);
+    const Corners corners = merged.mesh->corners(nearest[i]);
+    const double within = mesh.tolerance[sample];
+    if (squared_distance(p, corners[0], corners[1], corners[2]) <= within * within) return;
     double squared;
-    const std::uint32_t start = merged.mesh->around(merged.number[forest.leader(sample)]).front();
-    // Found from the point that the sample went into. A nearer triangle may be missed: what is promised rests on
-    // merge_proof.h alone, and not on what is attached here.
-    nearest[i] = merged.mesh->nearest_around(merged.mesh->walk(start, p), p, squared);
+    nearest[i] = merged.mesh->nearest_around(nearest[i], p, squared);
   });
   // In one thread, ascending: the lists are the same for every number of threads.
   for (std::uint32_t sample = 0; sample < nearest.size(); ++sample) {
@@ -143,10 +155,10 @@ void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const Merged
   }
 }
 
-/// The merged mesh with the numbers of the fine one, and with the planes and tolerances of all that its points stand
-/// for. Every edge is worth a look in the first round.
-DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
-                    std::span<const float> tolerance, const RunContext& context) {
+/// The merged mesh with the numbers of the fine one, and with the planes and tolerances of all that its
+/// points stand for. Edges of the points `where` are worth a look in the first round.
+DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
+                    const FineMesh& fine, std::span<const float> tolerance, const RunContext& context) {
   const std::size_t n = fine.points().size();
   DecimatedMesh mesh;
   mesh.fine = &fine;
@@ -165,7 +177,7 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const F
   });
   parallel_blocks(merged.leaders.size(), context, [&](std::size_t i) {
     const std::uint32_t p = merged.leaders[i], set = forest.set_of(p);
-    mesh.dirty[p] = 1;
+    mesh.dirty[p] = where.empty() || where[p];
     mesh.points[p] = merged.mesh->points()[i];
     mesh.least_tolerance[p] = tolerance[p];
     if (set == MergeForest::kNone) {
@@ -184,9 +196,11 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, const F
 
 }  // namespace
 
-void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
-                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file, RunContext& context) {
-  DecimatedMesh mesh = begin(forest, merged, fine, tolerance, context);
+void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
+                    const FineMesh& fine, std::span<const float> tolerance,
+                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file,
+                    RunContext& context) {
+  DecimatedMesh mesh = begin(forest, merged, where, fine, tolerance, context);
   mesh.pinned = pinned;
   if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
   Box3 box;
@@ -195,15 +209,17 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, const FineMes
   const double largest = (box.upper - box.lower).norm();
   for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
     Round round(mesh, box, side, context);
-    // Joins of one cube build on one another; cubes have no points in common. In the order of cubes, so nodes have the
-    // same numbers for every number of threads.
+    // Joins of one cube build on one another; cubes have no points in common. In the order of cubes, so nodes
+    // have the same numbers for every number of threads.
     for (const auto& joins : round.run(kind, file, context))
       for (const Join& join : joins) forest.join(join.going, join.node);
     forget_the_dead(mesh);
     mesh.dirty.swap(mesh.dirty_next);
     std::fill(mesh.dirty_next.begin(), mesh.dirty_next.end(), 0);
-    // Then the limit of edges binds no more, and as the first cube begins 0.382 sides before the box, that cube has
-    // held the whole mesh.
+    if (std::ranges::find(mesh.dirty, 1) == mesh.dirty.end())
+      break;  // no round is left that would look at an edge
+    // Then the limit of edges binds no more, and as the first cube begins 0.382 sides before the box, that
+    // cube has held the whole mesh.
     if (kLongestEdge * side > largest) break;
   }
   forest.settle();

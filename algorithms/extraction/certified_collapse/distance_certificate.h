@@ -17,11 +17,12 @@ inline constexpr double kDistanceSlack = 0.005;
 
 /// Proves that triangles are near a mesh, one after another.
 ///
-/// **Why it holds.** Most triangles are covered by the mesh right above or below, no farther away than the bound
-/// (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so, or until its corners
-/// are within the bound of one triangle of the mesh (the distance to a convex set is convex), or until it is so small that
-/// its middle's distance and its radius add up to no more than the bound and kDistanceSlack. It may fail to prove what is
-/// true: the mesh is searched for the nearest triangle only nearby, and there is an end to the pieces.
+/// **Why it holds.** Most triangles are covered by the mesh right above or below, no farther away than the
+/// bound (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so,
+/// or until its corners are within the bound of one triangle of the mesh (the distance to a convex set is
+/// convex), or until it is so small that its middle's distance and its radius add up to no more than the
+/// bound and kDistanceSlack. It may fail to prove what is true: the mesh is searched for the nearest triangle
+/// only nearby, and there is an end to the pieces.
 class DistanceCertificate {
  public:
   DistanceCertificate(const FineMesh& mesh, TriangleOverlay& overlay) : mesh_(mesh), overlay_(overlay) {}
@@ -29,14 +30,17 @@ class DistanceCertificate {
   /// Whether each place of the triangle is proved to be within the bound of the mesh.
   /// @param triangle the triangle asked about
   /// @param start a triangle of the mesh near it
-  /// @param bound called with a face of the mesh: how near the triangle has to be to that, voxels; it is called for
+  /// @param bound called with a face of the mesh: how near the triangle has to be to that, voxels; it is
+  /// called for
   ///   every face that the proof rests on
-  /// @param covered called with faces of the mesh that lie over the triangle as a whole, within their bounds
-  template <class Bound, class Covered>
-  bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, const Covered& covered) {
+  /// @param seen called with faces of the mesh that are over some of the triangle and within their bounds
+  /// there, as by
+  ///   TriangleOverlay::is_near()
+  template <class Bound, class Seen>
+  bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, Seen&& seen) {
     const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
     start = mesh_.walk(start, middle);
-    if (overlay_.is_near(triangle, mesh_, start, bound, covered)) return true;
+    if (overlay_.is_near(triangle, mesh_, start, bound, seen)) return true;
     pieces_left_ = kMostPieces;
     return holds_in_pieces(triangle, start, bound, nullptr);
   }
@@ -51,8 +55,8 @@ class DistanceCertificate {
     }
   };
 
-  /// Whether a piece is near, whole or cut in halves. `last` is the face that was nearest to what the piece is cut
-  /// from, or null.
+  /// Whether a piece is near, whole or cut in halves. `last` is the face that was nearest to what the piece
+  /// is cut from, or null.
   template <class Bound>
   bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound, const Face* last) {
     if (last && last->is_near(piece)) return true;
@@ -70,7 +74,8 @@ class DistanceCertificate {
 
     int i = 0;
     for (int side = 1; side < 3; ++side)
-      if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm()) i = side;
+      if ((piece[(side + 1) % 3] - piece[side]).squaredNorm() > (piece[(i + 1) % 3] - piece[i]).squaredNorm())
+        i = side;
     const int j = (i + 1) % 3, k = (i + 2) % 3;
     const Eigen::Vector3d half = 0.5 * (piece[i] + piece[j]);
     return holds_in_pieces({piece[i], half, piece[k]}, found, bound, &face) &&

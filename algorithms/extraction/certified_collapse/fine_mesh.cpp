@@ -17,9 +17,9 @@ namespace hermesh {
 
 namespace {
 
-/// Calls f(first, end) for ranges of the points, side by side. Each call is to read all triangles for the sake of its
-/// own points: that is cheap, for they are read in order, and what is done about a point is done in the same order by
-/// any number of threads.
+/// Calls f(first, end) for ranges of the points, side by side. Each call is to read all triangles for the
+/// sake of its own points: that is cheap, for they are read in order, and what is done about a point is done
+/// in the same order by any number of threads.
 template <class F>
 void for_each_range(std::size_t points, F&& f) {
   constexpr std::size_t kLeast = 1 << 13;
@@ -42,7 +42,8 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles_.size(), 1024), [&](const auto& range) {
     for (std::size_t t = range.begin(); t < range.end(); ++t) {
       if (triangles_[t][0] == kNone) continue;
-      const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]], &c = points_[triangles_[t][2]];
+      const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]],
+                            &c = points_[triangles_[t][2]];
       normals_[t] = (b - a).cross(c - a).stableNormalized().cast<float>();
     }
   });
@@ -62,12 +63,37 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
   for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
     for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t t) { around_[next[p]++] = t; });
   });
+  across_.resize(triangles_.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points_.size(), 1024), [&](const auto& range) {
+    std::vector<Fan> fan;
+    for (std::size_t p = range.begin(); p < range.end(); ++p) find_across(static_cast<std::uint32_t>(p), fan);
+  });
+}
+
+/// Finds what lies across the sides that end at a point: the first side that leads back from there.
+void FineMesh::find_across(std::uint32_t point, std::vector<Fan>& fan) {
+  fan.clear();
+  for (const std::uint32_t t : around(point)) {
+    const Triangle& c = triangles_[t];
+    const std::uint32_t i = c[0] == point ? 0u : c[1] == point ? 1u : 2u;
+    fan.push_back({3 * t + i, c[(i + 1) % 3], c[(i + 2) % 3]});
+  }
+  for (const Fan& in : fan) {
+    std::uint32_t& across =
+        across_[in.side / 3][(in.side % 3 + 2) % 3];  // of the side that ends at the point
+    across = kNone;
+    for (const Fan& out : fan)
+      if (out.next == in.before) {
+        across = out.side;
+        break;
+      }
+  }
 }
 
 std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) const {
   constexpr int kMostSteps = 1000;
-  // Where two triangles would send the walk to one another, the point lies outside of the ridge between them. Walks
-  // that go in longer circles, as around a spike, end with the number of steps.
+  // Where two triangles would send the walk to one another, the point lies outside of the ridge between them.
+  // Walks that go in longer circles, as around a spike, end with the number of steps.
   std::uint32_t before = triangle;
   for (int step = 0; step < kMostSteps; ++step) {
     const Corners c = corners(triangle);
@@ -76,7 +102,8 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
     double farthest = 0;
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d edge = c[(i + 1) % 3] - c[i];
-      // Beyond the side in the triangle's plane, times the side's length: squares are compared, without a root.
+      // Beyond the side in the triangle's plane, times the side's length: squares are compared, without a
+      // root.
       const double beyond = edge.cross(n).dot(p - c[i]), squared = edge.squaredNorm();
       if (beyond > 0 && beyond * beyond > farthest * squared) {
         farthest = beyond * beyond / squared;
@@ -93,7 +120,8 @@ std::uint32_t FineMesh::walk(std::uint32_t triangle, const Eigen::Vector3d& p) c
   return triangle;
 }
 
-std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p, double& squared) const {
+std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vector3d& p,
+                                       double& squared) const {
   constexpr int kMostSteps = 16;
   constexpr double kNormalRounding = 1e-4;  // over the few voxels that p is away
   squared = std::numeric_limits<double>::infinity();
@@ -101,7 +129,8 @@ std::uint32_t FineMesh::nearest_around(std::uint32_t triangle, const Eigen::Vect
   const auto ask = [&](std::uint32_t t) {
     const Corners c = corners(t);
     // Most are ruled out by their boxes.
-    const Eigen::Vector3d below = c[0].cwiseMin(c[1]).cwiseMin(c[2]) - p, above = p - c[0].cwiseMax(c[1]).cwiseMax(c[2]);
+    const Eigen::Vector3d below = c[0].cwiseMin(c[1]).cwiseMin(c[2]) - p,
+                          above = p - c[0].cwiseMax(c[1]).cwiseMax(c[2]);
     if (below.cwiseMax(above).cwiseMax(0.0).squaredNorm() >= squared) return;
     // Then by their planes; the normals are of single precision.
     const double height = std::abs(normals_[t].cast<double>().dot(p - c[0])) - kNormalRounding;

@@ -21,7 +21,6 @@ class MergeForest {
     std::uint32_t parent = kNone;
     std::uint32_t first;    ///< one of its points, which it goes by
     bool merges = false;
-    float error = 0;        ///< mean squared distance of `place` to its planes, over the squared tolerance
     Eigen::Vector3d place;  ///< where its points go, rounded for the file
     PlaneQuadric quadric;   ///< about `place`
   };

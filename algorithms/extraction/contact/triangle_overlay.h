@@ -13,8 +13,9 @@
 
 namespace hermesh {
 
-/// Coordinates of places seen from a triangle, all of them affine: how far a place lies beyond each of the three sides,
-/// along the triangle's plane, and how high above the plane. Lengths are those of the corners' coordinates.
+/// Coordinates of places seen from a triangle, all of them affine: how far a place lies beyond each of the
+/// three sides, along the triangle's plane, and how high above the plane. Lengths are those of the corners'
+/// coordinates.
 class OverTriangle {
  public:
   using Place = Eigen::Vector4d;  ///< beyond sides 0, 1, 2 (positive outside), height
@@ -52,8 +53,8 @@ class OverTriangle {
   bool degenerate_;
 };
 
-/// The part of a triangle over another one, by its corners: six at most, or more where rounding makes it not quite
-/// convex.
+/// The part of a triangle over another one, by its corners: six at most, or more where rounding makes it not
+/// quite convex.
 struct ClippedTriangle {
   std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles them
   int size = 0;
@@ -63,55 +64,62 @@ struct ClippedTriangle {
 /// Whether some of the segment lies above or below the inside of the triangle.
 bool passes_over(const OverTriangle::Place& from, const OverTriangle::Place& to);
 
-/// Lays a mesh over one triangle after another. An object remembers which faces it has seen, so each thread needs its
-/// own.
+/// Lays a mesh over one triangle after another. An object remembers which faces it has seen, so each thread
+/// needs its own.
 class TriangleOverlay {
  public:
   explicit TriangleOverlay(std::size_t faces) : seen_(faces) {}
 
-  /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther away than
-  /// `within(face)`, a double, says of the face that this lies in.
+  /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther
+  /// away than `within(face)`, a double, says of the face that this lies in.
   ///
-  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected, across every side
-  /// that passes over its inside. All of them face as t does. So the projection of their union onto t's inside is open; it
-  /// is closed, too, for no side leads out of it; so it is all of t. Over the part of a face that lies over t heights are
-  /// largest at the part's corners, and these are looked at. (Slivers that rounding hides are some 1e-9 voxels wide.)
+  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected,
+  /// across every side that passes over its inside. All of them face as t does. So the projection of their
+  /// union onto t's inside is open; it is closed, too, for no side leads out of it; so it is all of t. Over
+  /// the part of a face that lies over t heights are largest at the part's corners, and these are looked at.
+  /// (Slivers that rounding hides are some 1e-9 voxels wide.)
   ///
-  /// `Mesh` has corners(face), normal(face) and across(face, side). `covered(face)` is called for faces that lie over t
-  /// as a whole, no farther away than within(face), whatever the answer is.
-  template <class Mesh, class Within, class Covered>
-  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Covered&& covered) {
+  /// `Mesh` is as FineMesh. `seen(face, places)` is called, whatever the answer is, for faces that are no
+  /// farther away than within(face) wherever they are over t; `places` are their corners, seen from t.
+  template <class Mesh, class Within, class Seen>
+  bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Seen&& seen) {
     const OverTriangle over(t);
     if (over.degenerate()) return false;
     if (++question_ == 0) std::fill(seen_.begin(), seen_.end(), 0), question_ = 1;
-    faces_.assign(1, start);
+    const Corners first = mesh.corners(start);
+    std::array<OverTriangle::Place, 3> places = {over(first[0]), over(first[1]), over(first[2])};
+    // All faces but the first are come to over the inside of t.
+    if (!overlaps(places)) return false;
     seen_[start] = question_;
-    while (!faces_.empty()) {
-      const std::uint32_t face = faces_.back();
-      faces_.pop_back();
-      const Corners corners = mesh.corners(face);
-      const std::array<OverTriangle::Place, 3> places = {over(corners[0]), over(corners[1]), over(corners[2])};
-      // All faces but the first were come to over the inside of t.
-      if (face == start && !overlaps(places)) return false;
+    entries_.clear();
+    for (std::uint32_t face = start;;) {
       if (!is_near_and_faces_alike(over, mesh.normal(face), places, within(face))) return false;
-      if (places[0].head<3>().maxCoeff() <= 0 && places[1].head<3>().maxCoeff() <= 0 && places[2].head<3>().maxCoeff() <= 0)
-        covered(face);
+      seen(face, places);
       for (int i = 0; i < 3; ++i) {
-        if (!passes_over(places[i], places[(i + 1) % 3])) continue;
-        const std::uint32_t next = mesh.across(face, i);
-        if (next == Mesh::kNone) return false;
-        if (seen_[next] == question_) continue;
-        seen_[next] = question_;
-        faces_.push_back(next);
+        const std::uint32_t side = mesh.side_across(face, i);
+        if (side != Mesh::kNone && seen_[side / 3] == question_) continue;
+        const int j = i == 2 ? 0 : i + 1;
+        if (!passes_over(places[i], places[j])) continue;
+        if (side == Mesh::kNone) return false;
+        seen_[side / 3] = question_;
+        // The face beyond has the side's ends the other way around.
+        entries_.push_back({side, places[j], places[i]});
       }
+      if (entries_.empty()) return true;
+      const Entry& entry = entries_.back();
+      face = entry.side / 3;
+      const int i = static_cast<int>(entry.side % 3), j = i == 2 ? 0 : i + 1, k = 3 - i - j;
+      places[i] = entry.from;
+      places[j] = entry.to;
+      places[k] = over(mesh.points()[mesh.triangles()[face][k]]);
+      entries_.pop_back();
     }
-    return true;
   }
 
   /// is_near() for those who need not know which faces t is covered by.
   template <class Mesh, class Within>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
-    return is_near(t, mesh, start, within, [](std::uint32_t) {});
+    return is_near(t, mesh, start, within, [](std::uint32_t, const std::array<OverTriangle::Place, 3>&) {});
   }
 
  private:
@@ -119,7 +127,13 @@ class TriangleOverlay {
   static bool is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
                                       const std::array<OverTriangle::Place, 3>& places, double within);
 
-  std::vector<std::uint32_t> seen_, faces_;
+  /// A face that is still to be looked at: the side that it was come to by, and where that starts and ends.
+  struct Entry {
+    std::uint32_t side;  ///< as FineMesh::side_across() numbers it
+    OverTriangle::Place from, to;
+  };
+  std::vector<std::uint32_t> seen_;
+  std::vector<Entry> entries_;
   std::uint32_t question_ = 0;
 };
 
