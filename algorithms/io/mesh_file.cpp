@@ -4,8 +4,10 @@
 #include <bit>
 #include <limits>
 
-#include "algorithms/io/mesh_file_formats.h"
 #include "algorithms/core/polygon_cut.h"
+#include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/io/scenes/scene_files.h"
+#include "algorithms/io/scenes/zip_archive.h"
 
 namespace hermesh {
 
@@ -13,8 +15,10 @@ namespace mesh_formats {
 
 namespace {
 
-constexpr std::array<std::string_view, 4> extensions = {".ply", ".obj", ".off", ".stl"};
-constexpr std::array<std::string_view, 4> names = {"PLY", "OBJ", "OFF", "STL"};
+constexpr std::array<std::string_view, 7> extensions = {".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf"};
+constexpr std::array<std::string_view, 7> names = {"PLY",         "OBJ",          "OFF",
+                                                   "STL",         "binary glTF",  "glTF in text",
+                                                   "a ZIP archive, as 3MF is"};
 
 std::string lower(std::string text) {
   for (char& c : text)
@@ -35,6 +39,8 @@ std::optional<Format> format_of_content(std::string_view bytes) {
   // begin with, too.
   if (is_binary_stl(bytes)) return Format::stl;
   if (begins_like_ply(bytes)) return Format::ply;
+  if (begins_like_glb(bytes)) return Format::glb;
+  if (begins_like_zip(bytes)) return Format::three_mf;
   TextCursor cursor = to_first_word(bytes);
   const std::string_view word = cursor.word();
   cursor.skip_blanks();
@@ -43,6 +49,8 @@ std::optional<Format> format_of_content(std::string_view bytes) {
   // The 80 bytes of text with which a binary STL file begins say what they like.
   if (without_padding(bytes.substr(0, 1000)).find('\0') != std::string_view::npos) return std::nullopt;
   if (is_off) return Format::off;
+  // No text of another kind begins with a brace; what kind of JSON it is, its reader tells.
+  if (word.starts_with('{')) return Format::gltf;
   if (lower(std::string(word)) == "solid") return Format::stl;
   for (const char* keyword : {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"})
     if (word == keyword) return Format::obj;
@@ -71,7 +79,7 @@ void check_format(std::string_view bytes, Format named, const std::string& file)
   if (is_utf16(bytes)) throw Error(in_quotes(file) + " is text in UTF-16; save it as UTF-8 or plain ASCII");
   // An OBJ file may begin with any of dozens of words, a damaged binary STL file with any byte, and OFF files
   // without their keyword exist.
-  if (named == Format::ply || (named == Format::off && !begins_with_digit(bytes)))
+  if (named == Format::ply || named >= Format::glb || (named == Format::off && !begins_with_digit(bytes)))
     throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
 }
 
@@ -90,7 +98,7 @@ std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
 
 void throw_unknown_extension(const std::filesystem::path& path) {
   throw Error(in_quotes(path.string()) +
-              " is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
+              " is of an unknown type; mesh files end in " + kMeshEndings);
 }
 
 namespace {
@@ -305,6 +313,15 @@ MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& fil
       break;
     case Format::stl:
       read_stl(bytes, builder);
+      break;
+    case Format::glb:
+      read_glb(bytes, builder);
+      break;
+    case Format::gltf:
+      read_gltf(bytes, builder);
+      break;
+    case Format::three_mf:
+      read_three_mf(bytes, builder);
       break;
   }
   return builder.finish();

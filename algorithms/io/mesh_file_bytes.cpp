@@ -14,6 +14,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The first two bytes decide and not the name, for packed files come without .gz at the end, too.
+bool is_gzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
+
+}  // namespace
+
 std::string read_whole(const fs::path& path) {
   const std::string name = in_quotes(path.string());
   // What is wrong is told by what stands there, for a stream only says that it failed.
@@ -31,15 +36,12 @@ std::string read_whole(const fs::path& path) {
   return bytes;
 }
 
-// The first two bytes decide and not the name, for packed files come without .gz at the end, too.
-bool is_gzip(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
-
-/// Half of the machine's memory, in bytes: the limit of what a file may unpack to, since one of a few megabytes may
-/// unpack to terabytes.
 std::size_t memory_limit() {
   return static_cast<std::size_t>(sysconf(_SC_PHYS_PAGES)) / 2 *
          static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
+
+namespace {
 
 class Inflater {
  public:

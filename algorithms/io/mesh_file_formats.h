@@ -1,4 +1,4 @@
-// What the parsers of the mesh file formats share. Private to algorithms/io/mesh_file*.cpp.
+// What the parsers of the mesh file formats share. Private to algorithms/io/mesh_file*.cpp and algorithms/io/scenes.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@
 
 namespace hermesh::mesh_formats {
 
-enum class Format { ply, obj, off, stl };
+enum class Format { ply, obj, off, stl, glb, gltf, three_mf };
 
 struct MeshPath {
   Format format;
@@ -29,6 +29,11 @@ std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path);
 /// The whole file, unpacked if its first bytes say gzip (any number of members). @throws Error if it cannot be read,
 /// is empty, damaged or does not fit into memory.
 std::string load_bytes(const std::filesystem::path& path, const RunContext& context);
+/// The bytes of a regular file as they are. @throws Error if it cannot be read.
+std::string read_whole(const std::filesystem::path& path);
+/// Half of the machine's memory, in bytes: the limit of what a file may unpack to, since one of a few megabytes may
+/// unpack to terabytes.
+std::size_t memory_limit();
 
 /// Gives points that are equal in all three coordinates (−0 is 0) one number, in the order in which they are first
 /// seen.

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cstring>
 
+#include "algorithms/io/scenes/scene_files_for_tests.h"
 #include "algorithms/io/test_mesh_files.h"
 
 namespace hermesh {
@@ -24,6 +25,11 @@ struct Kind {
   Format format;
   bool text;
   Files files;  ///< undamaged
+  /// Puts what was damaged into its container, so that checksums and lengths of that are right; null where
+  /// there is none.
+  std::string (*wrap)(const std::string& bytes) = nullptr;
+
+  std::string file(const std::string& bytes) const { return wrap ? wrap(bytes) : bytes; }
 };
 
 template <class T>
@@ -161,6 +167,68 @@ std::string binary_stl(const Ring& mesh, std::string header) {
   return header;
 }
 
+std::string points_and_indices(const Ring& mesh) {
+  std::string bytes;
+  for (const auto& point : mesh.points)
+    for (const float x : point) put(bytes, x);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) put(bytes, std::uint16_t(corner));
+  return bytes;
+}
+
+/// A scene of two nodes and a sparse accessor. Blanks stand about all words, so that these can be exchanged.
+std::string gltf(const Ring& mesh, const std::string& uri) {
+  const std::string points = std::to_string(mesh.points.size()),
+                    corners = std::to_string(3 * mesh.triangles.size());
+  const std::string size = std::to_string(12 * mesh.points.size()),
+                    rest = std::to_string(6 * mesh.triangles.size());
+  return R"({ "asset" : { "version" : "2.0" } , "scene" : 0 , "scenes" : [ { "nodes" : [ 0 , 1 ] } ] ,
+"nodes" : [ { "mesh" : 0 , "translation" : [ 1 , 2 , 3 ] } , { "children" : [ 2 ] , "scale" : [ 1 , -1 , 1 ] } , { "mesh" : 0 ,
+"rotation" : [ 0 , 0 , 0 , 1 ] } ] , "meshes" : [ { "primitives" : [ { "attributes" : { "POSITION" : 0 } , "indices" : 1 , "mode" : 4 } ,
+{ "attributes" : { "POSITION" : 0 } , "mode" : 5 } ] } ] ,
+"accessors" : [ { "bufferView" : 0 , "byteOffset" : 0 , "componentType" : 5126 , "count" : )" +
+         points +
+         R"( , "type" : "VEC3" , "sparse" : { "count" : 2 , "indices" : { "bufferView" : 1 , "byteOffset" : 2 ,
+"componentType" : 5123 } , "values" : { "bufferView" : 0 , "byteOffset" : 12 } } } ,
+{ "bufferView" : 1 , "componentType" : 5123 , "count" : )" +
+         corners + R"( , "type" : "SCALAR" } ] , "bufferViews" : [ { "buffer" : 0 , "byteLength" : )" + size +
+         R"( , "byteStride" : 12 } , { "buffer" : 0 , "byteOffset" : )" + size + R"( , "byteLength" : )" +
+         rest + R"( } ] , "buffers" : [ { )" + (uri.empty() ? "" : "\"uri\" : \"" + uri + "\" , ") +
+         R"("byteLength" : )" + std::to_string(12 * mesh.points.size() + 6 * mesh.triangles.size()) +
+         " } ] }";
+}
+
+std::string base64(const std::string& bytes) {
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  // The bytes of the ring are a multiple of three.
+  for (std::size_t i = 0; i + 2 < bytes.size(); i += 3)
+    for (int k = 0; k < 4; ++k)
+      text += digits[((unsigned char)bytes[i] << 16 | (unsigned char)bytes[i + 1] << 8 |
+                      (unsigned char)bytes[i + 2]) >>
+                         (18 - 6 * k) &
+                     63];
+  return text;
+}
+
+std::string in_glb(const std::string& json) { return glb_of(json, points_and_indices(ring(7))); }
+
+std::string model(const Ring& mesh) {
+  std::ostringstream text;
+  text << "<object id = \" 1 \" > <mesh > <vertices >\n";
+  for (const auto& [x, y, z] : mesh.points)
+    text << "<vertex x = \" " << x << " \" y = \" " << y << " \" z = \" " << z << " \" />\n";
+  text << "</vertices > <triangles >\n";
+  for (const auto& [a, b, c] : mesh.triangles)
+    text << "<triangle v1 = \" " << a << " \" v2 = \" " << b << " \" v3 = \" " << c << " \" />\n";
+  text << "</triangles > </mesh > </object >\n<object id = \" 2 \" > <components >"
+          "<component objectid = \" 1 \" transform = \" 1 0 0 0 1 0 0 0 -1 5 6 7 \" /> <component objectid = "
+          "\" 1 \" /> "
+          "</components > </object >";
+  return model_of(text.str(), "<item objectid = \" 2 \" /> <item objectid = \" 1 \" />",
+                  "unit = \"inch\" xml:lang = \"en\"");
+}
+
 std::vector<Kind> all_kinds() {
   const Ring mesh = ring(7);
   return {{"ascii PLY", Format::ply, true, {ascii_ply(mesh, false), ascii_ply(mesh, true)}},
@@ -168,6 +236,11 @@ std::vector<Kind> all_kinds() {
           {"OBJ", Format::obj, true, {obj(mesh)}},
           {"ascii OFF", Format::off, true, {off(mesh, "OFF"), off(mesh, "COFF")}},
           {"binary OFF", Format::off, false, {binary_off(mesh, true), binary_off(mesh, false)}},
+          {"GLB", Format::glb, false, {in_glb(gltf(mesh, ""))}},
+          {"JSON of a GLB", Format::glb, true, {gltf(mesh, "")}, in_glb},
+          {"glTF", Format::gltf, true, {gltf(mesh, "data:;base64," + base64(points_and_indices(mesh)))}},
+          {"3MF", Format::three_mf, false, {three_mf_of(model(mesh))}},
+          {"model of a 3MF", Format::three_mf, true, {model(mesh)}, three_mf_of},
           {"ascii STL", Format::stl, true, {text_stl(mesh)}},
           {"binary STL", Format::stl, false, {binary_stl(mesh, "exported"), binary_stl(mesh, "solid part")}}};
 }
@@ -182,7 +255,7 @@ class Damager {
   std::string damaged() {
     std::string bytes = kind_.files[below(kind_.files.size())];
     for (std::size_t times = 1 + below(3); times > 0 && !bytes.empty(); --times) damage(bytes);
-    return bytes.empty() ? "x" : bytes;
+    return kind_.file(bytes.empty() ? "x" : bytes);
   }
 
  private:
@@ -391,7 +464,7 @@ void expect_all_survived(std::uint32_t trials) {
   for (const Kind& kind : kinds) {
     for (const std::string& file : kind.files) {
       bool refused = false;
-      EXPECT_EQ(fault_of(file, kind, refused), "") << kind.name;
+      EXPECT_EQ(fault_of(kind.file(file), kind, refused), "") << kind.name;
       EXPECT_FALSE(refused) << kind.name;
     }
     expect_survived(kinds, kind, trials);

@@ -248,7 +248,7 @@ TEST_F(MeshFileTest, RefusesWhatIsNoMeshFile) {
   EXPECT_EQ(error_of("empty.ply", ""), "'empty.ply' is empty");
   EXPECT_EQ(
       error_of("a.fbx", "x"),
-      "'a.fbx' is of an unknown type; mesh files end in .ply, .obj, .off or .stl, also with .gz behind");
+      "'a.fbx' is of an unknown type; mesh files end in .ply, .obj, .off, .stl, .glb, .gltf or .3mf (.gz may follow)");
   EXPECT_EQ(error_of("a.ply", obj), "'a.ply' is named .ply but holds OBJ");
   EXPECT_EQ(error_of("a.obj", ascii_ply), "'a.obj' is named .obj but holds PLY");
   EXPECT_EQ(error_of("a.stl", off), "'a.stl' is named .stl but holds OFF");

@@ -7,6 +7,7 @@
 
 #include "algorithms/io/atomic_file.h"
 #include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/io/scenes/scene_files.h"
 
 namespace hermesh {
 
@@ -361,6 +362,7 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
   // In this order: the stream is closed before its file is removed, should an Error end this.
   AtomicFile aside(path);
   Output out(aside.path(), path, named->gzipped, context);
+  const ByteSink sink = [&out](std::string_view bytes) { out.text(bytes); };
   switch (named->format) {
     case Format::ply:
       write_ply(out, file, ply_attributes(file, path.string(), context));
@@ -373,6 +375,13 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
       break;
     case Format::stl:
       write_stl(out, file);
+      break;
+    case Format::glb:
+    case Format::gltf:
+      write_gltf(sink, mesh, named->format == Format::glb, path.string());
+      break;
+    case Format::three_mf:
+      write_three_mf(sink, mesh, path.string(), context);
       break;
   }
   // A rename only after the last byte was taken without complaint.

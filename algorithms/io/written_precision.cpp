@@ -76,7 +76,7 @@ void check_written_precision(const std::filesystem::path& path, const LevelSet& 
   const bool single = is_written_in_single(path);
   if (single)
     check(reach.from_zero, 24, "STL's single precision",
-          "write .ply, .obj or .off, which hold double precision, or move the model nearer to the origin");
+          "write .ply, .obj, .off, .glb or .3mf, which hold more, or move the model nearer to the origin");
   check(reach.from_zero, 53, "double precision", "move the model nearer to the origin, or use larger voxels");
   check(reach.from_origin, 24, "single precision about the mesh's own origin",
         "use larger voxels, or divide the model: its parts lie too far from one another");

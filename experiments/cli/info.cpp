@@ -114,7 +114,7 @@ void print_volume(const std::filesystem::path& path, Session& session) {
 void add_info(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "info", "What a mesh or a .vdb file holds");
   auto file = std::make_shared<std::string>();
-  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl, also with .gz) or .vdb, or - for the standard input")->required();
+  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl .glb .gltf .3mf, also with .gz) or .vdb, or - for the standard input")->required();
   add_files(*command, session, {.inputs = {file.get()}, .in = FileKind::mesh_or_volume});
   add_json_option(*command, session);
   command->callback([file, &session] {
@@ -126,7 +126,7 @@ void add_info(CLI::App& app, Session& session) {
         print_volume(path, session);
       else
         throw Error("cannot tell what '" + *file + "' is: its name ends neither in .vdb nor in " +
-                    ".ply, .obj, .off or .stl (.gz may follow)");
+                    kMeshEndings);
       return kDone;
     };
   });

@@ -24,7 +24,7 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 void check_mesh_output(const std::filesystem::path& path) {
   if (!is_mesh_path(path))
     throw Error("cannot write a mesh to '" + path.string() +
-                "': its name must end in .ply, .obj, .off or .stl (.gz may follow)");
+                "': its name must end in " + kMeshEndings);
   check_writable(path);
 }
 

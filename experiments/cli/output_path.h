@@ -6,7 +6,7 @@
 namespace hermesh::cli {
 
 /// Checks that a mesh can be written there.
-/// @throws Error if the path is not one that meshes are written to (.ply .obj .off .stl, also with .gz), or check_writable()
+/// @throws Error if the path is not one that meshes are written to (kMeshEndings), or check_writable()
 /// throws.
 void check_mesh_output(const std::filesystem::path& path);
 

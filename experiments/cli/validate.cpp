@@ -9,6 +9,7 @@
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/report_text.h"
 #include "experiments/cli/session.h"
+#include "experiments/cli/voxelizing.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh::cli {
@@ -115,7 +116,7 @@ void add_validate(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "validate", "Judge a mesh: topology, self-intersections, distances");
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("MESH", arguments->mesh, "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard input")->required();
+  command->add_option("MESH", arguments->mesh, kMeshIn)->required();
   add_files(*command, session, {.inputs = {&arguments->mesh}, .takes_many = true});
   command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");
   command->add_flag("--certify", arguments->certify,

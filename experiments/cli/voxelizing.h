@@ -76,7 +76,7 @@ void print_summary(const Session& session, const std::string& line);
 void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
                      std::size_t active_voxels, const std::string& voxelizer, double seconds);
 
-inline constexpr const char* kMeshIn = "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard input";
-inline constexpr const char* kMeshOut = "Mesh: .ply .obj .off .stl, also with .gz, or - for the standard output";
+inline constexpr const char* kMeshIn = "Mesh: .ply .obj .off .stl .glb .gltf .3mf, also with .gz, or - for the standard input";
+inline constexpr const char* kMeshOut = "Mesh: .ply .obj .off .stl .glb .gltf .3mf, also with .gz, or - for the standard output";
 
 }  // namespace hermesh::cli

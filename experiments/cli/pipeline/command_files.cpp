@@ -49,7 +49,7 @@ void add_files(CLI::App& command, Session& session, CommandFiles given) {
   command.add_option(
       "--format", files.format,
       std::string("Format of a standard stream, which - names: ") +
-          (mesh ? "ply, obj, off or stl of a mesh (default: the standard input's by its content, ply for the "
+          (mesh ? "ply, obj, off, stl, glb, gltf or 3mf of a mesh (default: the standard input's by its content, ply for the "
                   "standard output)"
                 : "told by its kind"));
   command.add_option("--input-format", files.input_format,

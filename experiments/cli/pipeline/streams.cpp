@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kChunk = std::size_t(1) << 16;
 constexpr const char* kInputName = "the standard input";
 constexpr const char* kOutputName = "the standard output";
-const std::array<std::string, 4> kMeshFormats = {"ply", "obj", "off", "stl"};
+const std::array<std::string, 7> kMeshFormats = {"ply", "obj", "off", "stl", "glb", "gltf", "3mf"};
 
 /// Refuses a format that files of the kind do not have. @throws UsageError
 void check_format(const std::string& option, const std::string& format, FileKind kind) {
@@ -36,8 +36,8 @@ void check_format(const std::string& option, const std::string& format, FileKind
   throw UsageError(option + " " + format + " is nothing that this command has there: it takes " +
                    (kind == FileKind::volume           ? "vdb"
                     : kind == FileKind::imported       ? "nii"
-                    : kind == FileKind::mesh_or_volume ? "ply, obj, off, stl (.gz may follow) or vdb"
-                                                       : "ply, obj, off or stl (.gz may follow)"));
+                    : kind == FileKind::mesh_or_volume ? "ply, obj, off, stl, glb, gltf, 3mf (.gz may follow) or vdb"
+                                                       : "ply, obj, off, stl, glb, gltf or 3mf (.gz may follow)"));
 }
 
 /// Copies a stream to its end into a file; returns the bytes.
@@ -82,6 +82,9 @@ std::string ending_of(std::string_view bytes) {
   if (text.starts_with("OFF") || text.starts_with("COFF") || text.starts_with("NOFF") ||
       text.starts_with("STOFF"))
     return ".off";
+  if (bytes.starts_with("glTF")) return ".glb";
+  if (bytes.starts_with("PK\3\4")) return ".3mf";
+  if (text.starts_with('{')) return ".gltf";
   // The length of the header, in either order of bytes.
   if (bytes.starts_with(std::string_view("\x5c\x01\0\0", 4)) ||
       bytes.starts_with(std::string_view("\0\0\x01\x5c", 4)))

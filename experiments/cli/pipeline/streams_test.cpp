@@ -51,7 +51,7 @@ TEST_F(StreamsTest, NothingButTheFileGoesToTheStandardOutput) {
 }
 
 TEST_F(StreamsTest, EveryFormatIsToldByItsContent) {
-  for (const char* format : {"ply", "obj", "off", "stl", "ply.gz", "stl.gz"}) {
+  for (const char* format : {"ply", "obj", "off", "stl", "glb", "gltf", "3mf", "ply.gz", "stl.gz", "3mf.gz"}) {
     const Outcome outcome = piped(std::string("$H remesh sphere.off - --voxel-size 0.2 --quiet --format ") +
                                   format + " | $H validate - --require watertight --quiet");
     EXPECT_EQ(outcome.exit_code, 0) << format << outcome.err;
@@ -94,7 +94,7 @@ TEST_F(StreamsTest, RefusesWhatCannotBeMeant) {
   };
   expect("$H combine union - - o.ply --voxel-size 0.2", "only one input can be");
   expect("$H remesh - - --voxel-size 0.2 --json", "--json FILE");
-  expect("$H remesh - - --voxel-size 0.2 --format vdb", "takes ply, obj, off or stl");
+  expect("$H remesh - - --voxel-size 0.2 --format vdb", "takes ply, obj, off, stl, glb, gltf or 3mf");
   expect("$H remesh sphere.off o.ply --voxel-size 0.2 --format ply", "--format has no effect");
   expect("$H remesh sphere.off - --voxel-size 0.2 --input-format ply", "--input-format has no effect");
   expect("$H voxelize - - --voxel-size 0.2 --grids sdf,hermite", "a second file");

@@ -165,7 +165,7 @@ def to_meshio(mesh: Mesh) -> Any:
 
 def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progress: Progress | None = None,
               cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> Mesh:
-    """Reads PLY, OBJ, OFF or STL, each also gzipped; polygons of more corners are cut into triangles.
+    """Reads PLY, OBJ, OFF, STL, glTF 2.0 or 3MF, each also gzipped; polygons of more corners are cut into triangles.
 
     With `attributes` those of PLY and OBJ are read, too. Raises Error for a file that is missing, damaged, of another type or
     without polygons. What was forgiven is a note.
@@ -176,7 +176,7 @@ def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progres
 
 def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, *, progress: Progress | None = None,
                cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> None:
-    """Writes PLY (binary, with attributes), OBJ, OFF or STL, as the name ends; never half a file.
+    """Writes PLY (binary, with attributes), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, as the name ends; never half a file.
 
     Raises Error for an unknown end of the name or a path that cannot be written. STL has single precision; a note says what
     that cost.

@@ -1,0 +1,368 @@
+#include <gtest/gtest.h>
+
+#include "algorithms/io/scenes/scene_files_for_tests.h"
+#include "algorithms/io/test_mesh_files.h"
+
+namespace hermesh {
+namespace {
+
+using Eigen::Vector3d;
+using Points = std::vector<Vector3d>;
+using Triangles = std::vector<Triangle>;
+
+/// A scene of one mesh in parts that a test replaces one by one. As it is, the triangle (0,0,0) (1,0,0)
+/// (0,2,0).
+struct Gltf {
+  std::string head = R"("asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}])";
+  std::string nodes = R"([{"mesh":0}])";
+  std::string primitives = R"([{"attributes":{"POSITION":0},"indices":1}])";
+  std::string accessors = R"([{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)"
+                          R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}])";
+  std::string views = R"([{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":6}])";
+  std::string buffers = R"([{"byteLength":44}])";
+  std::string binary =
+      numbers_of<float>({0, 0, 0, 1, 0, 0, 0, 2, 0}) + numbers_of<std::uint16_t>({0, 1, 2, 0});
+
+  std::string json() const {
+    return "{" + head + ",\"nodes\":" + nodes + ",\"meshes\":[{\"primitives\":" + primitives +
+           "}],\"accessors\":" + accessors + ",\"bufferViews\":" + views + ",\"buffers\":" + buffers + "}";
+  }
+  std::string glb() const { return glb_of(json(), binary); }
+};
+
+class GltfFileTest : public MeshFileTest {
+ protected:
+  MeshFile read(const Gltf& gltf) { return MeshFileTest::read("a.glb", gltf.glb()); }
+  std::string error_of(const Gltf& gltf) { return MeshFileTest::error_of("a.glb", gltf.glb()); }
+  /// A scene without indices whose points are whole numbers of a primitive in this mode: 0 1 2 … along x,
+  /// squares along y.
+  Gltf row_of_points(std::size_t count, int mode) {
+    Gltf gltf;
+    gltf.binary.clear();
+    for (std::size_t i = 0; i < count; ++i) gltf.binary += numbers_of<float>({float(i), float(i * i), 0});
+    const std::string bytes = std::to_string(12 * count);
+    gltf.primitives = R"([{"attributes":{"POSITION":0},"mode":)" + std::to_string(mode) + "}]";
+    gltf.accessors =
+        R"([{"bufferView":0,"componentType":5126,"count":)" + std::to_string(count) + R"(,"type":"VEC3"}])";
+    gltf.views = R"([{"buffer":0,"byteLength":)" + bytes + "}]";
+    gltf.buffers = R"([{"byteLength":)" + bytes + "}]";
+    return gltf;
+  }
+};
+
+TEST_F(GltfFileTest, ReadsPointsAndTriangles) {
+  const MeshFile mesh = read(Gltf());
+  EXPECT_EQ(mesh.points, (Points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}}));
+  EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}}));
+  EXPECT_TRUE(context.notes.empty());
+}
+
+TEST_F(GltfFileTest, NodesPlaceTheirMeshesByTheWholeHierarchy) {
+  Gltf gltf;
+  // The child scales by 2 3 4, turns a quarter about z, and moves by 10; the parent moves by 100 along y.
+  gltf.nodes = R"([{"translation":[0,100,0],"children":[1]},)"
+               R"({"mesh":0,"translation":[10,0,0],"rotation":[0,0,0.5,0.5],"scale":[2,3,4]}])";
+  const MeshFile mesh = read(gltf);
+  // (1,0,0) → (2,0,0) → (0,2,0) → (10,102,0); (0,2,0) → (0,6,0) → (−6,0,0) → (4,100,0).
+  ASSERT_EQ(mesh.points.size(), 3u);
+  EXPECT_LT((mesh.points[0] - Vector3d(10, 100, 0)).norm(), 1e-12);
+  EXPECT_LT((mesh.points[1] - Vector3d(10, 102, 0)).norm(), 1e-12);
+  EXPECT_LT((mesh.points[2] - Vector3d(4, 100, 0)).norm(), 1e-12);
+  EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}}));
+}
+
+TEST_F(GltfFileTest, AMirrorTurnsTrianglesRound) {
+  Gltf gltf;
+  gltf.nodes = R"([{"mesh":0,"matrix":[-1,0,0,0, 0,1,0,0, 0,0,1,0, 5,6,7,1]}])";
+  const MeshFile mesh = read(gltf);
+  EXPECT_EQ(mesh.points, (Points{{5, 6, 7}, {4, 6, 7}, {5, 8, 7}}));
+  EXPECT_EQ(mesh.triangles, (Triangles{{0, 2, 1}}));
+  // Two mirrors are none.
+  gltf.nodes = R"([{"scale":[1,-1,1],"children":[1]},{"mesh":0,"scale":[-1,1,1]}])";
+  EXPECT_EQ(read(gltf).triangles, (Triangles{{0, 1, 2}}));
+}
+
+TEST_F(GltfFileTest, AMeshStandsWhereverANodeShowsIt) {
+  Gltf gltf;
+  gltf.head = R"("asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}])";
+  gltf.nodes = R"([{"mesh":0},{"mesh":0,"translation":[0,0,1]}])";
+  const MeshFile mesh = read(gltf);
+  EXPECT_EQ(mesh.points.size(), 6u);
+  EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {3, 4, 5}}));
+  EXPECT_EQ(mesh.points[4], Vector3d(1, 0, 1));
+}
+
+TEST_F(GltfFileTest, StripsAndFansKeepTheirOrientation) {
+  EXPECT_EQ(read(row_of_points(6, 4)).triangles, (Triangles{{0, 1, 2}, {3, 4, 5}}));
+  EXPECT_EQ(read(row_of_points(5, 5)).triangles, (Triangles{{0, 1, 2}, {2, 1, 3}, {2, 3, 4}}));
+  EXPECT_EQ(read(row_of_points(5, 6)).triangles, (Triangles{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+TEST_F(GltfFileTest, IndicesHaveOneTwoOrFourBytes) {
+  Gltf gltf;
+  const std::string points = gltf.binary.substr(0, 36);
+  const auto expect = [&](const char* type, const std::string& indices) {
+    gltf.accessors =
+        R"([{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":1,"componentType":)" +
+        std::string(type) + R"(,"count":3,"type":"SCALAR"}])";
+    gltf.views = R"([{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":)" +
+                 std::to_string(indices.size()) + "}]";
+    gltf.buffers = R"([{"byteLength":)" + std::to_string(36 + indices.size()) + "}]";
+    gltf.binary = points + indices;
+    EXPECT_EQ(read(gltf).triangles, (Triangles{{2, 0, 1}})) << type;
+  };
+  expect("5121", numbers_of<std::uint8_t>({2, 0, 1}));
+  expect("5123", numbers_of<std::uint16_t>({2, 0, 1}));
+  expect("5125", numbers_of<std::uint32_t>({2, 0, 1}));
+}
+
+TEST_F(GltfFileTest, PointsMayBeWholeNumbersAndInterleaved) {
+  Gltf gltf;
+  gltf.primitives = R"([{"attributes":{"POSITION":0}}])";
+  gltf.views = R"([{"buffer":0,"byteLength":24,"byteStride":8}])";
+  gltf.buffers = R"([{"byteLength":24}])";
+  gltf.accessors = R"([{"bufferView":0,"componentType":5122,"normalized":true,"count":3,"type":"VEC3"}])";
+  gltf.binary = numbers_of<std::int16_t>({0, 0, 0, 9, 32767, 0, 0, 9, 0, -32768, 0, 9});
+  EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {1, 0, 0}, {0, -1, 0}}));
+  gltf.accessors = R"([{"bufferView":0,"componentType":5122,"count":3,"type":"VEC3"}])";
+  EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {32767, 0, 0}, {0, -32768, 0}}));
+}
+
+TEST_F(GltfFileTest, SparseAccessorsReplaceWhatTheyList) {
+  Gltf gltf;
+  gltf.accessors =
+      R"([{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
+      R"("indices":{"bufferView":1,"byteOffset":4,"componentType":5123},"values":{"bufferView":0,"byteOffset":12}}},)"
+      R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}])";
+  // The index at byte 4 is 2, and the value at byte 12 is that of point 1.
+  gltf.primitives = R"([{"attributes":{"POSITION":0}}])";
+  EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {1, 0, 0}}));
+  // Without a view all the other values are 0.
+  gltf.accessors =
+      R"([{"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
+      R"("indices":{"bufferView":1,"byteOffset":2,"componentType":5121},"values":{"bufferView":0,"byteOffset":12}}}])";
+  EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {1, 0, 0}}));
+}
+
+/// A closed tetrahedron, each of whose triangles has three points of its own, as exporters write it for
+/// normals.
+TEST_F(GltfFileTest, PointsThatSeamsSplitAreOneAgain) {
+  Gltf gltf;
+  const Points corners = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  gltf.binary.clear();
+  for (const std::size_t i : {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3})
+    for (const double x : corners[i]) put_number(gltf.binary, i == 0 ? -float(x) : float(x));  // −0 is 0
+  gltf.primitives = R"([{"attributes":{"POSITION":0}},{"attributes":{"POSITION":1}}])";
+  gltf.accessors = R"([{"bufferView":0,"componentType":5126,"count":9,"type":"VEC3"},)"
+                   R"({"bufferView":0,"byteOffset":108,"componentType":5126,"count":3,"type":"VEC3"}])";
+  gltf.views = R"([{"buffer":0,"byteLength":144}])";
+  gltf.buffers = R"([{"byteLength":144}])";
+  const MeshFile mesh = read(gltf);
+  EXPECT_EQ(mesh.points.size(), 4u);
+  EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {2, 1, 3}}));
+}
+
+TEST_F(GltfFileTest, BuffersAreWithinTheFileOrBesideIt) {
+  Gltf gltf;
+  write("the buffer.bin", gltf.binary);
+  gltf.buffers = R"([{"byteLength":44,"uri":"the%20buffer.bin"}])";
+  EXPECT_EQ(read_mesh_file(write("a.gltf", gltf.json()), context).points.size(), 3u);
+  // 42 bytes in base64, by hand of another program.
+  gltf.buffers = R"([{"byteLength":42,"uri":"data:application/gltf-buffer;base64,)"
+                 R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAEAAAAAAAAABAAIA"}])";
+  EXPECT_EQ(read_mesh_file(write("b.gltf", gltf.json()), context).points,
+            (Points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}}));
+}
+
+TEST_F(GltfFileTest, BuffersElsewhereAreRefused) {
+  Gltf gltf;
+  const auto sentence = [&](const std::string& uri) {
+    gltf.buffers = R"([{"byteLength":44,"uri":")" + uri + R"("}])";
+    return MeshFileTest::error_of("a.gltf", gltf.json());
+  };
+  EXPECT_NE(sentence("none.bin").find("'none.bin' is not there"), std::string::npos);
+  EXPECT_NE(sentence("../a.bin").find("not in the folder"), std::string::npos);
+  EXPECT_NE(sentence("%2e%2e/a.bin").find("not in the folder"), std::string::npos);
+  EXPECT_NE(sentence("/etc/hostname").find("not in the folder"), std::string::npos);
+  EXPECT_NE(sentence("a%00.bin").find("not in the folder"), std::string::npos);
+  EXPECT_NE(sentence("https://example.org/a.bin").find("an address"), std::string::npos);
+  EXPECT_NE(sentence("data:,abc").find("not in base64"), std::string::npos);
+  EXPECT_NE(sentence("data:;base64,AA!A").find("none of its digits"), std::string::npos);
+  EXPECT_NE(sentence("data:;base64,AAAA").find("44 bytes, but 3 are there"), std::string::npos);
+}
+
+TEST_F(GltfFileTest, SaysWhatItLeavesOut) {
+  Gltf gltf;
+  gltf.head = R"("asset":{"version":"2.0"},"scene":1,"scenes":[{"nodes":[]},{"nodes":[0,1]}])";
+  gltf.nodes = R"([{"mesh":0,"skin":0,"translation":[9,9,9]},{"mesh":0,"scale":[1,0,1]}])";
+  gltf.primitives =
+      R"([{"attributes":{"POSITION":0},"mode":1},{"attributes":{"POSITION":0},"indices":1,"targets":[{"POSITION":0}]}])";
+  EXPECT_EQ(read(gltf).points[0], Vector3d(0, 0, 0));
+  std::string notes;
+  for (const std::string& note : context.notes) notes += note + "\n";
+  EXPECT_EQ(notes,
+            "'a.glb': it has 2 scenes; the default one was read\n"
+            "'a.glb': 1 parts that a transform flattens were left out\n"
+            "'a.glb': 1 of its primitives have points or lines and no triangles, and were left out\n"
+            "'a.glb': 1 of its meshes are bent by joints; they were read as they are stored\n"
+            "'a.glb': 1 of its primitives have morph targets, which were left out\n");
+}
+
+TEST_F(GltfFileTest, DamageIsASentence) {
+  const auto expect = [&](auto change, const std::string& part) {
+    Gltf gltf;
+    change(gltf);
+    const std::string sentence = error_of(gltf);
+    EXPECT_NE(sentence.find(part), std::string::npos) << sentence << "\nrather than " << part;
+    EXPECT_EQ(sentence.rfind("'a.glb'", 0), 0u) << sentence;
+  };
+  const auto asset = [](const std::string& rest) {
+    return R"("asset":{"version":"2.0"},)" + rest + R"("scenes":[{"nodes":[0]}])";
+  };
+  expect([](Gltf& g) { g.head = R"("asset":{"version":"1.0"})"; }, "version '1.0' of glTF");
+  expect([](Gltf& g) { g.head = R"("assets":{})"; }, "which version");
+  expect([&](Gltf& g) { g.head = asset(R"("extensionsRequired":["KHR_draco_mesh_compression"],)"); },
+         "without compression");
+  expect([&](Gltf& g) { g.head = asset(R"("extensionsRequired":["EXT_meshopt_compression"],)"); },
+         "without compression");
+  expect([&](Gltf& g) { g.head = asset(R"("extensionsRequired":["KHR_new_shapes"],)"); }, "'KHR_new_shapes'");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":0,"children":[0]}])"; }, "two parents or is within itself");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":1}])"; }, "number 1 of 'meshes', but there are 1");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":-1}])"; }, "'mesh' must be a whole number");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":0,"rotation":[0,0,0,0]}])"; }, "the length 0");
+  expect(
+      [](Gltf& g) { g.nodes = R"([{"children":[1],"scale":[1e200,1,1]},{"mesh":0,"scale":[1e200,1,1]}])"; },
+      "not finite");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":0,"scale":[1,1]}])"; }, "must be 3 numbers");
+  expect([](Gltf& g) { g.nodes = R"([{"mesh":0,"matrix":[1,0,0,1,0,1,0,0,0,0,1,0,0,0,0,1]}])"; },
+         "no affine map");
+  expect([](Gltf& g) { g.nodes = R"([{"name":"empty"}])"; }, "no polygon");
+  expect([](Gltf& g) { g.primitives = R"([{"attributes":{"POSITION":7}}])"; }, "number 7 of 'accessors'");
+  expect([](Gltf& g) { g.primitives = R"([{"attributes":{"POSITION":1}}])"; }, "of a type that its use");
+  expect([](Gltf& g) { g.primitives = R"([{"attributes":{"POSITION":0},"indices":0}])"; },
+         "of a type that its use");
+  expect([](Gltf& g) { g.primitives = R"([{"attributes":{"POSITION":0},"mode":9}])"; }, "mode 9");
+  expect([](Gltf& g) { g.binary[36] = 3; }, "refers to point 3, but there are 3");
+  expect([](Gltf& g) { g.binary.replace(12, 4, numbers_of<std::uint32_t>({0x7fc00000})); },
+         "not a finite number");
+  expect([](Gltf& g) { g.binary.resize(32); }, "declares 44 bytes, but 32 are there");
+  expect([](Gltf& g) { g.views = R"([{"buffer":0,"byteLength":35},{"buffer":0,"byteLength":6}])"; },
+         "reaches beyond");
+  expect(
+      [](Gltf& g) {
+        g.views = R"([{"buffer":0,"byteLength":36,"byteOffset":40},{"buffer":0,"byteLength":6}])";
+      },
+      "reaches beyond");
+  expect(
+      [](Gltf& g) {
+        g.views = R"([{"buffer":0,"byteLength":36,"byteStride":0},{"buffer":0,"byteLength":6}])";
+      },
+      "byteStride");
+  // Billions of zeros, which a file of a few bytes may declare.
+  expect(
+      [](Gltf& g) {
+        g.primitives = R"([{"attributes":{"POSITION":0}}])",
+        g.accessors = R"([{"componentType":5126,"count":3000000000,"type":"VEC3"}])";
+      },
+      "more elements than");
+  expect(
+      [](Gltf& g) { g.accessors = R"([{"bufferView":0,"componentType":5126,"count":1e15,"type":"VEC3"}])"; },
+      "reaches beyond");
+  expect(
+      [](Gltf& g) { g.accessors = R"([{"bufferView":0,"componentType":5126,"count":1e300,"type":"VEC3"}])"; },
+      "'count' must be");
+  expect(
+      [](Gltf& g) { g.accessors = R"([{"bufferView":0,"componentType":5126,"count":1e999,"type":"VEC3"}])"; },
+      "too large");
+  expect([](Gltf& g) { g.head = "\"asset\":"; }, "truncated or damaged at byte");
+}
+
+TEST_F(GltfFileTest, LengthsOfTheContainerAreChecked) {
+  const std::string whole = Gltf().glb();
+  for (std::size_t size = 4; size < whole.size(); ++size)
+    EXPECT_NE(MeshFileTest::error_of("a.glb", whole.substr(0, size)).find("truncated"), std::string::npos)
+        << size;
+  EXPECT_NE(MeshFileTest::error_of("a.glb", whole + "more").find("4 more follow"), std::string::npos);
+  std::string old = whole;
+  old[4] = 1;
+  EXPECT_NE(MeshFileTest::error_of("a.glb", old).find("version 1 of glTF"), std::string::npos);
+  EXPECT_NE(MeshFileTest::error_of("a.gltf", whole).find("is named .gltf but holds binary glTF"),
+            std::string::npos);
+  EXPECT_NE(MeshFileTest::error_of("a.glb", Gltf().json()).find("is named .glb but holds glTF in text"),
+            std::string::npos);
+  EXPECT_NE(MeshFileTest::error_of("a.glb", "ply\n").find("is named .glb but holds PLY"), std::string::npos);
+  EXPECT_NE(MeshFileTest::error_of("a.glb", "something else").find("does not begin like"), std::string::npos);
+  EXPECT_NE(MeshFileTest::error_of("a.ply", whole).find("is named .ply but holds binary glTF"),
+            std::string::npos);
+}
+
+/// Thousands of nodes that show thousands of primitives over the same bytes: what they would take is counted
+/// before it is taken.
+TEST_F(GltfFileTest, RepetitionDoesNotEatMemory) {
+  Gltf gltf = row_of_points(3000, 4);
+  gltf.nodes = "[{\"children\":[1";
+  std::string rest;
+  for (int i = 2; i < 40000; ++i) gltf.nodes += "," + std::to_string(i);
+  gltf.nodes += "]}";
+  for (int i = 1; i < 40000; ++i) gltf.nodes += ",{\"mesh\":0}";
+  gltf.nodes += "]";
+  std::string many = "[";
+  for (int i = 0; i < 2000; ++i) many += (i > 0 ? "," : "") + std::string(R"({"attributes":{"POSITION":0}})");
+  gltf.primitives = many + "]";
+  EXPECT_NE(error_of(gltf).find("half of the memory"), std::string::npos);
+}
+
+TEST_F(GltfFileTest, ManyNodesWithinOneAnotherAreNoRecursion) {
+  Gltf gltf;
+  gltf.nodes = "[";
+  for (int i = 1; i < 20000; ++i) gltf.nodes += "{\"children\":[" + std::to_string(i) + "]},";
+  gltf.nodes += "{\"mesh\":0}]";
+  EXPECT_EQ(read(gltf).points.size(), 3u);
+  EXPECT_NE(MeshFileTest::error_of("a.gltf", "{\"asset\":" + std::string(1000000, '[')), "");
+}
+
+TEST_F(GltfFileTest, RoundTripsKeepEveryBit) {
+  for (const Vector3d& origin : {Vector3d(0, 0, 0), Vector3d(1e6, -1e6, 3), Vector3d(0.1, 0, 0)}) {
+    const PolygonMesh mesh = random_mesh(11, origin);
+    for (const char* name : {"a.glb", "a.gltf", "a.3mf", "b.glb.gz", "b.gltf.gz", "b.3mf.gz"}) {
+      // Degenerate triangles are nothing that 3MF holds, so there are none here.
+      PolygonMesh proper = mesh;
+      std::erase_if(proper.triangles,
+                    [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+      proper.quads.clear();
+      for (std::uint32_t i = 0; i + 3 < proper.points.size(); ++i)
+        proper.quads.push_back({i, i + 1, i + 2, i + 3});
+      write_mesh(folder / name, proper, context);
+      const PolygonMesh back = read_mesh(folder / name, context);
+      EXPECT_EQ(back.origin, proper.origin) << name;
+      EXPECT_EQ(back.points, proper.points) << name;
+      EXPECT_EQ(back.triangles, triangulated(proper)) << name;
+      const std::string bytes = bytes_of(folder / name);
+      write_mesh(folder / name, proper, context);
+      EXPECT_EQ(bytes_of(folder / name), bytes) << name;
+    }
+  }
+  EXPECT_TRUE(context.notes.empty());
+}
+
+TEST_F(GltfFileTest, AnOriginThatTheReaderWouldNotChooseIsKept) {
+  PolygonMesh mesh;
+  mesh.points = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  for (const char* name : {"a.glb", "a.gltf", "a.3mf"}) {
+    write_mesh(folder / name, mesh, context);
+    EXPECT_TRUE(read_mesh(folder / name, context) == mesh) << name;
+  }
+}
+
+TEST_F(GltfFileTest, AMeshWithoutPolygonsIsAFileWithoutThem) {
+  for (const char* name : {"a.glb", "a.gltf", "a.3mf"}) {
+    write_mesh(folder / name, PolygonMesh(), context);
+    EXPECT_NE(
+        error_of_path(folder / name).find(std::string(name) == "a.3mf" ? "places no object" : "no polygon"),
+        std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace hermesh
