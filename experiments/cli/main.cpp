@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "algorithms/core/shown.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/help/suggestions.h"
@@ -112,6 +113,24 @@ std::string option_without_value(const CLI::App& app) {
   return {};
 }
 
+/// A sentence about a word behind --json that is meant as its file but would be taken for an input, for want of an ending by
+/// which it is told; empty if there is none.
+std::string misnamed_json_file(const std::vector<std::string>& words) {
+  const auto at = std::ranges::find(words, "--json");
+  if (at == words.end() || at + 1 == words.end()) return {};
+  const std::filesystem::path word = *(at + 1);
+  const std::string ending = word.extension().string();
+  if (word.string().starts_with('-') || ending.empty() || is_mesh_path(word)) return {};
+  // No command reads or makes what ends like this; and what is not there can be no input of any kind, but an output of ours.
+  const bool is_report = ending == ".txt" || ending == ".log" || ending == ".csv";
+  const auto endings = {".json", ".jsonl", ".vdb", ".nii", ".raw", ".gz", ".toml"};
+  const bool is_ours = std::ranges::find(endings, ending) != endings.end();
+  std::error_code error;
+  if (is_ours || (!is_report && std::filesystem::exists(word, error))) return {};
+  return "--json takes the next word for its file where that ends in .json or .jsonl, and '" + word.string() +
+         "' would be an input: write --json='" + word.string() + "' if it is the file";
+}
+
 /// The arguments in the order in which CLI11 takes them, the last one first. The file of --json is tied to it, for a flag
 /// takes no value of its own accord; no file that a command reads or makes ends as that one does.
 std::vector<std::string> with_json_files(int argc, char** argv) {
@@ -145,6 +164,8 @@ int run_program(int argc, char** argv) {
   add_experiments(app, session);
   add_compare(app, session);
   add_help(app, session);
+  if (const std::string sentence = misnamed_json_file({argv + 1, argv + argc}); !sentence.empty())
+    return fail(kUsage, sentence + "; see hermesh --help");
   for (int i = 1; i < argc; ++i) session.command_line += (i > 1 ? " " : "") + std::string(argv[i]);
   try {
     app.parse(with_json_files(argc, argv));

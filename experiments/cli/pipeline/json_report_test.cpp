@@ -93,6 +93,17 @@ TEST_F(JsonReportTest, GoesIntoAFileBesideTheSummaries) {
       1);
 }
 
+TEST_F(JsonReportTest, AFileThatEndsOtherwiseIsToldHowToBeNamed) {
+  write_cube();
+  const Outcome outcome = run({"validate", "cube.off", "--json", "summary.txt"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.err.find("write --json='summary.txt'"), std::string::npos) << outcome.err;
+  EXPECT_EQ(run({"validate", "cube.off", "--json=summary.txt"}).exit_code, 0);
+  EXPECT_EQ(Json::parse(read("summary.txt")).at("status"), "done");
+  // What is an input stays one.
+  EXPECT_EQ(run({"validate", "--json", "cube.off"}).exit_code, 0);
+}
+
 using OptionsTest = JsonReportTest;
 
 TEST_F(OptionsTest, ScaleIsAFactorToWorldUnits) {
