@@ -121,6 +121,7 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   print_summary(session, "proved: the mesh is within " + text(made.to_surface) +
                              " of the polygons' solid and that within " + text(made.from_surface) +
                              " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)");
+  note_components(mesh, made.mesh, session);
   save(paths.out, made.mesh, session);
   return kDone;
 }

@@ -253,6 +253,30 @@ TEST_F(CliTest, WatertightIncludesOriented) {
   EXPECT_EQ(Json::parse(outcome.out).at("watertight"), false);
 }
 
+/// Twenty beads on a string that is thinner than a voxel and lies between samples: one component, of which twenty are left.
+TEST_F(CliTest, ManyNewComponentsAreANote) {
+  std::string points, faces;
+  int rings = 0;
+  const auto ring = [&](double x, double half) {
+    for (const auto& [y, z] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
+      points += std::to_string(x) + " " + std::to_string(0.1 + half * y) + " " + std::to_string(0.1 + half * z) + "\n";
+    const int a = 4 * rings++;
+    for (int i = 0; i < 4 && a > 0; ++i)
+      faces += "4 " + std::to_string(a + i) + " " + std::to_string(a - 4 + i) + " " +
+               std::to_string(a - 4 + (i + 1) % 4) + " " + std::to_string(a + (i + 1) % 4) + "\n";
+  };
+  for (int bead = 0; bead < 20; ++bead) {
+    ring(2 * bead, 0.01), ring(2 * bead + 0.1, 0.5);
+    ring(2 * bead + 1.1, 0.5), ring(2 * bead + 1.2, 0.01);
+  }
+  faces += "4 3 2 1 0\n4 316 317 318 319\n";
+  write("beads.off", "OFF\n320 " + std::to_string(4 * 79 + 2) + " 0\n" + points + faces);
+  const Outcome outcome = run({"remesh", "beads.off", "out.ply", "--voxel-size", "0.23"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("note: the mesh has 20 components and the polygons have 1:"), std::string::npos) << outcome.err;
+  EXPECT_EQ(run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.2"}).err.find("components"), std::string::npos);
+}
+
 TEST_F(CliTest, InfoOfAMesh) {
   write_cube();
   const Outcome outcome = run({"info", "cube.off"});

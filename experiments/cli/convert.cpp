@@ -108,7 +108,9 @@ int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const Ex
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  save(paths.out, extract(paths, level_set, &mesh, chosen, extracting, session), session);
+  const PolygonMesh made = extract(paths, level_set, &mesh, chosen, extracting, session);
+  note_components(mesh, made, session);
+  save(paths.out, made, session);
   return kDone;
 }
 

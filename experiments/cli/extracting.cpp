@@ -1,5 +1,6 @@
 #include "experiments/cli/extracting.h"
 
+#include "algorithms/core/disjoint_sets.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/help/suggestions.h"
@@ -38,6 +39,34 @@ void print_extracted(Session& session, const PolygonMesh& mesh, const std::strin
                              std::to_string(mesh.triangles.size()) + " triangles, " +
                              std::to_string(mesh.quads.size()) + " quads, " + extractor + ", " +
                              seconds_text(seconds));
+}
+
+namespace {
+
+/// How many sets of polygons hang together by shared points.
+std::size_t count_components(const PolygonMesh& mesh) {
+  DisjointSets sets(mesh.points.size());
+  std::vector<bool> used(mesh.points.size());
+  const auto join = [&](const auto& polygons) {
+    for (const auto& polygon : polygons)
+      for (const std::uint32_t corner : polygon) used[corner] = true, sets.join(polygon[0], corner);
+  };
+  join(mesh.triangles);
+  join(mesh.quads);
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < sets.size(); ++i) count += used[i] && sets.find(i) == i;
+  return count;
+}
+
+}  // namespace
+
+void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Session& session) {
+  const std::size_t before = count_components(polygons), after = count_components(mesh);
+  if (after < 2 * before + 8) return;
+  session.context.note(
+      "the mesh has " + std::to_string(after) + " components and the polygons have " +
+      std::to_string(before) +
+      ": gaps and walls that are about as thin as a voxel came apart; smaller voxels mostly leave fewer");
 }
 
 void save(const std::string& path, const PolygonMesh& mesh, Session& session) {

@@ -24,6 +24,10 @@ ChosenExtractor choose_extractor(const ExtractorArguments& arguments);
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
                      double seconds);
 
+/// Notes that a mesh has many more components than the polygons that it was made from, in time and memory that are linear in
+/// both. A few more are nothing that a note is worth: polygons that cross are one solid, or several.
+void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Session& session);
+
 /// Writes the mesh; from then on a signal is too late.
 void save(const std::string& path, const PolygonMesh& mesh, Session& session);
 
