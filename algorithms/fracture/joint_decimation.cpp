@@ -28,7 +28,7 @@ void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context)
   if (tolerance <= 0 || mesh.triangles.empty()) return;
   // All patches are decimated as one mesh, so the proof that no two triangles meet holds across pieces, too.
   const FilePoints file(mesh.placement);
-  const FineMesh fine(mesh.points, mesh.triangles);
+  const FineMesh fine(mesh.points, mesh.triangles, context);
   // Where more than two triangles share an edge its ends lie on a rim, and rims are pinned: that is what
   // decimate_certified() asks of a complex of patches.
   const std::vector<float> asked(mesh.points.size(), static_cast<float>(tolerance));

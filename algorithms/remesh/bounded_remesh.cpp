@@ -182,7 +182,7 @@ class BoundedRemesher {
         voxel_size,
         surface_of(std::move(volume.boundary), turns_, options_.over_holes),
         file,
-        FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads)),
+        FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads), context_),
         {},
         file.placement().origin - mesh_.origin};
     if (result.surface.triangles.empty()) return std::nullopt;

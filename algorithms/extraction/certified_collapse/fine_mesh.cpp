@@ -32,7 +32,7 @@ void for_each_range(std::size_t points, F&& f) {
 
 }  // namespace
 
-FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles)
+FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles, const RunContext& context)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
   // `around_` has three entries for each triangle, which `first_` counts in 32 bits.
   if (triangles_.size() > kNone / 3)
@@ -40,6 +40,7 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
                 " triangles, more than can be merged; use larger voxels or tolerance 0");
   normals_.resize(triangles_.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles_.size(), 1024), [&](const auto& range) {
+    context.check();
     for (std::size_t t = range.begin(); t < range.end(); ++t) {
       if (triangles_[t][0] == kNone) continue;
       const Eigen::Vector3d &a = points_[triangles_[t][0]], &b = points_[triangles_[t][1]],
@@ -48,11 +49,14 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
     }
   });
   // Triangles by point: count, scan, fill, so that those around a point ascend.
+  constexpr std::uint32_t kBetweenChecks = 1 << 16;  // triangles, which are millions: all of them take tenths of a second
   const auto for_each_corner = [&](std::uint32_t first, std::uint32_t end, auto&& f) {
-    for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      if (t % kBetweenChecks == 0) context.check();
       if (triangles_[t][0] != kNone)
         for (const std::uint32_t p : triangles_[t])
           if (p >= first && p < end) f(p, t);
+    }
   };
   for_each_range(points_.size(), [&](std::uint32_t first, std::uint32_t end) {
     for_each_corner(first, end, [&](std::uint32_t p, std::uint32_t) { ++first_[p + 1]; });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/extraction/contact/triangle_contact.h"
 
 namespace hermesh {
@@ -19,8 +20,8 @@ class FineMesh {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
   /// Finds the normals of the triangles, those around each point and those beyond each side.
-  /// @throws Error if three times the triangles are more than 32 bits can number.
-  FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles);
+  /// @throws Error if three times the triangles are more than 32 bits can number; Cancelled.
+  FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles, const RunContext& context = RunContext());
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   const std::vector<Triangle>& triangles() const { return triangles_; }

@@ -10,7 +10,7 @@ namespace {
 CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
                                RunContext& context) {
   const FineMesh fine(std::move(uniform.points),
-                      all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})));
+                      all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})), context);
   std::vector<float> asked(fine.points().size());
   parallel_blocks(asked.size(), context,
                   [&](std::size_t i) { asked[i] = field.tolerance(fine.points()[i], tolerance); });

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -50,6 +51,14 @@ MergeForest pairs(const FineMesh& fine, const std::vector<std::array<std::uint32
     nodes.push_back(set(p, 0.5 * (fine.points()[p] + fine.points()[q]) + off * outwards));
   }
   return MergeForest(std::move(nodes), std::move(node_of));
+}
+
+TEST(FineMesh, ItsMakingEndsWhenTheWorkIsCancelled) {
+  const std::atomic<bool> cancel = true;
+  RunContext context;
+  context.cancel = &cancel;
+  const FineMesh fine = torus(8);
+  EXPECT_THROW(FineMesh(fine.points(), fine.triangles(), context), Cancelled);
 }
 
 TEST(MergeForest, SplitsIntoWhatWasJoined) {
