@@ -69,6 +69,7 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
   });
   across_.resize(triangles_.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points_.size(), 1024), [&](const auto& range) {
+    context.check();
     std::vector<Fan> fan;
     for (std::size_t p = range.begin(); p < range.end(); ++p) find_across(static_cast<std::uint32_t>(p), fan);
   });
