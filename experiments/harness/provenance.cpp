@@ -2,7 +2,6 @@
 
 #include <CGAL/version.h>
 #include <OpenMesh/Core/System/config.h>
-#include <embree3/rtcore_config.h>
 #include <openvdb/version.h>
 #include <sys/utsname.h>
 #include <tbb/global_control.h>
@@ -21,6 +20,7 @@
 #include "algorithms/core/error.h"
 #include "algorithms/lattice/simd/simd_level.h"
 #include "experiments/harness/shell.h"
+#include "experiments/pictures/embree.h"
 
 #ifndef HERMESH_BUILD_TYPE
 #define HERMESH_BUILD_TYPE "unknown"

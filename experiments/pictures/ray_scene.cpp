@@ -1,6 +1,5 @@
 #include "experiments/pictures/ray_scene.h"
 
-#include <embree3/rtcore.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -9,6 +8,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "experiments/pictures/embree.h"
 
 namespace hermesh {
 namespace {
@@ -129,9 +130,7 @@ struct Painter {
     ray.dir_x = direction.x(), ray.dir_y = direction.y(), ray.dir_z = direction.z();
     ray.tfar = distance;
     ray.mask = ~0u;
-    RTCIntersectContext intersection;
-    rtcInitIntersectContext(&intersection);
-    rtcOccluded1(scene, &intersection, &ray);
+    find_any_hit(scene, ray);
     return ray.tfar < 0.0f;
   }
 
@@ -187,9 +186,7 @@ struct Painter {
     hit.ray.tfar = std::numeric_limits<float>::infinity();
     hit.ray.mask = ~0u;
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    RTCIntersectContext intersection;
-    rtcInitIntersectContext(&intersection);
-    rtcIntersect1(scene, &intersection, &hit);
+    find_first_hit(scene, hit);
     if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return background(y);
 
     Vector3f normal = Vector3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
@@ -246,9 +243,7 @@ std::vector<Glimpse> RayScene::glimpses(const Camera& camera, const View& view, 
         hit.ray.tfar = std::numeric_limits<float>::infinity();
         hit.ray.mask = ~0u;
         hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        RTCIntersectContext intersection;
-        rtcInitIntersectContext(&intersection);
-        rtcIntersect1(machinery_->scene, &intersection, &hit);
+        find_first_hit(machinery_->scene, hit);
         if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
         Glimpse& glimpse = seen[static_cast<std::size_t>(row) * view.width + column];
         glimpse.hit = true;
