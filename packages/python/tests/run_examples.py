@@ -1,5 +1,6 @@
 """Runs the examples, and the script of the README, in a fresh virtual environment in which the wheel is installed, and compares
-what they print with the comments at their ends: run_examples.py WHEEL [--write]. With --write it writes these comments.
+what they print with the comments at their ends: run_examples.py WHEEL [--write]. With --write it writes these comments; with
+--installed in the wheel's place the environment sees the module of the distribution's package.
 
 The models of $HERMESH_DATA are used where they are; without them each example has shapes of its own, and another comment.
 """
@@ -35,10 +36,14 @@ with tempfile.TemporaryDirectory() as folder:
     python = os.path.join(folder, "bin", "python")
     environment = {key: value for key, value in os.environ.items() if key not in ("HERMESH_DATA", "PYTHONPATH")}
     environment["PYTHONIOENCODING"] = "utf-8"
-    run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", wheel], env=environment)
+    places = [folder, os.path.realpath(folder)]
+    if wheel == "--installed":
+        places = ["/usr/lib/python3/dist-packages"]
+    else:
+        run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", wheel], env=environment)
     where = run([python, "-c", "import hermesh; print(hermesh.__file__)"], env=environment, cwd=folder)
-    if not where.startswith(os.path.realpath(folder)) and not where.startswith(folder):
-        sys.exit(f"the module was not taken from the environment, but from {where}")
+    if not any(where.startswith(place) for place in places):
+        sys.exit(f"the module was not taken from {places[0]}, but from {where}")
 
     for example in sorted(ours.glob("examples/*.py")):
         source = example.read_text(encoding="utf-8")
