@@ -321,7 +321,7 @@ class Combination {
     if (both & (Code::offset(*of_a) == Code::offset(*of_b)))
       takes_b = rule_.template prefers_normal_of_b<Code>(*of_a, *of_b);
     const Crossing crossing = *(takes_b ? of_b : of_a);
-    return takes_b & rule_.turns_b() ? Code::negated(crossing) : crossing;
+    return (takes_b & rule_.turns_b()) ? Code::negated(crossing) : crossing;
   }
 
   BooleanRule rule_;

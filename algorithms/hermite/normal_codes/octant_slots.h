@@ -37,8 +37,9 @@ struct Projection {
   const float sum = x + y + z;
   // Floats that are not negative compare like their bits, and the bits of NaN are above those of infinity.
   const auto bits = std::bit_cast<std::int32_t>(sum);
-  const bool directed = (bits > std::bit_cast<std::int32_t>(kShortest)) &
-                        (bits < std::bit_cast<std::int32_t>(std::numeric_limits<float>::infinity()));
+  const bool long_enough = bits > std::bit_cast<std::int32_t>(kShortest);
+  const bool finite = bits < std::bit_cast<std::int32_t>(std::numeric_limits<float>::infinity());
+  const bool directed = long_enough & finite;
   const std::uint32_t mask = 0u - std::uint32_t(directed);
   const auto kept = [mask](float value, float otherwise) __attribute__((always_inline)) {
     return std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) & mask) |
