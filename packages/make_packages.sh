@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
-# Builds the Debian packages: packages/make_packages.sh [BUILD], build/packages unless said; an hour the first time, for the
-# objects of shared libraries are compiled anew. They lie in BUILD/debian in the end, and lintian, where it is installed, must
-# find no error in them.
+# Builds the Debian packages and the wheel: packages/make_packages.sh [BUILD], build/packages unless said; as long as the program
+# takes, or what ccache leaves of it. They lie in BUILD/debian in the end, and lintian, where it is installed, must find no error
+# in the packages. packages/check_clean_debian.sh tries them where nothing else is installed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:-build/packages}
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr -DBUILD_SHARED_LIBS=ON \
-  -DHERMESH_DEBIAN_PACKAGES=ON -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF
+  -DHERMESH_DEBIAN_PACKAGES=ON -DHERMESH_BUILD_PYTHON=ON -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF
 cmake --build "$build" -j "${JOBS:-$(nproc)}"
 rm -rf "$build/debian"
 # Packages hold what root owns and may not be written by the group, whoever builds them.
 (umask 022 && cd "$build" && cpack -G DEB -B debian)
 rm -rf "$build/debian/_CPack_Packages"
-ls -l "$build"/debian/*.deb
+cmake --build "$build" --target hermesh_wheel
+cp "$build"/packages/python/wheel/*.whl "$build/debian"
+ls -l "$build/debian"
 if command -v lintian > /dev/null; then
   lintian --allow-root --fail-on error "$build"/debian/*.deb
   echo "lintian: no error"

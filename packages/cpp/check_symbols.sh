@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# What shared libraries show: packages/cpp/check_symbols.sh LIBRARY...; an instant. Counts the names that each shows, and exits
+# with 1 where one is not public: another namespace's, or what the public functions share on the inside.
+set -euo pipefail
+for library in "$@"; do
+  names=$(nm -D --defined-only -C "$library" | sed -E 's/^[0-9a-f]* *[A-Za-z] //')
+  echo "symbols: $(wc -l <<< "$names") of $(basename "$library")"
+  others=$(grep -vE '^((typeinfo|vtable|typeinfo name) for )?hermesh::v1::|^HERMESH_1$' <<< "$names" || true)
+  others+=$(grep -E '^[^(]*(::Inside|std::|openvdb::)' <<< "$names" || true)
+  if [ -n "$others" ]; then echo "shown, but not public:"; head -20 <<< "$others"; exit 1; fi
+done
