@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Whether another program can be built against what is installed: packages/cpp/check_package.sh BUILD; a quarter of a minute.
+# Whether another program can be built against what is installed: packages/cpp/check_package.sh BUILD [--shared]; a quarter of a
+# minute. With --shared what is checked is a build of shared libraries alone beside BUILD, whose objects ccache has from BUILD.
 # Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them there, which
 # must take less than 20 s, and runs it; counts headers and symbols, and prints sizes. With shared libraries all that they show
 # must be public names. Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and says
@@ -7,6 +8,13 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 build=$1
+if [ "${2:-}" = --shared ]; then
+  # A folder as deep as the other, from where ccache knows the objects.
+  build=${build%/}_shared
+  { cmake -S ../.. -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=ON -DHERMESH_BUILD_PROGRAM=OFF \
+      -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_PYTHON=OFF && cmake --build "$build"; } > "$1/shared.log" 2>&1 ||
+    { tail -50 "$1/shared.log"; exit 1; }
+fi
 where=$build/package_check
 rm -rf "$where"
 mkdir -p "$where"

@@ -24,14 +24,17 @@
 #include "hermesh/options.h"
 #include "hermesh/volume.h"
 
+/// What lives in the public namespace and is not public: the shared libraries show that namespace, but for this.
+#define HERMESH_INNER __attribute__((visibility("hidden")))
+
 namespace hermesh::v1 {
 
-struct Mesh::Arrays {
+struct HERMESH_INNER Mesh::Arrays {
   PolygonMesh mesh;
 };
 
 /// Grants the sources of this folder what the public classes hold.
-struct Inside {
+struct HERMESH_INNER Inside {
   static const PolygonMesh& polygons(const Mesh& mesh) { return mesh.arrays_->mesh; }
   static Mesh mesh(PolygonMesh&& polygons) {
     return Mesh(std::make_shared<const Mesh::Arrays>(Mesh::Arrays{std::move(polygons)}));
@@ -125,7 +128,7 @@ auto run(Work&& work) {
 }
 
 /// A method of a table as the public functions list it.
-MethodInfo method_info(const std::string& name, const std::string& summary,
-                       const std::vector<OptionSpec>& options);
+HERMESH_INNER MethodInfo method_info(const std::string& name, const std::string& summary,
+                                     const std::vector<OptionSpec>& options);
 
 }  // namespace hermesh::v1

@@ -7,7 +7,7 @@
 
 namespace hermesh::v1 {
 
-struct Solid::Data {
+struct HERMESH_INNER Solid::Data {
   Volume level_set;
   FloatHermite hermite;
 };

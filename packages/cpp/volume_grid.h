@@ -6,7 +6,7 @@
 
 namespace hermesh::v1 {
 
-struct Volume::Grid {
+struct HERMESH_INNER Volume::Grid {
   openvdb::GridBase::ConstPtr grid;
   LevelSet level_set;  ///< the same grid, where it is of floats
   std::string name;
