@@ -18,7 +18,7 @@ constexpr double kHopeless = 2.0;
 /// What the mean squared distance of the new point to the planes may be in a bold collapse, in tolerances squared:
 /// nothing else is asked of distances there. (With 0.3 the proof takes back a third of what is collapsed, with 0.03 nearly all is
 /// left to careful collapses, which cost five times as much each.)
-constexpr double kBold = 0.1;
+constexpr double kBold = 0.12;
 
 /// Collapses edges of a cube, cheapest first. The heap may hold proposals that are out of date: the versions of their
 /// ends tell.

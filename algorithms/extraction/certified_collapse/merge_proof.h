@@ -45,8 +45,7 @@ class MergeProof {
   const MergedMesh& prove();
 
   const MergedMesh& merged() const { return merged_; }
-  /// By point of the fine mesh, 1 for points of the merged mesh that splits have brought back in the last
-  /// call.
+  /// Flags by point of the fine mesh: 1 for points of the merged mesh that splits have brought back in the last call.
   std::span<const std::uint8_t> brought_back() const { return brought_back_; }
 
  private:
