@@ -44,17 +44,6 @@ Times times(const Soup& soup) {
   return {processor_seconds([&] { voxelize(soup.mesh, {.voxel_size = soup.voxel_size}, context); }), openvdb};
 }
 
-TEST(SoupSpeed, NoSmallSoupTakesTwentyTimesAsLongAsOpenVDB) {
-  initialize_openvdb();
-  for (std::uint64_t seed = 1000, done = 0; done < 2; ++seed) {
-    const Soup soup = test::soup(seed);
-    if (soup.mesh.triangles.size() > 1000) continue;  // seconds each
-    const Times t = times(soup);
-    EXPECT_LT(t.ratio(), 20.0) << soup.name << ", seed " << seed << ": " << t.ours << " s and " << t.openvdb << " s";
-    ++done;
-  }
-}
-
 /// Prints a curve, too: the number of triangles of each soup, and the seconds of either voxelizer.
 TEST(Slow, TwoHundredSoupsTakeNoMoreThanTwentyTimesWhatOpenVDBTakes) {
   initialize_openvdb();
