@@ -29,6 +29,7 @@ if [ -z "${HERMESH_OWN_MOUNTS:-}" ]; then
   HERMESH_OWN_MOUNTS=1 exec unshare --mount --propagation private "$(realpath "$0")" "$@"
 fi
 root=$(mktemp -d "${TMPDIR:-/tmp}/hermesh_debian.XXXXXX")
+chmod 755 "$root"  # its users look for their commands in it
 clean_up() {
   umount "$root/proc" 2> /dev/null || true
   rm -rf --one-file-system "$root"
