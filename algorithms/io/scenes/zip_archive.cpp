@@ -184,9 +184,9 @@ ZipWriter::~ZipWriter() {
 
 namespace {
 
-/// Appends a number of so many bytes, little-endian.
+/// Appends a number of so many bytes, of which there may be more than it has, little-endian.
 void put(std::string& to, std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) to += static_cast<char>(value >> (8 * i) & 0xff);
+  for (int i = 0; i < bytes; ++i, value >>= 8) to += static_cast<char>(value & 0xff);
 }
 
 /// Packs bytes, and appends what comes out.
