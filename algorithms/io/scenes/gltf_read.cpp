@@ -1,12 +1,12 @@
 // glTF 2.0 (Khronos 2017, ISO/IEC 12113). The JSON is parsed by nlohmann's library; every index, count and
 // offset in it is held against what is there before it is followed, because no library for glTF does that for
 // accessors.
-#include <bit>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "algorithms/io/scenes/gltf_buffers.h"
+#include "algorithms/io/scenes/gltf_numbers.h"
 #include "algorithms/io/scenes/scene_files.h"
 #include "algorithms/io/scenes/scene_part.h"
 
@@ -15,69 +15,6 @@ namespace hermesh::mesh_formats {
 namespace {
 
 using Json = nlohmann::json;
-
-// The numbers are constants of OpenGL, to which a renderer hands the buffers as they are.
-/// Component types of accessors, by the numbers of OpenGL.
-enum Component : std::size_t {
-  kByte = 5120,
-  kUnsignedByte = 5121,
-  kShort = 5122,
-  kUnsignedShort = 5123,
-  kUnsignedInt = 5125,
-  kFloat = 5126
-};
-
-/// Bytes of a number of a component type; 0 for a number that is none.
-std::size_t size_of(std::size_t component) {
-  switch (component) {
-    case kByte:
-    case kUnsignedByte:
-      return 1;
-    case kShort:
-    case kUnsignedShort:
-      return 2;
-    case kUnsignedInt:
-    case kFloat:
-      return 4;
-    default:
-      return 0;
-  }
-}
-
-/// A number at any address, in the order of bytes that the format has on all machines.
-template <class T>
-T little_endian(const char* at) {
-  std::array<char, sizeof(T)> bytes;
-  std::memcpy(bytes.data(), at, sizeof(T));
-  if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
-  return std::bit_cast<T>(bytes);
-}
-
-/// A number of an accessor. Double precision holds all values of all of these types.
-double number_at(const char* at, std::size_t component) {
-  switch (component) {
-    case kByte:
-      return little_endian<std::int8_t>(at);
-    case kUnsignedByte:
-      return little_endian<std::uint8_t>(at);
-    case kShort:
-      return little_endian<std::int16_t>(at);
-    case kUnsignedShort:
-      return little_endian<std::uint16_t>(at);
-    case kUnsignedInt:
-      return little_endian<std::uint32_t>(at);
-    default:
-      return little_endian<float>(at);
-  }
-}
-
-/// The largest value of a type of whole numbers, which stands for 1 where they are normalized.
-double largest_of(std::size_t component) {
-  return component == kByte           ? 127.0
-         : component == kUnsignedByte ? 255.0
-         : component == kShort        ? 32767.0
-                                      : 65535.0;
-}
 
 /// Elements that lie in a buffer at equal distances.
 struct Elements {
