@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 

@@ -5,9 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
+#include "algorithms/core/bounds.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/mesh_attribute.h"
 
@@ -36,20 +36,6 @@ struct PolygonMesh {
 
 /// All polygons as triangles: the triangles first, then each quad (a,b,c,d) as abc and acd.
 std::vector<Triangle> triangulated(const PolygonMesh& mesh);
-
-/// Axis-aligned box in world units; empty when no point was added.
-struct Bounds {
-  Eigen::Vector3d lower = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector3d upper = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
-  void add(const Eigen::Vector3d& point) {
-    lower = lower.cwiseMin(point);
-    upper = upper.cwiseMax(point);
-  }
-  bool empty() const { return (lower.array() > upper.array()).any(); }
-  Eigen::Vector3d size() const {
-    return empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(upper - lower);
-  }
-};
 
 /// Box of the points that a polygon uses: a scan file may hold stray points that no polygon refers to.
 Bounds bounds(const PolygonMesh& mesh);

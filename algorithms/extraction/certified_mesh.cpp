@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/hermite/with_normal_code.h"
@@ -134,25 +135,36 @@ PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, con
   return in_world(std::move(polygons), file, context);
 }
 
-std::vector<OptionSpec> tolerance_options() {
-  return {{.name = "tolerance",
-           .fallback = "0.1",
-           .help = "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
-                   "gives fewer polygons, 0 the uniform mesh itself",
-           .maximum = 1e6,
-           .only_with = {"tolerance_world=0"}},
-          {.name = "tolerance_world",
-           .fallback = "0",
-           .help = "the same in world units, instead of tolerance where it is greater than 0",
-           .maximum = 1e30}};
+namespace {
+
+/// The bound that a user asks for.
+struct AskedTolerance {
+  double voxels = 0.1;
+  double world = 0.0;  ///< world units; in place of the voxels where it is greater than 0
+};
+
+const OptionTable<AskedTolerance>& tolerance_table() {
+  static const auto table =
+      OptionTable<AskedTolerance>()
+          .number("tolerance", &AskedTolerance::voxels, {.maximum = 1e6},
+                  "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
+                  "gives fewer polygons, 0 the uniform mesh itself",
+                  {"tolerance_world=0"})
+          .number("tolerance_world", &AskedTolerance::world, {.maximum = 1e30},
+                  "the same in world units, instead of tolerance where it is greater than 0");
+  return table;
 }
+
+}  // namespace
+
+std::vector<OptionSpec> tolerance_options() { return tolerance_table().specs(); }
 
 PolygonMesh contour_certified(const ExtractionInput& input, std::string_view name, bool needs_normals,
                               const std::function<PolygonMesh(const HermiteView&, double)>& contour) {
-  const double asked = input.options.number("tolerance"), world = input.options.number("tolerance_world");
+  const AskedTolerance asked = tolerance_table().read(input.options);
   const auto contoured = [&](const HermiteView& grid) {
     // The bound is proved in index space, whatever units it was asked for in.
-    return contour(grid, world > 0 ? world / longest_step(grid.placement()) : asked);
+    return contour(grid, asked.world > 0 ? asked.world / longest_step(grid.placement()) : asked.voxels);
   };
   // Packed data are decoded where they are read, by code that is compiled for their normal code; all other
   // representations are floats by now.

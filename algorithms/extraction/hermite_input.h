@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "algorithms/core/variant.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/representation.h"
 
 namespace hermesh {

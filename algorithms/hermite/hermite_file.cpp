@@ -7,7 +7,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/io/vdb_archive.h"
-#include "algorithms/hermite/dense_tree.h"
+#include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/sign_tree.h"
 
 namespace hermesh {

@@ -18,7 +18,7 @@
 #include <string>
 #include <variant>
 
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 

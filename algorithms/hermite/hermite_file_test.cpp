@@ -8,7 +8,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/io/vdb_file.h"
-#include "algorithms/hermite/dense_tree.h"
+#include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/test_lattice.h"
 
 namespace hermesh {

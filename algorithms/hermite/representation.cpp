@@ -1,7 +1,7 @@
 #include "algorithms/hermite/representation.h"
 
 #include "algorithms/core/run_context.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 namespace {

@@ -32,7 +32,7 @@ struct ValueLayout {
 };
 
 /// Layout of a type of tree, null for one that is not known here. Leaves of bools hold two masks and leaves of masks
-/// one; our own types of Hermite data are as large as their voxels (hermite/voxels.h).
+/// one; our own types of Hermite data are as large as their voxels (hermite/dense/voxels.h).
 const ValueLayout* layout_of(const std::string& type) {
   using Leaf = ValueLayout::Leaf;
   static const std::map<std::string, ValueLayout> known = {{"bool", {1, 0, Leaf::truths}},

@@ -134,7 +134,7 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
 }
 
 /// What the estimates of blocks of any size share.
-struct Extent {
+struct BandSize {
   double surface;         ///< area in faces of voxels
   double thickness;       ///< thickness of the band, voxels
   Eigen::Vector3d sides;  ///< sides of the box around the band, voxels
@@ -148,16 +148,16 @@ struct Blocks {
 /// A plane layer of thickness t with unit normal n meets (e |n|₁ + t) / e³ blocks of edge e a unit of area,
 /// and |n|₁ is 3/2 on average over all directions. Blocks with points beyond those that the area explains are
 /// small scattered pieces, each of which costs as much as a point's ball. The box is the upper limit.
-Blocks count_blocks(double with_points, const Extent& extent, double edge) {
+Blocks count_blocks(double with_points, const BandSize& layer, double edge) {
   const double volume = edge * edge * edge;
   // Blocks with points that the area explains: those that a layer without thickness meets (t = 0).
-  const double bare = extent.surface * 1.5 * edge / volume;
+  const double bare = layer.surface * 1.5 * edge / volume;
   Blocks blocks;
-  blocks.along_surface = extent.surface * (1.5 * edge + extent.thickness) / volume;
+  blocks.along_surface = layer.surface * (1.5 * edge + layer.thickness) / volume;
   blocks.scattered = std::max(0.0, with_points - bare);
-  const double box = ((extent.sides / edge).array() + 1.0).prod();
+  const double box = ((layer.sides / edge).array() + 1.0).prod();
   blocks.all =
-      std::min(box, blocks.along_surface + blocks.scattered * std::pow(edge + extent.thickness, 3) / volume);
+      std::min(box, blocks.along_surface + blocks.scattered * std::pow(edge + layer.thickness, 3) / volume);
   return blocks;
 }
 
@@ -232,22 +232,22 @@ BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double 
                       double exterior_band, double interior_band) {
   // The band lies around the surface on both sides, and one more sample where its ends fall between samples.
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
-  const Extent extent{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
+  const BandSize layer{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
                       measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
 
   BandEstimate estimate;
   const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
-  const Blocks leaves = count_blocks(small, extent, 8.0);
+  const Blocks leaves = count_blocks(small, layer, 8.0);
   estimate.leaves = leaves.all;
   // The least of three counts: the filled box, all samples of the leaves, and the band's own
   // volume with scattered pieces.
   // A piece far below a voxel is a ball of the exterior band's radius.
   const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
   estimate.active_voxels = std::min(
-      {extent.sides.prod(), 512.0 * leaves.all, extent.thickness * extent.surface + leaves.scattered * ball});
+      {layer.sides.prod(), 512.0 * leaves.all, layer.thickness * layer.surface + leaves.scattered * ball});
   // Eight upper nodes meet at the grid's origin, where most meshes lie.
-  estimate.grid_bytes = kLeafBytes * leaves.all + kMiddleBytes * count_blocks(middle, extent, 128.0).all +
-                        kUpperBytes * (8.0 + count_blocks(large, extent, 4096.0).all);
+  estimate.grid_bytes = kLeafBytes * leaves.all + kMiddleBytes * count_blocks(middle, layer, 128.0).all +
+                        kUpperBytes * (8.0 + count_blocks(large, layer, 4096.0).all);
   estimate.peak_bytes = kPeakOverGrid * estimate.grid_bytes;
   return estimate;
 }

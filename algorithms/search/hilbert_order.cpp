@@ -9,6 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include "algorithms/core/bounds.h"
+
 namespace hermesh {
 namespace {
 
@@ -21,11 +23,6 @@ constexpr std::size_t kCrowded = 32;     ///< triangles in a cell beyond which i
 using SortKey = std::uint64_t;
 // One array an axis, so that a loop over a batch reads and writes vectors.
 using Cells = std::array<std::array<std::uint32_t, kBatch>, 3>;
-
-struct Box {
-  Eigen::Vector3f lower = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Vector3f upper = -lower;
-};
 
 /// Cell coordinates to place along the curve, in place and transposed: the code's bits are those of x, y and
 /// z in turn (Skilling, Programming the Hilbert Curve, AIP Conf. Proc. 707, 2004). Without branches, over
@@ -105,7 +102,7 @@ class CurveSorter {
   /// Sorts keys along a curve through the cube that holds the centers of their triangles. They come in order of
   /// triangle number, and of equal codes the lower number stays first.
   void sort(std::span<SortKey> keys) const {
-    const Box box = bounds_of_centres(keys);
+    const BoundsOf<float> box = bounds_of_centres(keys);
     const double side = (box.upper.cast<double>() - box.lower.cast<double>()).maxCoeff();
     if (!(side > 0)) return;  // keys of equal code are in order of number already
     // Half a cell less than the cube holds, so that the farthest center lies in the last cell however the product is
@@ -131,20 +128,15 @@ class CurveSorter {
     return 0.5f * a.cwiseMin(b).cwiseMin(c) + 0.5f * a.cwiseMax(b).cwiseMax(c);
   }
 
-  Box bounds_of_centres(std::span<const SortKey> keys) const {
+  BoundsOf<float> bounds_of_centres(std::span<const SortKey> keys) const {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, keys.size(), kChunk), Box(),
-        [&](const tbb::blocked_range<std::size_t>& range, Box box) {
-          for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const Eigen::Vector3f c = centre(keys[i]);
-            box.lower = box.lower.cwiseMin(c);
-            box.upper = box.upper.cwiseMax(c);
-          }
+        tbb::blocked_range<std::size_t>(0, keys.size(), kChunk), BoundsOf<float>(),
+        [&](const tbb::blocked_range<std::size_t>& range, BoundsOf<float> box) {
+          for (std::size_t i = range.begin(); i < range.end(); ++i) box.add(centre(keys[i]));
           return box;
         },
-        [](Box a, const Box& b) {
-          a.lower = a.lower.cwiseMin(b.lower);
-          a.upper = a.upper.cwiseMax(b.upper);
+        [](BoundsOf<float> a, const BoundsOf<float>& b) {
+          a.add(b);
           return a;
         });
   }

@@ -52,7 +52,7 @@ class VisitStack {
  public:
   struct Visit {
     double squared;
-    TriangleTree::BoxRef ref;
+    TriangleTree::Node ref;
   };
   bool empty() const { return size_ == 0; }
   Visit pop() { return visits_[--size_]; }

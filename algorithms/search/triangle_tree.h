@@ -35,7 +35,7 @@ class TriangleTree {
     float lower[3][kFan], upper[3][kFan];
   };
   /// A box by its number (pack * kFan + lane) and its level; boxes of level 0 are the leaves.
-  struct BoxRef {
+  struct Node {
     std::uint32_t box, level;
   };
 
@@ -68,7 +68,7 @@ class TriangleTree {
         for (int a = 0; a < 3; ++a)
           meets &= pack.lower[a][k] * scale_ <= high[a] && pack.upper[a][k] * scale_ >= low[a];
         if (!meets) continue;
-        const BoxRef box{static_cast<std::uint32_t>(number * kFan + k), level};
+        const Node box{static_cast<std::uint32_t>(number * kFan + k), level};
         if (level > 0)
           packs.push_back({child_pack(box), level - 1});
         else
@@ -93,7 +93,7 @@ class TriangleTree {
   /// First pack of a level; the packs of a level are consecutive, level 0 first, the root's pack last.
   std::size_t first_pack(std::size_t level) const { return first_[level]; }
   /// The pack that holds the children of a box above level 0.
-  std::size_t child_pack(BoxRef ref) const {
+  std::size_t child_pack(Node ref) const {
     return first_[ref.level - 1] + (ref.box - first_[ref.level] * kFan);
   }
   /// Numbers of the triangles in a leaf; none for a leaf past the end.

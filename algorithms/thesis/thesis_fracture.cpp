@@ -9,7 +9,7 @@
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "algorithms/fracture/labelled_solid.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 
 namespace hermesh {
 namespace {

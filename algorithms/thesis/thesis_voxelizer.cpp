@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
@@ -139,46 +140,33 @@ bool has_inside(const thesis::Band& band) {
   return 100 * (set - outside) > set;
 }
 
+/// The options that set ThesisVoxelizerOptions.
+const OptionTable<ThesisVoxelizerOptions>& option_table() {
+  using Options = ThesisVoxelizerOptions;
+  static const auto table =
+      OptionTable<Options>()
+          .number("sign_angle", &Options::sign_angle, {.minimum = 1e-6, .maximum = 180.0},
+                  "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; larger makes "
+                  "more outside",
+                  {"signs=flood-fill"})
+          // A seed is a whole number of up to 1e15, which a double holds exactly.
+          .number("shuffle_seed", &Options::shuffle_seed, {.maximum = 1e15},
+                  "takes the triangles in a random order with this seed; 0 in that of the mesh")
+          .choice("signs", &Options::signs, {{"flood-fill", true}, {"unsigned", false}},
+                  "stage 3: flood-fill from outside and angles (§5.3), or unsigned distances")
+          .choice("clean_up", &Options::clean_up, {{"true", true}, {"false", false}},
+                  "stage 4: whether voxels that self-intersections left inside are removed (§5.4)", {"signs=flood-fill"})
+          .choice("expansion", &Options::expansion, {{"true", true}, {"false", false}},
+                  "stage 5: whether the band is expanded to its widths (§5.5); else it is about a voxel wide to either "
+                  "side, or less where less is asked for");
+  return table;
+}
+
 }  // namespace
 
-std::vector<OptionSpec> thesis_voxelizer_options() {
-  return {{.name = "sign_angle",
-           .fallback = "90",
-           .help = "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
-                   "larger makes more outside",
-           .minimum = 1e-6,
-           .maximum = 180.0,
-           .only_with = {"signs=flood-fill"}},
-          {.name = "shuffle_seed",
-           .fallback = "0",
-           .help = "takes the triangles in a random order with this seed; 0 in that of the mesh",
-           .maximum = 1e15},
-          {.name = "signs",
-           .fallback = "flood-fill",
-           .help = "stage 3: flood-fill from outside and angles (§5.3), or unsigned distances",
-           .choices = {"flood-fill", "unsigned"}},
-          {.name = "clean_up",
-           .fallback = "true",
-           .help = "stage 4: whether voxels that self-intersections left inside are removed (§5.4)",
-           .choices = {"true", "false"},
-           .only_with = {"signs=flood-fill"}},
-          {.name = "expansion",
-           .fallback = "true",
-           .help = "stage 5: whether the band is expanded to its widths (§5.5); else it is about a voxel wide to either "
-                   "side, or less where less is asked for",
-           .choices = {"true", "false"}}};
-}
+std::vector<OptionSpec> thesis_voxelizer_options() { return option_table().specs(); }
 
-ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) {
-  ThesisVoxelizerOptions result;
-  result.sign_angle = options.number("sign_angle");
-  // A seed is a whole number of up to 1e15, which a double holds exactly.
-  result.shuffle_seed = std::uint64_t(options.number("shuffle_seed"));
-  result.signs = options.is("signs", "flood-fill");
-  result.clean_up = options.is("clean_up", "true");
-  result.expansion = options.is("expansion", "true");
-  return result;
-}
+ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) { return option_table().read(options); }
 
 Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options, bool nearest) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);

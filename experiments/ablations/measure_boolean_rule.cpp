@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "experiments/ablations/boolean_rule.h"

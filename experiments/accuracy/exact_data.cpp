@@ -2,6 +2,7 @@
 
 #include <openvdb/tools/SignedFloodFill.h>
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -17,12 +18,9 @@ using Eigen::Vector3d;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 /// Samples that hold the shape, with `margin` more on each side.
-struct LatticeBox {
-  std::array<std::int32_t, 3> lower, upper;
-};
-LatticeBox lattice_box(const PlacedShape& shape, double voxel_size, int margin) {
+BoundsOf<std::int32_t> lattice_box(const PlacedShape& shape, double voxel_size, int margin) {
   const Bounds box = shape.bounds();
-  LatticeBox result{};
+  BoundsOf<std::int32_t> result;
   for (int a = 0; a < 3; ++a) {
     result.lower[a] = std::int32_t(std::floor(box.lower[a] / voxel_size)) - margin;
     result.upper[a] = std::int32_t(std::ceil(box.upper[a] / voxel_size)) + margin;
@@ -38,7 +36,7 @@ LevelSet exact_level_set(const PlacedShape& shape, double voxel_size, double hal
   if (reach > shape.shape().exact_within())
     throw Error(
         "the shape does not know distances as large as the band at this voxel size; use smaller voxels");
-  const LatticeBox box = lattice_box(shape, voxel_size, int(std::ceil(half_width)) + 2);
+  const BoundsOf<std::int32_t> box = lattice_box(shape, voxel_size, int(std::ceil(half_width)) + 2);
   std::vector<openvdb::Coord> blocks;
   const auto first = [](std::int32_t index) { return index & ~7; };
   for (std::int32_t x = first(box.lower[0]); x <= box.upper[0]; x += 8)
@@ -79,11 +77,12 @@ LevelSet exact_level_set(const PlacedShape& shape, double voxel_size, double hal
 }
 
 FloatHermite exact_hermite(const PlacedShape& shape, const LevelSet& level_set, RunContext& context) {
-  const LatticeBox box = lattice_box(shape, level_set.voxel_size(), 4);
+  const BoundsOf<std::int32_t> box = lattice_box(shape, level_set.voxel_size(), 4);
   const AnalyticSurface surface = {
       .value = [&](const Vector3d& p) { return shape.bounded_distance(p); },
       .gradient = [&](const Vector3d& p) -> Vector3d { return shape.nearest(p).normal; }};
-  return sample_function(surface, placement_of(*level_set.grid().grid), box.lower, box.upper, 1e-9, context);
+  const auto sample = [](const Eigen::Vector3i& at) { return std::array{at[0], at[1], at[2]}; };
+  return sample_function(surface, placement_of(*level_set.grid().grid), sample(box.lower), sample(box.upper), 1e-9, context);
 }
 
 BandErrors band_errors(const PlacedShape& shape, const LevelSet& level_set, double near,

@@ -6,7 +6,7 @@
 
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"

@@ -5,7 +5,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/lattice/memory_estimate.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/measure.h"

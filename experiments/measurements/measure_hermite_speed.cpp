@@ -10,7 +10,7 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"

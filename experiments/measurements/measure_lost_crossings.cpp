@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/measurements/measurements.h"
 

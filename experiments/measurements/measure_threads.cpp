@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "experiments/cases/cases.h"
 #include "experiments/fracture/fracture_run.h"

@@ -6,7 +6,7 @@
 //      `Measurement NAME_measurement()`: the name, the parameters with their defaults and ranges, the tables
 //      with what their columns mean, and that function. Add the file to experiments/CMakeLists.txt.
 //   2. Declare it at the end of this header, and enter it in the table in measurements.cpp.
-//   3. Write experiments/NAME.toml; normal_codes.toml explains the keys.
+//   3. Write experiments/questions/thesis/NAME.toml, or in the folder of another subject; normal_codes.toml explains the keys.
 // For that it gets rows with commit, machine, seed and parameters, `hermesh run`, `hermesh report` in all its
 // formats, and the plots that its file asks for.
 #pragma once

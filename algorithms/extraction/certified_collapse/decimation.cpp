@@ -39,7 +39,7 @@ struct Entry {
 /// One round: the mesh divided among cubes of one size, each done by one thread.
 class Round {
  public:
-  Round(DecimatedMesh& mesh, const Box3& box, double side, RunContext& context)
+  Round(DecimatedMesh& mesh, const Bounds& box, double side, RunContext& context)
       : mesh_(mesh), side_(side), start_(box.lower - Vector3d::Constant(kDisplacement * side)) {
     // Sorted by cube and then by number: each cube sees its triangles in one order.
     file_triangles(context);
@@ -91,7 +91,7 @@ class Round {
   template <class F>
   void for_each_cube(std::size_t t, F&& f) const {
     if (!mesh_.alive(t)) return;
-    Box3 box;
+    Bounds box;
     for (const std::uint32_t p : mesh_.triangles[t]) box.add(mesh_.points[p]);
     // By box: more cubes than the triangle touches, but never fewer.
     const DecimationCube::Index low = DecimationCube::index_of(box.lower, start_, side_),
@@ -203,7 +203,7 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<con
   DecimatedMesh mesh = begin(forest, merged, where, fine, tolerance, context);
   mesh.pinned = pinned;
   if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
-  Box3 box;
+  Bounds box;
   for (const Vector3d& p : merged.mesh->points()) box.add(p);
   // No edge is longer than the box's diagonal.
   const double largest = (box.upper - box.lower).norm();

@@ -323,7 +323,7 @@ void MergeProof::prove(std::uint32_t t, Proof what) {
 void MergeProof::look_at_contacts() {
   const FineMesh& mesh = *merged_.mesh;
   const std::size_t n = mesh.triangles().size();
-  std::vector<Box3> boxes(n);
+  std::vector<Bounds> boxes(n);
   for (std::uint32_t t = 0; t < n; ++t)
     for (const Vector3d& p : mesh.corners(t)) boxes[t].add(p);
   const TriangleGrid grid(boxes);

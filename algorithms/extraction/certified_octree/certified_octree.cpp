@@ -1,5 +1,6 @@
 #include "algorithms/extraction/certified_octree/certified_octree.h"
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/certified_mesh.h"
 #include "algorithms/extraction/certified_octree/region_mesh.h"
@@ -51,10 +52,27 @@ PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptio
   return finished(as_they_are(std::move(uniform)), at_points, file, context);
 }
 
+namespace {
+
+/// The options that the octree has beyond those of all certified extractors.
+const OptionTable<CertifiedOctreeOptions>& option_table() {
+  using Options = CertifiedOctreeOptions;
+  static const auto table =
+      OptionTable<Options>()
+          .number("flatness", &Options::flatness, {.maximum = 1e6},
+                  "how far a cube's point may be from the planes of its crossings, in voxels, root mean square, if "
+                  "tolerance allows more; 0 for what tolerance allows")
+          .choice("largest_cube", &Options::largest_cube, {{"8", 8}, {"4", 4}, {"2", 2}},
+                  "cells a side of the largest cubes; where flatness is below 0.2 or so, 4 is as fast as 8, and "
+                  "nearer");
+  return table;
+}
+
+}  // namespace
+
 PolygonMesh certified_octree(const ExtractionInput& input) {
-  CertifiedOctreeOptions options{.flatness = input.options.number("flatness"),
-                                 .largest_cube = std::stoi(input.options.text("largest_cube")),
-                                 .uniform = read_placement_options(input)};
+  CertifiedOctreeOptions options = option_table().read(input.options);
+  options.uniform = read_placement_options(input);
   return contour_certified(input, "certified-octree",
                            options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
@@ -65,16 +83,7 @@ PolygonMesh certified_octree(const ExtractionInput& input) {
 
 std::vector<OptionSpec> certified_octree_options() {
   std::vector<OptionSpec> options = tolerance_options();
-  options.push_back({.name = "flatness",
-                     .fallback = "0",
-                     .help = "how far a cube's point may be from the planes of its crossings, in voxels, root mean square, if "
-                             "tolerance allows more; 0 for what tolerance allows",
-                     .maximum = 1e6});
-  options.push_back({.name = "largest_cube",
-                     .fallback = "8",
-                     .help = "cells a side of the largest cubes; where flatness is below 0.2 or so, 4 is as fast as 8, and "
-                             "nearer",
-                     .choices = {"8", "4", "2"}});
+  for (OptionSpec& option : option_table().specs()) options.push_back(std::move(option));
   for (OptionSpec& option : dual_contouring_options())
     if (option.name != "reach") options.push_back(std::move(option));
   return options;

@@ -30,15 +30,15 @@ std::array<std::int64_t, 3> cube_at(const Eigen::Vector3d& place) {
 
 /// Calls f(number) for the cubes that a box touches.
 template <class F>
-void for_each_place(const Box3& box, F&& f) {
+void for_each_place(const Bounds& box, F&& f) {
   const std::array<std::int64_t, 3> first = cube_at(box.lower), last = cube_at(box.upper);
   for (std::int64_t x = first[0]; x <= last[0]; ++x)
     for (std::int64_t y = first[1]; y <= last[1]; ++y)
       for (std::int64_t z = first[2]; z <= last[2]; ++z) f(number_of({x, y, z}));
 }
 
-Box3 box_of(const NamedPolygon& polygon) {
-  Box3 box;
+Bounds box_of(const NamedPolygon& polygon) {
+  Bounds box;
   for (int i = 0; i < polygon.corners; ++i) box.add(polygon.points[static_cast<std::size_t>(i)]);
   return box;
 }
@@ -48,7 +48,7 @@ Box3 box_of(const NamedPolygon& polygon) {
 struct Half {
   NamedTriangle triangle;
   std::array<bool, 3> settled;
-  Box3 box;
+  Bounds box;
   Half(const NamedPolygon& polygon, int half) {
     const std::array<std::size_t, 3> corners = {0, static_cast<std::size_t>(half + 1),
                                                 static_cast<std::size_t>(half + 2)};
@@ -96,7 +96,7 @@ bool may_meet(const NamedPolygon& a, const NamedPolygon& b) {
 
 }  // namespace
 
-LoosePolygons::ByPlace::ByPlace(std::span<const Box3> boxes, const RunContext& context) {
+LoosePolygons::ByPlace::ByPlace(std::span<const Bounds> boxes, const RunContext& context) {
   // Count, scan, fill, and a sort that makes one order of them, whoever was first.
   std::vector<std::uint64_t> starts(boxes.size());
   parallel_blocks(boxes.size(), context,
@@ -129,7 +129,7 @@ std::size_t LoosePolygons::ByPlace::slot_of(std::uint64_t place) const {
 }
 
 template <class F>
-void LoosePolygons::ByPlace::for_each_near(const Box3& box, F&& f) const {
+void LoosePolygons::ByPlace::for_each_near(const Bounds& box, F&& f) const {
   for_each_place(box, [&](std::uint64_t place) {
     const Range& range = ranges_[slot_of(place)];
     for (std::uint32_t i = range.first; i < range.end; ++i) f(entries_[i].polygon, place);
@@ -139,7 +139,7 @@ void LoosePolygons::ByPlace::for_each_near(const Box3& box, F&& f) const {
 LoosePolygons::LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& context)
     : polygons_(std::move(tested)),
       boxes_([&] {
-        std::vector<Box3> boxes(polygons_.size());
+        std::vector<Bounds> boxes(polygons_.size());
         parallel_blocks(boxes.size(), context, [&](std::size_t i) { boxes[i] = box_of(polygons_[i]); });
         return boxes;
       }()),
@@ -161,7 +161,7 @@ struct LoosePolygons::Near {
     for (auto* sides : {&lower, &upper})
       for (std::vector<float>& side : *sides) side.clear();
   }
-  void add(std::uint32_t polygon, const Box3& box) {
+  void add(std::uint32_t polygon, const Bounds& box) {
     polygons.push_back(polygon);
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<std::size_t>(axis);
@@ -171,7 +171,7 @@ struct LoosePolygons::Near {
   }
   /// Calls f(polygon) for those whose boxes overlap one.
   template <class F>
-  void for_each_at(const Box3& box, F&& f) {
+  void for_each_at(const Bounds& box, F&& f) {
     const Eigen::Vector3f from = (box.lower - origin).cast<float>(), to = (box.upper - origin).cast<float>();
     const std::size_t n = polygons.size();
     overlap.resize(n);
@@ -191,7 +191,7 @@ struct LoosePolygons::Near {
   static constexpr float kRounding = 1e-4f;
 };
 
-void LoosePolygons::find_near(const Box3& box, Near& near) const {
+void LoosePolygons::find_near(const Bounds& box, Near& near) const {
   // Relative to the box: single precision is enough for the few voxels around.
   near.begin(box.lower);
   by_place_.for_each_near(box, [&](std::uint32_t polygon, std::uint64_t place) {
@@ -207,7 +207,7 @@ void LoosePolygons::test_against(std::span<const NamedPolygon> polygons) {
   if (polygons.empty()) return;
   // All polygons of a lot are near one another, so what is near any of them is looked up once.
   thread_local Near near;
-  Box3 all;
+  Bounds all;
   for (const NamedPolygon& polygon : polygons)
     for (int i = 0; i < polygon.corners; ++i) all.add(polygon.points[static_cast<std::size_t>(i)]);
   find_near(all, near);

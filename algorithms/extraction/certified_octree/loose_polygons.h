@@ -44,10 +44,10 @@ class LoosePolygons {
   /// Polygons by the cubes of a lattice that their boxes touch.
   class ByPlace {
    public:
-    ByPlace(std::span<const Box3> boxes, const RunContext& context);
+    ByPlace(std::span<const Bounds> boxes, const RunContext& context);
     /// Calls f(polygon, the cube) for those that share a cube with the box.
     template <class F>
-    void for_each_near(const Box3& box, F&& f) const;
+    void for_each_near(const Bounds& box, F&& f) const;
 
    private:
     struct Entry {
@@ -65,10 +65,10 @@ class LoosePolygons {
   };
 
   struct Near;
-  void find_near(const Box3& box, Near& near) const;
+  void find_near(const Bounds& box, Near& near) const;
 
   LargeArray<NamedPolygon> polygons_;
-  std::vector<Box3> boxes_;  ///< one for each polygon
+  std::vector<Bounds> boxes_;  ///< one for each polygon
   ByPlace by_place_;
   std::vector<std::uint8_t> meets_;  ///< 1 for polygons that meet others
 };

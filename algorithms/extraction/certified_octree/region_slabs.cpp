@@ -74,22 +74,18 @@ struct RegionSlabs::Part {
 /// The corners of what a slab has of a box, which is a convex body: corners of the box within the slab, and
 /// where its edges pass the slab's planes.
 struct RegionSlabs::Corners {
-  Corners(const Box& box, const Vector3d& up, const Slab& slab) {
+  Corners(const BoundsOf<int>& box, const Vector3d& up, const Slab& slab) {
     for (int c = 0; c < 8; ++c) {
       const std::array<int, 3> at = corner_offset(c);
       Vector3d place;
-      for (int a = 0; a < 3; ++a) {
-        const auto i = static_cast<std::size_t>(a);
-        place[a] = at[i] ? box.upper[i] : box.lower[i];
-      }
+      for (int a = 0; a < 3; ++a) place[a] = at[static_cast<std::size_t>(a)] ? box.upper[a] : box.lower[a];
       const double height = up.dot(place);
       if (height >= double(slab.low) && height <= double(slab.high)) places[count++] = place;
       for (int a = 0; a < 3; ++a) {
-        const auto i = static_cast<std::size_t>(a);
-        if (at[i]) continue;
+        if (at[static_cast<std::size_t>(a)]) continue;
         for (const float plane : {slab.low, slab.high}) {
           const double by = (double(plane) - height) / up[a];
-          if (by >= 0 && by <= box.upper[i] - box.lower[i]) places[count++] = place + by * Vector3d::Unit(a);
+          if (by >= 0 && by <= box.upper[a] - box.lower[a]) places[count++] = place + by * Vector3d::Unit(a);
         }
       }
     }
@@ -159,11 +155,11 @@ void RegionSlabs::make_room() { slabs_.resize(regions_.cube_count()); }
 /// Calls f(place), in the block's coordinates, for the crossings and points in a box, its faces included. The box
 /// may reach eight samples below the block and, less its faces, as many above.
 template <class F>
-void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const {
+void RegionSlabs::for_each_near(std::int32_t block, const BoundsOf<int>& box, F&& f) const {
   const auto& neighbours = cells_.source(block).neighbours;
   float lower[3], upper[3];
   int step[3], from[3], to[3];
-  for (std::size_t a = 0; a < 3; ++a) {
+  for (int a = 0; a < 3; ++a) {
     lower[a] = static_cast<float>(box.lower[a]);
     upper[a] = static_cast<float>(box.upper[a]);
     from[a] = box.lower[a] >> 3;
@@ -177,7 +173,7 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
         if (there < 0) continue;
         int first[3], last[3];  // cubes of 2³ samples
         float shift[3];
-        for (std::size_t a = 0; a < 3; ++a) {
+        for (int a = 0; a < 3; ++a) {
           first[a] = std::max(0, box.lower[a] - 8 * step[a]) / 2;
           last[a] = std::min(7, box.upper[a] - 8 * step[a]) / 2;
           shift[a] = static_cast<float>(8 * step[a]);
@@ -205,11 +201,9 @@ void RegionSlabs::for_each_near(std::int32_t block, const Box& box, F&& f) const
 void RegionSlabs::begin(const Region& cube) {
   // With the cells around the cube: polygons of S within it may have corners in these.
   const std::array<int, 3> at = coordinates(cube.cell);
-  Box box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    box.lower[a] = at[a] - 1;
-    box.upper[a] = at[a] + cube.side() + 1;
-  }
+  BoundsOf<int> box;
+  box.add({at[0] - 1, at[1] - 1, at[2] - 1});
+  box.upper.array() += cube.side() + 2;
   const Vector3f up = regions_.normal(cube).cast<float>(),
                  point = (regions_.point(cube) - cells_.corner(cube.block, 0)).cast<float>();
   // From zero, so the cube's own point is in the slab.
@@ -241,7 +235,7 @@ void RegionSlabs::widen(const Region& cube, std::span<const Vector3d> places) {
 struct RegionSlabs::Fan {
   std::array<Vector3d, 9> places;
   std::size_t count = 0;
-  Box box{{16, 16, 16}, {-8, -8, -8}};
+  BoundsOf<int> box;
 
   std::span<const Vector3d> all() const { return std::span(places).first(count); }
 };
@@ -255,9 +249,8 @@ RegionSlabs::Fan RegionSlabs::fan_of(const RegionPolygon& loose) const {
   }
   const Vector3d corner = cells_.corner(loose.crossing.block, 0);
   for (const Vector3d& place : fan.all())
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<std::size_t>(axis);
-      const double at = place[axis] - corner[axis];
+    for (int a = 0; a < 3; ++a) {
+      const double at = place[a] - corner[a];
       fan.box.lower[a] = std::min(fan.box.lower[a], static_cast<int>(std::floor(at)));
       fan.box.upper[a] = std::max(fan.box.upper[a], static_cast<int>(std::ceil(at)));
     }
@@ -297,7 +290,7 @@ void RegionSlabs::add(const RegionPolygon& polygon) {
 
 /// Calls f(Region) for the cubes that share places with a box.
 template <class F>
-void RegionSlabs::for_each_cube(std::int32_t block, const Box& box, F&& f) const {
+void RegionSlabs::for_each_cube(std::int32_t block, const BoundsOf<int>& box, F&& f) const {
   const auto& neighbours = cells_.source(block).neighbours;
   int step[3];
   for (step[0] = box.lower[0] >> 3; step[0] <= (box.upper[0] - 1) >> 3; ++step[0])
@@ -307,7 +300,7 @@ void RegionSlabs::for_each_cube(std::int32_t block, const Box& box, F&& f) const
             neighbours[static_cast<std::size_t>(neighbour_slot(step[0], step[1], step[2]))];
         if (there < 0) continue;
         int first[3], end[3];
-        for (std::size_t a = 0; a < 3; ++a) {
+        for (int a = 0; a < 3; ++a) {
           first[a] = std::max(0, box.lower[a] - 8 * step[a]);
           end[a] = std::min(8, box.upper[a] - 8 * step[a]);
         }
@@ -353,12 +346,12 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
   up.cwiseAbs().maxCoeff(&steepest);
   // Where the box ends near the polygon there is nothing above or below that, so one that is higher is tried,
   // too.
-  Box box = fan.box;
+  BoundsOf<int> box = fan.box;
   for (const int more : {0, 1}) {
-    box.lower[static_cast<std::size_t>(steepest)] -= more;
-    box.upper[static_cast<std::size_t>(steepest)] += more;
-    Box around = box;
-    for (std::size_t a = 0; a < 3; ++a)
+    box.lower[steepest] -= more;
+    box.upper[steepest] += more;
+    BoundsOf<int> around = box;
+    for (int a = 0; a < 3; ++a)
       if (--around.lower[a] < -8 || ++around.upper[a] > 15)
         return false;  // beyond the neighbours of the block
     Slab slab{std::numeric_limits<float>::max(), -std::numeric_limits<float>::max()};
@@ -388,8 +381,9 @@ bool RegionSlabs::holds(const Region& cube) const {
   const auto level = static_cast<float>(up.dot(point));
   const Slab& relative = slabs_[regions_.number(cube)];
   const Slab slab{relative.low + level, relative.high + level};
-  Box box{at, at};
-  for (int& upper : box.upper) upper += cube.side();
+  BoundsOf<int> box;
+  box.add({at[0], at[1], at[2]});
+  box.upper.array() += cube.side();
   const Corners corners(box, up, slab);
   return are_near_parts(cube.block, box, at, up, slab, corners.all(), tolerance) ||
          all_within(corners.all(), corners.all(), tolerance);
@@ -417,20 +411,19 @@ bool RegionSlabs::is_inside(std::int32_t block, std::array<int, 3> from, const s
 /// Whether what is above a slab in a box is outside, what is below it inside, and a convex body with these
 /// corners near both: the distance to either is a convex function, so the corners tell. All is relative to
 /// the block; `known` is a sample of it.
-bool RegionSlabs::are_near_parts(std::int32_t block, const Box& box, const std::array<int, 3>& known,
+bool RegionSlabs::are_near_parts(std::int32_t block, const BoundsOf<int>& box, const std::array<int, 3>& known,
                                  const Vector3d& up, const Slab& slab, std::span<const Vector3d> corners,
                                  double tolerance) const {
-  std::array<int, 3> highest = box.upper, lowest = box.lower;
+  Eigen::Vector3i highest = box.upper, lowest = box.lower;
   Part above{{}, {}, up, double(slab.high)};
   double high = 0, low = 0;
   // The corners A and B of the header: farthest up and farthest down.
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    if (up[axis] < 0) std::swap(highest[a], lowest[a]);
-    above.lower[axis] = box.lower[a];
-    above.upper[axis] = box.upper[a];
-    high += up[axis] * highest[a];
-    low += up[axis] * lowest[a];
+  for (int a = 0; a < 3; ++a) {
+    if (up[a] < 0) std::swap(highest[a], lowest[a]);
+    above.lower[a] = box.lower[a];
+    above.upper[a] = box.upper[a];
+    high += up[a] * highest[a];
+    low += up[a] * lowest[a];
   }
   if (!(high > double(slab.high) && low < double(slab.low))) return false;
   const Part below{above.lower, above.upper, -up, -double(slab.low)};
@@ -438,7 +431,8 @@ bool RegionSlabs::are_near_parts(std::int32_t block, const Box& box, const std::
     for (const Part* part : {&std::as_const(above), &below})
       if (part->squared_distance(corner) > tolerance * tolerance) return false;
   // Last, for it walks over edges; one sample tells of all of a part, which nothing passes through.
-  return is_inside(block, known, lowest) && !is_inside(block, known, highest);
+  const auto sample = [](const Eigen::Vector3i& at) { return std::array{at[0], at[1], at[2]}; };
+  return is_inside(block, known, sample(lowest)) && !is_inside(block, known, sample(highest));
 }
 
 }  // namespace hermesh

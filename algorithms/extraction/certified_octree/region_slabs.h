@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "algorithms/core/bounds.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/certified_octree/region_polygon.h"
@@ -68,10 +69,6 @@ class RegionSlabs {
   struct Slab {
     float low, high;
   };
-  /// A box of lattice cubes, in the coordinates of a block.
-  struct Box {
-    std::array<int, 3> lower, upper;
-  };
   struct Part;
   struct Corners;
   struct Fan;
@@ -79,13 +76,13 @@ class RegionSlabs {
   void widen(const Region& cube, std::span<const Eigen::Vector3d> places);
   Fan fan_of(const RegionPolygon& loose) const;
   bool is_inside(std::int32_t block, std::array<int, 3> from, const std::array<int, 3>& to) const;
-  bool are_near_parts(std::int32_t block, const Box& box, const std::array<int, 3>& known,
+  bool are_near_parts(std::int32_t block, const BoundsOf<int>& box, const std::array<int, 3>& known,
                       const Eigen::Vector3d& up, const Slab& slab, std::span<const Eigen::Vector3d> corners,
                       double tolerance) const;
   template <class F>
-  void for_each_cube(std::int32_t block, const Box& box, F&& f) const;
+  void for_each_cube(std::int32_t block, const BoundsOf<int>& box, F&& f) const;
   template <class F>
-  void for_each_near(std::int32_t block, const Box& box, F&& f) const;
+  void for_each_near(std::int32_t block, const BoundsOf<int>& box, F&& f) const;
 
   const CellRegions& regions_;
   const CellBlocks& cells_;

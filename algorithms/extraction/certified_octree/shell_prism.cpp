@@ -18,7 +18,7 @@ using Places = std::array<OverTriangle::Place, 3>;
 enum class Walls { outer, inner };
 
 /// Between which heights a triangle lies in a prism; nowhere if the first is the greater one.
-struct Extent {
+struct Heights {
   double lowest = 1, highest = -1;
   bool empty() const { return lowest > highest; }
 };
@@ -26,8 +26,8 @@ struct Extent {
 /// Where a triangle lies in the prism that is as wide, or as narrow, as the leans of a side's two pillars
 /// allow at each height: above the triangle's plane that is one plane, below it another. What reaches less
 /// than kRounding into it is not there.
-Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
-  Extent extent;
+Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
+  Heights heights;
   for (const double up : {1.0, -1.0}) {
     Places places = triangle;
     for (std::size_t side = 0; side < 3; ++side) {
@@ -43,12 +43,12 @@ Extent extent_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
       farthest = std::max(farthest, up * part.corners[i][3]);
     }
     if (farthest < 0 || nearest >= prism.height()) continue;
-    const Extent there = up > 0 ? Extent{nearest, farthest} : Extent{-farthest, -nearest};
-    extent = extent.empty()
+    const Heights there = up > 0 ? Heights{nearest, farthest} : Heights{-farthest, -nearest};
+    heights = heights.empty()
                  ? there
-                 : Extent{std::min(extent.lowest, there.lowest), std::max(extent.highest, there.highest)};
+                 : Heights{std::min(heights.lowest, there.lowest), std::max(heights.highest, there.highest)};
   }
-  return extent;
+  return heights;
 }
 
 Places places_of(const ShellPrism& prism, const Corners& triangle) {
@@ -141,16 +141,16 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
       const auto by = [&](std::size_t corner) { return beyond[i][corner] + beyond[j][corner]; };
       if (std::min({by(0), by(1), by(2)}) > kRounding) return Meeting::none;
     }
-  const Extent extent = extent_in(prism, places, Walls::outer);
-  if (extent.empty()) return Meeting::none;
+  const Heights heights = heights_in(prism, places, Walls::outer);
+  if (heights.empty()) return Meeting::none;
   // Heights are measured along the normal: the lid is least_lid() of the height up at its lowest, and what is
   // no higher than that share of the tolerance is no farther than the tolerance along any line.
   const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kRounding;
-  return faces && extent.lowest >= -most && extent.highest <= most ? Meeting::good : Meeting::bad;
+  return faces && heights.lowest >= -most && heights.highest <= most ? Meeting::good : Meeting::bad;
 }
 
 bool reaches_into(const ShellPrism& prism, const Corners& triangle) {
-  return !extent_in(prism, places_of(prism, triangle), Walls::inner).empty();
+  return !heights_in(prism, places_of(prism, triangle), Walls::inner).empty();
 }
 
 }  // namespace hermesh

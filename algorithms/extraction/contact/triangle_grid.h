@@ -8,19 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace hermesh {
+#include "algorithms/core/bounds.h"
 
-/// A box along the axes, empty until something is added; faces belong to it.
-struct Box3 {
-  Eigen::Vector3d lower = Eigen::Vector3d::Constant(1e300), upper = Eigen::Vector3d::Constant(-1e300);
-  void add(const Eigen::Vector3d& p) {
-    lower = lower.cwiseMin(p);
-    upper = upper.cwiseMax(p);
-  }
-  bool overlaps(const Box3& other) const {
-    return (lower.array() <= other.upper.array()).all() && (other.lower.array() <= upper.array()).all();
-  }
-};
+namespace hermesh {
 
 /// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing, that holds
 /// the triangles which are about as wide as a cell. So no triangle is in more than eight cells, however their sizes
@@ -28,9 +18,9 @@ struct Box3 {
 class TriangleGrid {
  public:
   /// Sorts triangles into lattices. `boxes` are those of the triangles, and must outlive this.
-  explicit TriangleGrid(const std::vector<Box3>& boxes) : boxes_(boxes), level_(boxes.size()) {
+  explicit TriangleGrid(const std::vector<Bounds>& boxes) : boxes_(boxes), level_(boxes.size()) {
     double widths = 0.0;
-    for (const Box3& box : boxes) widths += width(box);
+    for (const Bounds& box : boxes) widths += width(box);
     const double least = std::max(1e-3, 1.5 * widths / std::max<double>(1.0, double(boxes.size())));
     std::vector<std::size_t> sizes;
     for (std::size_t t = 0; t < boxes.size(); ++t) {
@@ -54,7 +44,7 @@ class TriangleGrid {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  static double width(const Box3& box) { return (box.upper - box.lower).maxCoeff(); }
+  static double width(const Bounds& box) { return (box.upper - box.lower).maxCoeff(); }
 
   class Level {
    public:
@@ -62,14 +52,14 @@ class TriangleGrid {
         : scale_(1.0 / cell_width), first_(std::bit_ceil(std::max<std::size_t>(64, 2 * triangles)), kNone) {
       entries_.reserve(4 * triangles);
     }
-    void add(std::uint32_t triangle, const Box3& box) {
+    void add(std::uint32_t triangle, const Bounds& box) {
       for_each_slot(box, [&](std::size_t slot) {
         entries_.push_back({triangle, first_[slot]});
         first_[slot] = static_cast<std::uint32_t>(entries_.size() - 1);
       });
     }
     template <class Visit>
-    void visit(const Box3& box, Visit&& visit) const {
+    void visit(const Bounds& box, Visit&& visit) const {
       if (entries_.empty()) return;
       for_each_slot(box, [&](std::size_t slot) {
         for (std::uint32_t link = first_[slot]; link != kNone; link = entries_[link].next) visit(entries_[link].triangle);
@@ -81,7 +71,7 @@ class TriangleGrid {
       std::uint32_t triangle, next;
     };
     template <class F>
-    void for_each_slot(const Box3& box, F&& f) const {
+    void for_each_slot(const Bounds& box, F&& f) const {
       std::int64_t first[3], last[3];
       for (int a = 0; a < 3; ++a) {
         first[a] = static_cast<std::int64_t>(std::floor(box.lower[a] * scale_));
@@ -105,7 +95,7 @@ class TriangleGrid {
     std::vector<Entry> entries_;
   };
 
-  const std::vector<Box3>& boxes_;
+  const std::vector<Bounds>& boxes_;
   std::vector<std::uint8_t> level_;  ///< level of each triangle
   std::vector<Level> levels_;
 };

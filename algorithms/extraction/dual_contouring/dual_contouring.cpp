@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
@@ -242,20 +243,41 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
   return Contourer(grid, options).run(context);
 }
 
-DualContouringOptions read_placement_options(const ExtractionInput& input) {
-  using Placement = DualContouringOptions::Placement;
-  const Options& given = input.options;
-  DualContouringOptions options;
+namespace {
+
+/// The options that set DualContouringOptions.
+const OptionTable<DualContouringOptions>& option_table() {
+  using Options = DualContouringOptions;
+  using Placement = Options::Placement;
+  static const auto table =
+      OptionTable<Options>()
+          .choice("placement", &Options::placement,
+                  {{"unbiased", Placement::unbiased}, {"optimal", Placement::optimal}, {"average", Placement::average}},
+                  "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features; 'unbiased' does so, too, "
+                  "but takes back by how much that lies outside of smooth surfaces; 'average' takes the mean of its "
+                  "crossings")
+          .number("truncation", &Options::truncation, {.maximum = 1.0},
+                  "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+                  "features",
+                  {"placement=unbiased|optimal"})
+          .number("reach", &Options::reach, {.maximum = 1e6},
+                  "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
+                  "the surface less",
+                  {"placement=unbiased|optimal"});
+  return table;
+}
+
+}  // namespace
+
+DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
+  DualContouringOptions options = option_table().read(input.options);
   options.linear_crossings = !wants_polygons(input);
-  if (given.is("placement", "optimal")) options.placement = Placement::optimal;
-  if (given.is("placement", "average")) options.placement = Placement::average;
-  options.truncation = given.number("truncation");
   return options;
 }
 
-DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
-  DualContouringOptions options = read_placement_options(input);
-  options.reach = input.options.number("reach");
+DualContouringOptions read_placement_options(const ExtractionInput& input) {
+  DualContouringOptions options = option_table().without("reach").read(input.options);
+  options.linear_crossings = !wants_polygons(input);
   return options;
 }
 
@@ -270,25 +292,7 @@ PolygonMesh dual_contouring(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> dual_contouring_options() {
-  std::vector<OptionSpec> options = {
-      {.name = "placement",
-       .fallback = "unbiased",
-       .help = "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features; 'unbiased' does so, too, "
-               "but takes back by how much that lies outside of smooth surfaces; 'average' takes the mean of its "
-               "crossings",
-       .choices = {"unbiased", "optimal", "average"}},
-      {.name = "truncation",
-       .fallback = "0.1",
-       .help = "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
-               "features",
-       .maximum = 1.0,
-       .only_with = {"placement=unbiased|optimal"}},
-      {.name = "reach",
-       .fallback = "1",
-       .help = "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
-               "the surface less",
-       .maximum = 1e6,
-       .only_with = {"placement=unbiased|optimal"}}};
+  std::vector<OptionSpec> options = option_table().specs();
   const std::vector<OptionSpec> of_hermite = hermite_options();
   options.insert(options.begin() + 1, of_hermite.begin(), of_hermite.end());
   return options;

@@ -84,7 +84,7 @@ class Star {
       });
     }
     for (const Triangle& t : star_) {
-      const Box3 box = mesh_.box_of(t);
+      const Bounds box = mesh_.box_of(t);
       for (const Triangle& other : *nearby_)
         if (box.overlaps(mesh_.box_of(other)) && !mesh_.apart(t, other)) return false;
     }
@@ -96,7 +96,7 @@ class Star {
   UniformPoints& points_;
   std::int32_t block_ = 0;
   std::uint32_t point_ = 0;
-  Box3 box_;
+  Bounds box_;
   std::vector<Triangle> star_;
   std::optional<std::vector<Triangle>> nearby_;
 };

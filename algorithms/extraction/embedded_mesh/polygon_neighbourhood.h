@@ -56,7 +56,7 @@ class PolygonNeighbourhood {
   /// voxels out of the block. The triangles of an edge lie in the box of its four cells and `farthest` around it, so
   /// their edges begin at most five samples below the block or six above its last.
   template <class F>
-  void for_each_near(std::int32_t block, const Box3& box, F&& f) const {
+  void for_each_near(std::int32_t block, const Bounds& box, F&& f) const {
     const Eigen::Vector3d origin = cells_.corner(block, 0);
     int first[3], last[3];
     for (int a = 0; a < 3; ++a) {
@@ -69,8 +69,8 @@ class PolygonNeighbourhood {
           for_each_in_row(block, x, y, z, std::min(last[2], z | 7), box, f);
   }
 
-  Box3 box_of(const Triangle& t) const {
-    Box3 box;
+  Bounds box_of(const Triangle& t) const {
+    Bounds box;
     for (const std::uint32_t p : t) box.add(points_[p]);
     return box;
   }
@@ -123,7 +123,7 @@ class PolygonNeighbourhood {
   /// Calls f(edge, triangle) for the crossing edges that begin at samples from z to `end` of one row of a block: eight
   /// bits of a mask.
   template <class F>
-  void for_each_in_row(std::int32_t block, int x, int y, int z, int end, const Box3& box, F&& f) const {
+  void for_each_in_row(std::int32_t block, int x, int y, int z, int end, const Bounds& box, F&& f) const {
     const CellBlocks::Cell row = cells_.locate(block, x, y, z & ~7);
     if (row.block < 0) return;
     const unsigned wanted = (2u << (end & 7)) - (1u << (z & 7));

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "algorithms/io/import/sample_box.h"
+#include "algorithms/io/import/stored_samples.h"
 
 namespace hermesh {
 namespace {
@@ -100,7 +100,7 @@ SampleFormat format_of(const Header& header, RunContext& context) {
 }
 
 /// Sets the box's dimensions; axes beyond the third are frames. @returns how many boxes there are.
-std::int64_t read_dims(const Header& header, SampleBox& box) {
+std::int64_t read_dims(const Header& header, StoredSamples& box) {
   const int axes = header.number<std::int16_t>(40);
   if (axes < 1 || axes > 7) header.fail("is damaged: it says that it has " + std::to_string(axes) + " dimensions");
   std::int64_t frames = 1;
@@ -208,7 +208,7 @@ Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
 
 /// Moves the box on to the frame that is asked for. @throws Error where there is none.
 void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame_bytes, const ImportOptions& options,
-                  SampleBox& box, RunContext& context) {
+                  StoredSamples& box, RunContext& context) {
   const std::int64_t frame = options.frame.value_or(0);
   if (frame < 0 || frame >= frames)
     header.fail("has no frame " + std::to_string(frame) + "; it has " + std::to_string(frames) + ", numbered from 0");
@@ -249,7 +249,7 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const fs::path header_path = unpacked_name(path).second == ".img" ? companion(path, ".hdr") : path;
   ByteSource first(header_path);
   const Header header(first, header_path.string(), context);
-  SampleBox box{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
+  StoredSamples box{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
   const std::int64_t frames = read_dims(header, box);
   // scl_slope and scl_inter: value = slope · stored + intercept.
   const double slope = header.number<float>(112);
@@ -267,10 +267,10 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   }
   ByteSource& source = second ? *second : first;
   // Twice: the first time for one frame, whose size the offset of the frame needs, the second time with that offset.
-  const std::uint64_t frame_bytes = check_box(box, source.at_most());
+  const std::uint64_t frame_bytes = check_stored(box, source.at_most());
   choose_frame(header, frames, frame_bytes, options, box, context);
-  check_box(box, source.at_most());
-  return read_box(source, box, options, context);
+  check_stored(box, source.at_most());
+  return read_stored(source, box, options, context);
 }
 
 }  // namespace hermesh

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/thesis/adaptive_dual_contouring/block_regions.h"
@@ -246,12 +247,33 @@ class Contourer {
   std::vector<Steps> steps_;  ///< by group
 };
 
-AdaptiveOptions::TopologyTests topology_tests_of(const std::string& name) {
-  using Tests = AdaptiveOptions::TopologyTests;
-  // The option's declaration allows no other names.
-  if (name == "table") return Tests::table;
-  if (name == "signs") return Tests::signs;
-  return name == "none" ? Tests::none : Tests::both;
+/// The options that set AdaptiveOptions.
+const OptionTable<AdaptiveOptions>& option_table() {
+  using Options = AdaptiveOptions;
+  using Placement = Options::Placement;
+  using Nearest = Options::Nearest;
+  using Tests = Options::TopologyTests;
+  static const auto table =
+      OptionTable<Options>()
+          .number("threshold", &Options::threshold, {},
+                  "square voxels: cells are merged while the sum of the squared distances to their planes is less; larger "
+                  "merges more, 0 nothing")
+          .choice("placement", &Options::placement, {{"optimal", Placement::optimal}, {"average", Placement::average}},
+                  "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the "
+                  "mean of its crossings")
+          .number("truncation", &Options::truncation, {.maximum = 1.0},
+                  "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+                  "features, 0 drops none that can be told from 0",
+                  {"placement=optimal"})
+          .choice("minimiser", &Options::nearest, {{"mass-point", Nearest::mass_point}, {"corner", Nearest::corner}},
+                  "where singular values are dropped, the minimiser nearest to the 'mass-point' of the crossings, or to "
+                  "the first 'corner' of the cell or region (the pseudo-inverse alone)",
+                  {"placement=optimal"})
+          .choice("topology_tests", &Options::topology_tests,
+                  {{"both", Tests::both}, {"table", Tests::table}, {"signs", Tests::signs}, {"none", Tests::none}},
+                  "what a region must pass to be merged: the look-up 'table', the 'signs' of middles, 'both' (as "
+                  "printed), or 'none'; without one the topology may change");
+  return table;
 }
 
 }  // namespace
@@ -284,12 +306,7 @@ PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveO
 }
 
 PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
-  AdaptiveOptions options;
-  if (input.options.is("placement", "average")) options.placement = AdaptiveOptions::Placement::average;
-  options.threshold = input.options.number("threshold");
-  options.truncation = input.options.number("truncation");
-  if (input.options.is("minimiser", "corner")) options.nearest = AdaptiveOptions::Nearest::corner;
-  options.topology_tests = topology_tests_of(input.options.text("topology_tests"));
+  const AdaptiveOptions options = option_table().read(input.options);
   // As printed: what is meshed are the 10 bytes themselves, with the edges that they say have data.
   if (input.options.is("representation", "thesis") && input.options.is("lost_crossings", "kept"))
     return adaptive_dual_contouring(thesis_hermite_input(input, "adaptive-dual-contouring"), options, input.field,
@@ -301,38 +318,7 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> adaptive_dual_contouring_options() {
-  std::vector<OptionSpec> options = {
-      {"threshold",
-       "0.1",
-       "square voxels: cells are merged while the sum of the squared distances to their planes is less; larger merges "
-       "more, 0 nothing",
-       {},
-       0.0,
-       1e300},
-      {"placement",
-       "optimal",
-       "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the mean of "
-       "its crossings",
-       {"optimal", "average"}},
-      {"truncation",
-       "0.1",
-       "singular values below this share of the largest are dropped; larger is smoother and keeps fewer features, 0 "
-       "drops none that can be told from 0",
-       {},
-       0.0,
-       1.0,
-       {"placement=optimal"}},
-      {.name = "minimiser",
-       .fallback = "mass-point",
-       .help = "where singular values are dropped, the minimiser nearest to the 'mass-point' of the crossings, or to the "
-               "first 'corner' of the cell or region (the pseudo-inverse alone)",
-       .choices = {"mass-point", "corner"},
-       .only_with = {"placement=optimal"}},
-      {.name = "topology_tests",
-       .fallback = "both",
-       .help = "what a region must pass to be merged: the look-up 'table', the 'signs' of middles, 'both' (as printed), "
-               "or 'none'; without one the topology may change",
-       .choices = {"both", "table", "signs", "none"}}};
+  std::vector<OptionSpec> options = option_table().specs();
   // The Hermite data has options of its own: where the crossings come from, and how they are stored
   // (hermite_input.h).
   // What the print says is the default here: its own 10 bytes.

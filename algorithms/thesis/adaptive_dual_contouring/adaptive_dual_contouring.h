@@ -33,7 +33,7 @@
 // The unit of the threshold (trap T6) is not in the text, and E grows with the number of cells. Here lengths are voxels
 // and normals have unit length, so E is in square voxels. The thesis's 0 to 2000 cannot be that: a region has some 300
 // planes, so that 2000 would let every one be two voxels off. Its reductions are met if 1000 of its units, within a
-// quarter, are one square voxel, with Hermite data quantised as there (experiments/table_9_2.toml).
+// quarter, are one square voxel, with Hermite data quantised as there (experiments/questions/thesis/table_9_2.toml).
 //
 // What bounds it: of the time without the Hermite data three quarters go into merging, about evenly into the sums of
 // the QEFs, their minimisers, and waiting for crossings and fresh pages; connecting takes a sixth.
@@ -45,7 +45,7 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/variant.h"
 #include "algorithms/extraction/adaptivity_field.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/hermite/dense_tree.h"
-#include "algorithms/hermite/thesis_voxel.h"
+#include "algorithms/hermite/dense/dense_tree.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
 
 namespace hermesh {
 namespace {

@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/thesis/adaptive_dual_contouring/region_topology.h"
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 

@@ -81,11 +81,11 @@ class LeafWork {
 
  private:
   /// Squared distance in voxels from the box to the box of the block's samples.
-  double gap2(const VoxelBox& box) const {
+  double gap2(const Bounds& box) const {
     double sum = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       const double gap =
-          std::max({0.0, box.low[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.high[a]});
+          std::max({0.0, box.lower[a] - (frame_.origin[a] + 7.0), frame_.origin[a] - box.upper[a]});
       sum += gap * gap;
     }
     return sum;
@@ -190,9 +190,9 @@ class LeafWork {
       // The box is rounded outwards by far more than single precision's error at this range. Those that fill up the
       // last sixteen are so far away that none is ever near, and their squares are still finite.
       boxes.side[a][0][i % kBatch] =
-          there ? float(clusters_[i].box.low[a] - frame_.origin[a]) - 1e-5f : 1e18f;
+          there ? float(clusters_[i].box.lower[a] - frame_.origin[a]) - 1e-5f : 1e18f;
       boxes.side[a][1][i % kBatch] =
-          there ? float(clusters_[i].box.high[a] - frame_.origin[a]) + 1e-5f : 1e18f;
+          there ? float(clusters_[i].box.upper[a] - frame_.origin[a]) + 1e-5f : 1e18f;
     }
   }
 
@@ -214,10 +214,10 @@ class LeafWork {
 
   /// Whether an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so at least two of the
   /// box's sides must reach across one. The margin of 1e-5 is wider than the shift of the sides' lattice.
-  bool meets_edges(const VoxelBox& box) const {
+  bool meets_edges(const Bounds& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double low = box.low[a] - frame_.origin[a] - 1e-5, high = box.high[a] - frame_.origin[a] + 1e-5;
+      const double low = box.lower[a] - frame_.origin[a] - 1e-5, high = box.upper[a] - frame_.origin[a] + 1e-5;
       if (high < 0.0 || low > 8.0) return false;
       across += std::floor(high) >= std::ceil(low) ? 1 : 0;
     }

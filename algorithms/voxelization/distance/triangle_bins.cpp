@@ -26,9 +26,9 @@ constexpr std::size_t kMany = 256;
 
 std::int32_t block_of(double voxel) { return static_cast<std::int32_t>(std::floor(voxel)) >> 3; }
 
-BlockAt block_of_centre(const VoxelBox& box) {
+BlockAt block_of_centre(const Bounds& box) {
   BlockAt block;
-  for (std::size_t a = 0; a < 3; ++a) block[a] = block_of(0.5 * (box.low[a] + box.high[a]));
+  for (int a = 0; a < 3; ++a) block[std::size_t(a)] = block_of(0.5 * (box.lower[a] + box.upper[a]));
   return block;
 }
 
@@ -36,15 +36,15 @@ double gap(double low, double high, double from, double to) { return std::max({0
 
 /// Calls f(block) for the blocks with a voxel nearer than `reach` to the box.
 template <class F>
-void for_each_block_near(const VoxelBox& box, double reach, F&& f) {
+void for_each_block_near(const Bounds& box, double reach, F&& f) {
   BlockAt from, to;
   for (int a = 0; a < 3; ++a) {
     // Only samples count, so the first block is that of the first sample within reach.
-    from[a] = block_of(std::ceil(box.low[a] - reach));
-    to[a] = block_of(std::floor(box.high[a] + reach));
+    from[a] = block_of(std::ceil(box.lower[a] - reach));
+    to[a] = block_of(std::floor(box.upper[a] + reach));
   }
   const auto gap2 = [&](int axis, std::int32_t b) {
-    const double g = gap(box.low[axis], box.high[axis], 8.0 * b, 8.0 * b + 7.0);
+    const double g = gap(box.lower[axis], box.upper[axis], 8.0 * b, 8.0 * b + 7.0);
     return g * g;
   };
   for (std::int32_t x = from[0]; x <= to[0]; ++x)
@@ -178,11 +178,33 @@ void write_packed(std::uint32_t step, std::uint8_t*& at) {
   *at++ = std::uint8_t(step);
 }
 
+/// The box in sixteenths of a voxel from three voxels before the bin's first, rounded outwards: truncation and the added 1
+/// do that. A small triangle lies well within 0 to 255, and the clamp only guards it.
+BinBounds in_sixteenths(const Bounds& box, const BlockAt& bin) {
+  BinBounds result;
+  for (int a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[std::size_t(a)] - 3.0;
+    result.lower[a] = std::uint8_t(std::clamp(16.0 * (box.lower[a] - start), 0.0, 255.0));
+    result.upper[a] = std::uint8_t(std::clamp(16.0 * (box.upper[a] - start) + 1.0, 0.0, 255.0));
+  }
+  return result;
+}
+
+Bounds from_sixteenths(const BinBounds& box, const BlockAt& bin) {
+  Bounds result;
+  for (int a = 0; a < 3; ++a) {
+    const double start = 8.0 * bin[std::size_t(a)] - 3.0;
+    result.lower[a] = start + box.lower[a] / 16.0;
+    result.upper[a] = start + box.upper[a] / 16.0;
+  }
+  return result;
+}
+
 /// The triangles that a piece of the work files in a bin.
 struct BinRun {
   explicit BinRun(std::uint32_t of_bin) : code(of_bin) {}
   std::uint32_t code;  ///< of the bin in the piece's set
-  BinBox box;
+  BinBounds box;
   std::uint32_t count = 0, first = 0, last = 0;  ///< triangles
   std::uint64_t bytes = 0;                       ///< packed, of all but the first; later, where they go
 };
@@ -209,36 +231,11 @@ struct TriangleBins::Survey {
   std::vector<std::vector<BinRun>> runs;
 };
 
-void BinBox::add(const VoxelBox& box, const BlockAt& bin) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    // The sixteenth that a lower side is in, and the one above that of an upper side: truncation and the added 1
-    // round outwards. A small triangle lies well within 0 to 255, and the clamp only guards it.
-    const double start = 8.0 * bin[a] - 3.0;
-    low[a] = std::min(low[a], std::uint8_t(std::clamp(16.0 * (box.low[a] - start), 0.0, 255.0)));
-    high[a] = std::max(high[a], std::uint8_t(std::clamp(16.0 * (box.high[a] - start) + 1.0, 0.0, 255.0)));
-  }
-}
+Bounds TriangleBins::bin_box(std::uint32_t bin) const { return from_sixteenths(box_of_bin_[bin], bin_at_[bin]); }
 
-void BinBox::add(const BinBox& other) {
-  for (std::size_t a = 0; a < 3; ++a) {
-    low[a] = std::min(low[a], other.low[a]);
-    high[a] = std::max(high[a], other.high[a]);
-  }
-}
-
-VoxelBox BinBox::in_voxels(const BlockAt& bin) const {
-  VoxelBox box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double start = 8.0 * bin[a] - 3.0;
-    box.low[a] = start + low[a] / 16.0;
-    box.high[a] = start + high[a] / 16.0;
-  }
-  return box;
-}
-
-bool TriangleBins::is_large(const VoxelBox& box) {
+bool TriangleBins::is_large(const Bounds& box) {
   double longest = 0;
-  for (std::size_t a = 0; a < 3; ++a) longest = std::max(longest, box.high[a] - box.low[a]);
+  for (int a = 0; a < 3; ++a) longest = std::max(longest, box.upper[a] - box.lower[a]);
   return longest > kLargest;
 }
 
@@ -263,7 +260,7 @@ TriangleBins::Survey TriangleBins::survey() {
     std::vector<BinRun>& runs = found.runs[chunk];
     CodeNumbers numbers;
     for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
-      const VoxelBox box = in_voxels(box_of(t));
+      const Bounds box = in_voxels(box_of(t));
       if (is_large(box)) {
         all_large_[chunk].push_back(t);
         continue;
@@ -273,7 +270,7 @@ TriangleBins::Survey TriangleBins::survey() {
       const std::uint32_t number = numbers(code, std::uint32_t(runs.size()));
       if (number == runs.size()) runs.emplace_back(code);
       BinRun& run = runs[number];
-      run.box.add(box, block);
+      run.box.add(in_sixteenths(box, block));
       // The first number of a run is a step from the last one of an earlier chunk, and so is measured in pack().
       if (run.count++ == 0)
         run.first = t;
@@ -324,7 +321,7 @@ void TriangleBins::pack(Survey& survey) {
       to.push_back(packed_.data() + first_byte_[bins_.number(translation, run.code)] + run.bytes);
     }
     for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
-      const VoxelBox box = in_voxels(box_of(t));
+      const Bounds box = in_voxels(box_of(t));
       if (is_large(box)) continue;
       const std::uint32_t run = numbers(survey.bins[chunk].insert(block_of_centre(box)), 0);
       write_packed(t - std::exchange(runs[run].first, t), to[run]);
@@ -372,7 +369,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
     for (const BinRun& run : survey.runs[chunk]) {
       context_.check();
       // Small triangles ask for blocks by the box of their run: a few blocks too many, and far fewer questions.
-      for_each_block_near(run.box.in_voxels(survey.bins[chunk].block(run.code)), reach_,
+      for_each_block_near(from_sixteenths(run.box, survey.bins[chunk].block(run.code)), reach_,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
     }
     pairs[chunk] = file_large(all_large_[chunk], sets[chunks + chunk]);
@@ -433,9 +430,9 @@ void TriangleBins::forget_slabs() {
 }
 
 std::size_t TriangleBins::bytes_in_memory() const {
-  std::size_t bytes = packed_.size() + bins_.size() * (sizeof(BlockAt) + sizeof(BinBox) + 16);
+  std::size_t bytes = packed_.size() + bins_.size() * (sizeof(BlockAt) + sizeof(BinBounds) + 16);
   for (const Slab& slab : slabs_)
-    if (slab.files) bytes += 4 * slab.files->order.size() + sizeof(FloatBox) * slab.files->clusters.size();
+    if (slab.files) bytes += 4 * slab.files->order.size() + sizeof(BoundsOf<float>) * slab.files->clusters.size();
   return bytes;
 }
 
@@ -511,8 +508,8 @@ void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, S
   std::vector<Centre>& centres = sorter.centres;
   centres.clear();
   for (const std::uint32_t t : triangles) {
-    const FloatBox box = box_of(t);
-    centres.push_back({box.low + box.high, t});
+    const BoundsOf<float> box = box_of(t);
+    centres.push_back({box.lower + box.upper, t});
   }
   if (centres.size() > kMany) {
     sort_by_cell(centres, bin_at_[bin], soup_.scale(), sorter.cells, sorter.sorted);
@@ -525,14 +522,11 @@ void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, S
 }
 
 /// Boxes of each sixteen triangles, in the mesh's own single precision, in which minima and maxima are exact.
-void TriangleBins::enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const {
+void TriangleBins::enclose(std::span<const std::uint32_t> triangles, BoundsOf<float>* clusters) const {
   for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++clusters) {
     *clusters = box_of(triangles[first]);
-    for (std::size_t i = first + 1; i < std::min(first + kClusterSize, triangles.size()); ++i) {
-      const FloatBox box = box_of(triangles[i]);
-      clusters->low = clusters->low.cwiseMin(box.low);
-      clusters->high = clusters->high.cwiseMax(box.high);
-    }
+    for (std::size_t i = first + 1; i < std::min(first + kClusterSize, triangles.size()); ++i)
+      clusters->add(box_of(triangles[i]));
   }
 }
 

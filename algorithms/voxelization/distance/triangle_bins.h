@@ -12,23 +12,20 @@
 #include <unordered_map>
 #include <vector>
 
+#include "algorithms/core/bounds.h"
 #include "algorithms/lattice/block_table.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/voxelization/distance/index_soup.h"
 
 namespace hermesh {
 
-/// Box in voxels relative to the mesh's origin; never smaller than what it holds.
-struct VoxelBox {
-  std::array<double, 3> low, high;
-};
-
-/// The box from a block's first voxel to its last and `margin` voxels more on every side.
-inline VoxelBox around(const BlockAt& block, double margin) {
-  VoxelBox box;
-  for (std::size_t a = 0; a < 3; ++a) {
-    box.low[a] = block[a] * 8.0 - margin;
-    box.high[a] = block[a] * 8.0 + 7.0 + margin;
+/// The box from a block's first voxel to its last and `margin` voxels more on every side; voxels relative to the mesh's
+/// origin, as all boxes here whose name does not say otherwise.
+inline Bounds around(const BlockAt& block, double margin) {
+  Bounds box;
+  for (int a = 0; a < 3; ++a) {
+    box.lower[a] = block[std::size_t(a)] * 8.0 - margin;
+    box.upper[a] = block[std::size_t(a)] * 8.0 + 7.0 + margin;
   }
   return box;
 }
@@ -38,13 +35,7 @@ inline constexpr std::size_t kClusterSize = 16;
 
 /// The box of small triangles that are filed in a bin, in sixteenths of a voxel from three voxels before the bin's
 /// first, rounded outwards. A small triangle reaches two voxels beyond its bin, so that eight bits are enough.
-struct BinBox {
-  std::array<std::uint8_t, 3> low{255, 255, 255}, high{0, 0, 0};
-
-  void add(const VoxelBox& box, const BlockAt& bin);
-  void add(const BinBox& other);
-  VoxelBox in_voxels(const BlockAt& bin) const;
-};
+using BinBounds = BoundsOf<std::uint8_t>;
 
 /// The triangles of a soup by the blocks of voxels that they can be near.
 class TriangleBins {
@@ -60,7 +51,7 @@ class TriangleBins {
   /// Up to sixteen small triangles that are close together.
   struct Cluster {
     std::span<const std::uint32_t> triangles;  ///< numbers, at most kClusterSize
-    VoxelBox box;
+    Bounds box;
   };
   /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are within
   /// reach, in an order that depends on the mesh alone. From any thread, but not from within f, where the slabs
@@ -72,7 +63,7 @@ class TriangleBins {
   /// Calls f(cluster) for the clusters that may meet the box `near`, which reaches no farther around the block's
   /// voxels than the reach. The smaller the box, the fewer clusters have to be made.
   template <class F>
-  void for_each_cluster(const BlockAt& block, const VoxelBox& near, F&& f) const;
+  void for_each_cluster(const BlockAt& block, const Bounds& near, F&& f) const;
   /// Large triangles within reach of block number `i`, in ascending order.
   std::span<const std::uint32_t> large(std::uint32_t i) const {
     return {large_.data() + first_large_[i], first_large_[i + 1] - first_large_[i]};
@@ -92,14 +83,11 @@ class TriangleBins {
   std::size_t bytes_in_memory() const;
 
  private:
-  struct FloatBox {
-    Eigen::Vector3f low, high;  ///< world units relative to the mesh's origin, exact
-  };
   /// Triangles of some bins, and their clusters, which do not reach across bins.
   struct Files {
     std::vector<std::uint32_t> first, order;  ///< bin b: order[first[b]] …
     std::vector<std::uint32_t> first_cluster;
-    std::vector<FloatBox> clusters;
+    std::vector<BoundsOf<float>> clusters;  ///< world units relative to the mesh's origin, exact
   };
   struct Slab {
     std::int32_t end = 0;             ///< first layer of blocks beyond it
@@ -119,15 +107,14 @@ class TriangleBins {
   void unpack(std::uint32_t bin, std::uint32_t* to) const;
   struct Sorter;
   void sort(std::uint32_t bin, std::span<std::uint32_t> triangles, Sorter& sorter) const;
-  void enclose(std::span<const std::uint32_t> triangles, FloatBox* clusters) const;
+  void enclose(std::span<const std::uint32_t> triangles, BoundsOf<float>* clusters) const;
   const Files& own_files(std::uint32_t bin) const;
   template <class F>
-  void for_each_in(const Files& files, std::uint32_t i, const VoxelBox& near, F&& f) const;
-  static bool meet(const VoxelBox& a, const VoxelBox& b);
-  VoxelBox bin_box(std::uint32_t bin) const { return box_of_bin_[bin].in_voxels(bin_at_[bin]); }
-  static bool is_large(const VoxelBox& box);
-  VoxelBox in_voxels(const FloatBox& box) const;
-  FloatBox box_of(std::size_t triangle) const;
+  void for_each_in(const Files& files, std::uint32_t i, const Bounds& near, F&& f) const;
+  Bounds bin_box(std::uint32_t bin) const;
+  static bool is_large(const Bounds& box);
+  Bounds in_voxels(const BoundsOf<float>& box) const;
+  BoundsOf<float> box_of(std::size_t triangle) const;
 
   const IndexSoup& soup_;
   RunContext& context_;
@@ -135,7 +122,7 @@ class TriangleBins {
   int rings_;  ///< how many blocks away a small triangle that matters can be filed
   BlockTable bins_;
   std::vector<BlockAt> bin_at_;
-  std::vector<BinBox> box_of_bin_;
+  std::vector<BinBounds> box_of_bin_;
   /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte, the
   /// lowest first, the eighth bit set where more follow.
   std::vector<std::uint8_t> packed_;
@@ -152,32 +139,26 @@ class TriangleBins {
   mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> cache_;
 };
 
-inline bool TriangleBins::meet(const VoxelBox& a, const VoxelBox& b) {
-  bool apart = false;
-  for (std::size_t i = 0; i < 3; ++i) apart |= a.low[i] > b.high[i] || a.high[i] < b.low[i];
-  return !apart;
-}
-
 template <class F>
-void TriangleBins::for_each_in(const Files& files, std::uint32_t i, const VoxelBox& near, F&& f) const {
+void TriangleBins::for_each_in(const Files& files, std::uint32_t i, const Bounds& near, F&& f) const {
   std::uint32_t start = files.first[i];
   for (std::uint32_t c = files.first_cluster[i]; c < files.first_cluster[i + 1]; ++c) {
     const std::uint32_t end = std::min<std::uint32_t>(start + kClusterSize, files.first[i + 1]);
-    const VoxelBox box = in_voxels(files.clusters[c]);
-    if (meet(box, near)) f(Cluster{{files.order.data() + start, end - start}, box});
+    const Bounds box = in_voxels(files.clusters[c]);
+    if (box.overlaps(near)) f(Cluster{{files.order.data() + start, end - start}, box});
     start = end;
   }
 }
 
 template <class F>
-void TriangleBins::for_each_cluster(const BlockAt& block, const VoxelBox& near, F&& f) const {
+void TriangleBins::for_each_cluster(const BlockAt& block, const Bounds& near, F&& f) const {
   BlockFinder finder(bins_);
   for (int x = -rings_; x <= rings_; ++x)
     for (int y = -rings_; y <= rings_; ++y)
       for (int z = -rings_; z <= rings_; ++z) {
         const BlockAt at{block[0] + x, block[1] + y, block[2] + z};
         const std::uint32_t bin = finder.find(at);
-        if (bin == BlockTable::kNone || !meet(bin_box(bin), near)) continue;
+        if (bin == BlockTable::kNone || !bin_box(bin).overlaps(near)) continue;
         if (const Files* files = slabs_[slab_of(at)].files.get())
           for_each_in(*files, place_[bin], near, f);
         else
@@ -185,16 +166,16 @@ void TriangleBins::for_each_cluster(const BlockAt& block, const VoxelBox& near, 
       }
 }
 
-inline VoxelBox TriangleBins::in_voxels(const FloatBox& box) const {
-  VoxelBox result;
+inline Bounds TriangleBins::in_voxels(const BoundsOf<float>& box) const {
+  Bounds result;
   for (int a = 0; a < 3; ++a) {
-    result.low[a] = double(box.low[a]) * soup_.scale();
-    result.high[a] = double(box.high[a]) * soup_.scale();
+    result.lower[a] = double(box.lower[a]) * soup_.scale();
+    result.upper[a] = double(box.upper[a]) * soup_.scale();
   }
   return result;
 }
 
-inline TriangleBins::FloatBox TriangleBins::box_of(std::size_t triangle) const {
+inline BoundsOf<float> TriangleBins::box_of(std::size_t triangle) const {
   const Triangle t = soup_.triangle(triangle);
   const Eigen::Vector3f &a = soup_.point(t[0]), &b = soup_.point(t[1]), &c = soup_.point(t[2]);
   return {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};

@@ -34,21 +34,21 @@ PolygonMesh sheet(std::size_t count, float size, bool shuffled) {
   return mesh;
 }
 
-double gap2(const VoxelBox& box, const BlockAt& block) {
+double gap2(const Bounds& box, const BlockAt& block) {
   double sum = 0;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double g = std::max({0.0, box.low[a] - (block[a] * 8.0 + 7.0), block[a] * 8.0 - box.high[a]});
+    const double g = std::max({0.0, box.lower[a] - (block[a] * 8.0 + 7.0), block[a] * 8.0 - box.upper[a]});
     sum += g * g;
   }
   return sum;
 }
 
-VoxelBox box_of(const IndexSoup& soup, std::uint32_t t) {
+Bounds box_of(const IndexSoup& soup, std::uint32_t t) {
   const TriangleCorners c = soup.corners(t);
-  VoxelBox box;
+  Bounds box;
   for (std::size_t a = 0; a < 3; ++a) {
-    box.low[a] = std::min({c[a], c[a + 3], c[a + 6]});
-    box.high[a] = std::max({c[a], c[a + 3], c[a + 6]});
+    box.lower[a] = std::min({c[a], c[a + 3], c[a + 6]});
+    box.upper[a] = std::max({c[a], c[a + 3], c[a + 6]});
   }
   return box;
 }
@@ -100,11 +100,11 @@ TEST_P(ManySlabs, EveryBlockNearATriangleIsThere) {
   RunContext context;
   const TriangleBins bins(soup, 3.0, context);
   for (std::uint32_t t = 0; t < soup.size(); t += 11) {
-    const VoxelBox box = box_of(soup, t);
+    const Bounds box = box_of(soup, t);
     // The voxels next to the middle of the box are within reach.
     BlockAt block;
     for (std::size_t a = 0; a < 3; ++a)
-      block[a] = std::int32_t(std::floor(0.5 * (box.low[a] + box.high[a]) + 0.5)) >> 3;
+      block[a] = std::int32_t(std::floor(0.5 * (box.lower[a] + box.upper[a]) + 0.5)) >> 3;
     ASSERT_NE(bins.blocks().find(block), BlockTable::kNone);
   }
 }
@@ -148,15 +148,15 @@ TEST(TriangleBins, SmallBoxFindsWhatMeetsIt) {
   bins.forget_slabs();
   const std::vector<BlockAt> blocks = bins.blocks().blocks();
   for (std::size_t i = 0; i < blocks.size(); i += 53) {
-    VoxelBox near = around(blocks[i], -2.0);
+    Bounds near = around(blocks[i], -2.0);
     std::set<std::uint32_t> found;
     bins.for_each_cluster(blocks[i], near, [&](const TriangleBins::Cluster& cluster) {
       found.insert(cluster.triangles.begin(), cluster.triangles.end());
     });
     for (std::uint32_t t = 0; t < soup.size(); ++t) {
-      const VoxelBox box = box_of(soup, t);
+      const Bounds box = box_of(soup, t);
       bool meets = true;
-      for (std::size_t a = 0; a < 3; ++a) meets &= box.low[a] <= near.high[a] && box.high[a] >= near.low[a];
+      for (std::size_t a = 0; a < 3; ++a) meets &= box.lower[a] <= near.upper[a] && box.upper[a] >= near.lower[a];
       ASSERT_TRUE(!meets || found.contains(t)) << t;
     }
   }

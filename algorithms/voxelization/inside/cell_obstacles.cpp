@@ -57,7 +57,7 @@ struct CellObstacles::Block {
     bins.for_each_cluster(at, around(at, 1.1), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
         // The cells of a block reach from its first voxel to the next block's; the rest is more than the margin.
-        if (cluster.box.low[a] > at[a] * 8.0 + 8.1 || cluster.box.high[a] < at[a] * 8.0 - 0.1) return;
+        if (cluster.box.lower[a] > at[a] * 8.0 + 8.1 || cluster.box.upper[a] < at[a] * 8.0 - 0.1) return;
       for (const std::uint32_t t : cluster.triangles) add(t);
     });
     if (const std::uint32_t i = bins.blocks().find(at); i != BlockTable::kNone)

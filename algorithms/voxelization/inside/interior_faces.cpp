@@ -174,12 +174,12 @@ class Finder {
 
   /// Meets the edges of a block with the triangles near them; the box of the edges keeps most clusters away.
   void find_hits(std::uint32_t block, std::vector<InnerEdge>& edges) const {
-    VoxelBox box;
+    Bounds box;
     for (std::size_t a = 0; a < 3; ++a) {
-      box.low[a] = box.high[a] = edges[0].voxel[a];
+      box.lower[a] = box.upper[a] = edges[0].voxel[a];
       for (const InnerEdge& edge : edges) {
-        box.low[a] = std::min(box.low[a], double(edge.voxel[a]));
-        box.high[a] = std::max(box.high[a], double(edge.voxel[a]) + (edge.axis == int(a) ? 1.0 : 0.0));
+        box.lower[a] = std::min(box.lower[a], double(edge.voxel[a]));
+        box.upper[a] = std::max(box.upper[a], double(edge.voxel[a]) + (edge.axis == int(a) ? 1.0 : 0.0));
       }
     }
     const auto meet = [&](std::uint32_t t) {
@@ -188,7 +188,7 @@ class Finder {
     };
     bins_.for_each_cluster(band_.blocks[block], box, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.low[a] > box.high[a] + kNearby || cluster.box.high[a] < box.low[a] - kNearby) return;
+        if (cluster.box.lower[a] > box.upper[a] + kNearby || cluster.box.upper[a] < box.lower[a] - kNearby) return;
       for (const std::uint32_t t : cluster.triangles) meet(t);
     });
     for (const std::uint32_t t : bins_.large(block)) meet(t);
@@ -260,7 +260,7 @@ class Finder {
     const BlockAt& at = band_.blocks[block];
     bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.low[a] > at[a] * 8.0 + 9.0 || cluster.box.high[a] < at[a] * 8.0 - 1.0) return;
+        if (cluster.box.lower[a] > at[a] * 8.0 + 9.0 || cluster.box.upper[a] < at[a] * 8.0 - 1.0) return;
       triangles.insert(triangles.end(), cluster.triangles.begin(), cluster.triangles.end());
     });
   }

@@ -14,7 +14,7 @@ namespace {
 using winding::Multipole;
 using winding::PlacedTriangle;
 using winding::Targets;
-using BoxRef = TriangleTree::BoxRef;
+using Node = TriangleTree::Node;
 
 constexpr std::size_t kFan = TriangleTree::kFan;
 constexpr std::size_t kMaxBatch = 512;  ///< points that share one descent
@@ -135,7 +135,7 @@ Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> 
 }
 
 /// The multipole of a box from those of its children, without a look at the triangles.
-Multipole parent_multipole(const TriangleTree& tree, const std::vector<Multipole>& multipoles, BoxRef ref) {
+Multipole parent_multipole(const TriangleTree& tree, const std::vector<Multipole>& multipoles, Node ref) {
   const Eigen::Vector3d centre = box_centre(tree, ref.box);
   const std::size_t first = tree.child_pack(ref) * kFan;
   Moments moments;
@@ -172,7 +172,7 @@ class Batch {
 
   /// Writes the numbers in the order in which the points were given.
   void evaluate(std::span<float> values) {
-    std::vector<BoxRef> roots;
+    std::vector<Node> roots;
     push_children(tree_.packs().size() - 1, static_cast<std::uint32_t>(tree_.level_count() - 1), roots);
     descend(0, count_, std::move(roots));
     for (std::size_t i = 0; i < count_; ++i)
@@ -202,7 +202,7 @@ class Batch {
   }
 
   /// Adds the boxes of a pack; those that are empty, or hold a mere point, have no field.
-  void push_children(std::size_t pack, std::uint32_t level, std::vector<BoxRef>& boxes) const {
+  void push_children(std::size_t pack, std::uint32_t level, std::vector<Node>& boxes) const {
     for (std::size_t k = 0; k < kFan; ++k)
       if (multipoles_[pack * kFan + k].radius > 0)
         boxes.push_back({static_cast<std::uint32_t>(pack * kFan + k), level});
@@ -210,14 +210,14 @@ class Batch {
 
   /// Adds the given boxes to the points of a range: those that are far from all of them at once, those that
   /// are large beside the range by their children, and the others to either half by itself.
-  void descend(std::size_t begin, std::size_t end, std::vector<BoxRef> boxes) {
+  void descend(std::size_t begin, std::size_t end, std::vector<Node> boxes) {
     const Targets targets{&x_[begin], &y_[begin], &z_[begin], &sum_[begin], end - begin};
     const auto [lowest, highest] = box(targets);
     const double extent = 0.5 * (highest - lowest).norm();
     const bool last = end - begin <= kGroup;
-    std::vector<BoxRef> later;
+    std::vector<Node> later;
     while (!boxes.empty()) {
-      const BoxRef ref = boxes.back();
+      const Node ref = boxes.back();
       boxes.pop_back();
       const Multipole& multipole = multipoles_[ref.box];
       const Eigen::Vector3d centre = box_centre(tree_, ref.box) - origin_;

@@ -1,5 +1,5 @@
 // What OpenVDB's tools make of the trees, and their tiles.
-#include "algorithms/hermite/dense_tree.h"
+#include "algorithms/hermite/dense/dense_tree.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/Prune.h>
@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "algorithms/hermite/test_lattice.h"
-#include "algorithms/hermite/thesis_voxel.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
 
 namespace hermesh {
 namespace {

@@ -1,4 +1,4 @@
-#include "algorithms/hermite/dense_tree.h"
+#include "algorithms/hermite/dense/dense_tree.h"
 
 HERMESH_INSTANTIATE_TREE(template, hermesh::FloatDenseTree)
 HERMESH_INSTANTIATE_TREE(template, hermesh::DirectedDenseTree)

@@ -10,7 +10,7 @@
 namespace hermesh {
 
 /// A box of samples in a file, x fastest, then y, then z.
-struct SampleBox {
+struct StoredSamples {
   std::string file;  ///< name of the file that holds the samples, for sentences
   std::array<std::int64_t, 3> dims{};
   SampleFormat format;
@@ -21,11 +21,11 @@ struct SampleBox {
 
 /// Bytes that the samples take. @throws Error for dimensions below 1 or beyond what a grid's index can be, for more than
 /// `at_most` bytes in all, and for more memory than there is; nothing is allocated.
-std::uint64_t check_box(const SampleBox& box, std::uint64_t at_most);
+std::uint64_t check_stored(const StoredSamples& box, std::uint64_t at_most);
 
 /// Reads the samples from the source, which stands at or before the first, into a grid as import_volume.h describes
 /// it. @throws Error for a source that ends early or is damaged, for samples that are not finite unless they are
 /// replaced, and for a transform that OpenVDB does not take. @throws Cancelled.
-LevelSet read_box(ByteSource& source, const SampleBox& box, const ImportOptions& options, RunContext& context);
+LevelSet read_stored(ByteSource& source, const StoredSamples& box, const ImportOptions& options, RunContext& context);
 
 }  // namespace hermesh

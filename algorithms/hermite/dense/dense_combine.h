@@ -4,7 +4,7 @@
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/boolean_rule.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 

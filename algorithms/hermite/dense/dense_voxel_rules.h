@@ -6,8 +6,8 @@
 #include <type_traits>
 
 #include "algorithms/hermite/boolean_rule.h"
-#include "algorithms/hermite/thesis_voxel.h"
-#include "algorithms/hermite/voxels.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/dense/voxels.h"
 
 namespace hermesh {
 

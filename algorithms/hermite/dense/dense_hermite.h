@@ -9,7 +9,7 @@
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
-#include "algorithms/hermite/voxels.h"
+#include "algorithms/hermite/dense/voxels.h"
 #include "algorithms/lattice/placement.h"
 
 namespace hermesh {

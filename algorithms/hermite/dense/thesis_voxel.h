@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algorithms/hermite/normal_codes/thesis.h"
-#include "algorithms/hermite/voxels.h"
+#include "algorithms/hermite/dense/voxels.h"
 
 namespace hermesh {
 

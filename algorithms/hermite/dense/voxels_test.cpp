@@ -1,5 +1,5 @@
-#include "algorithms/hermite/thesis_voxel.h"
-#include "algorithms/hermite/voxels.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/dense/voxels.h"
 #include "algorithms/hermite/with_normal_code.h"
 
 #include <gtest/gtest.h>

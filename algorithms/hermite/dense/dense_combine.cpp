@@ -1,4 +1,4 @@
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -15,8 +15,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/hermite/dense_tree.h"
-#include "algorithms/hermite/dense_voxel_rules.h"
+#include "algorithms/hermite/dense/dense_tree.h"
+#include "algorithms/hermite/dense/dense_voxel_rules.h"
 #include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {

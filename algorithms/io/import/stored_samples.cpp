@@ -1,4 +1,4 @@
-#include "algorithms/io/import/sample_box.h"
+#include "algorithms/io/import/stored_samples.h"
 
 #include <openvdb/tools/Prune.h>
 
@@ -25,7 +25,7 @@ std::string dims_text(const std::array<std::int64_t, 3>& dims) {
 }
 
 /// The samples as floats, in the order of the file, x fastest.
-std::vector<float> read_values(ByteSource& source, const SampleBox& box, const ImportOptions& options,
+std::vector<float> read_values(ByteSource& source, const StoredSamples& box, const ImportOptions& options,
                                RunContext& context) {
   source.skip(box.offset - source.position(), context);
   const std::size_t size = size_of(box.format.type);
@@ -84,7 +84,7 @@ Leaf* make_leaf(const std::vector<float>& values, const std::array<std::int64_t,
   return leaf;
 }
 
-openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const SampleBox& box, float background,
+openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const StoredSamples& box, float background,
                                   RunContext& context) {
   std::array<std::size_t, 3> blocks;
   for (int axis = 0; axis < 3; ++axis) blocks[axis] = static_cast<std::size_t>((box.dims[axis] + 7) / 8);
@@ -105,7 +105,7 @@ openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const Sample
 
 }  // namespace
 
-std::uint64_t check_box(const SampleBox& box, std::uint64_t at_most) {
+std::uint64_t check_stored(const StoredSamples& box, std::uint64_t at_most) {
   constexpr std::int64_t kMost = std::int64_t{1} << 30;  // of an axis: what index coordinates are sure to hold
   const std::string claim = dims_text(box.dims) + " samples of " + name_of(box.format);
   for (const std::int64_t dim : box.dims)
@@ -126,7 +126,7 @@ std::uint64_t check_box(const SampleBox& box, std::uint64_t at_most) {
   return static_cast<std::uint64_t>(bytes);
 }
 
-LevelSet read_box(ByteSource& source, const SampleBox& box, const ImportOptions& options, RunContext& context) {
+LevelSet read_stored(ByteSource& source, const StoredSamples& box, const ImportOptions& options, RunContext& context) {
   const Stage stage(context, "read volume");
   initialize_openvdb();
   const std::vector<float> values = read_values(source, box, options, context);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algorithms/core/openvdb_trees.h"
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 // OpenVDB calls these functions by their full names, so that they must be specialised type by type: an overload for
 // all voxel types would be declared too late to be found.

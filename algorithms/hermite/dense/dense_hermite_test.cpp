@@ -1,12 +1,12 @@
-#include "algorithms/hermite/dense_hermite.h"
+#include "algorithms/hermite/dense/dense_hermite.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/dense_tree.h"
+#include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/test_lattice.h"
-#include "algorithms/hermite/thesis_voxel.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
 #include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {

@@ -1,4 +1,4 @@
-#include "algorithms/hermite/dense_combine.h"
+#include "algorithms/hermite/dense/dense_combine.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -9,10 +9,10 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense_tree.h"
-#include "algorithms/hermite/dense_voxel_rules.h"
+#include "algorithms/hermite/dense/dense_tree.h"
+#include "algorithms/hermite/dense/dense_voxel_rules.h"
 #include "algorithms/hermite/test_lattice.h"
-#include "algorithms/hermite/thesis_voxel.h"
+#include "algorithms/hermite/dense/thesis_voxel.h"
 
 namespace hermesh {
 namespace {

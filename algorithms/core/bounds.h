@@ -1,0 +1,42 @@
+// Boxes along the axes, one type for all of algorithms/ and experiments/; the judges of validation/ keep their own.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+
+namespace hermesh {
+
+/// A box along the axes from `lower` to `upper`, in the unit of what is added to it. Its faces belong to it. It is empty
+/// until something is added.
+template <class T>
+struct BoundsOf {
+  using Vector = Eigen::Matrix<T, 3, 1>;
+  static constexpr T kFarthest =
+      std::numeric_limits<T>::has_infinity ? std::numeric_limits<T>::infinity() : std::numeric_limits<T>::max();
+  static constexpr T kLeast = std::numeric_limits<T>::has_infinity ? -kFarthest : std::numeric_limits<T>::lowest();
+
+  Vector lower = Vector::Constant(kFarthest), upper = Vector::Constant(kLeast);
+
+  void add(const Vector& point) {
+    lower = lower.cwiseMin(point);
+    upper = upper.cwiseMax(point);
+  }
+  void add(const BoundsOf& other) {
+    lower = lower.cwiseMin(other.lower);
+    upper = upper.cwiseMax(other.upper);
+  }
+  bool empty() const { return (lower.array() > upper.array()).any(); }
+  /// Whether the two have a point in common. An empty box has none.
+  bool overlaps(const BoundsOf& other) const {
+    // All six are compared: a branch costs more than a comparison, and this is the inner loop of many searches.
+    bool apart = false;
+    for (int a = 0; a < 3; ++a) apart |= lower[a] > other.upper[a] || other.lower[a] > upper[a];
+    return !apart;
+  }
+  /// The lengths of the sides; zero if the box is empty.
+  Vector size() const { return empty() ? Vector(Vector::Zero()) : Vector(upper - lower); }
+};
+
+using Bounds = BoundsOf<double>;
+
+}  // namespace hermesh

@@ -1,0 +1,90 @@
+// Options of a variant, each bound to the member that it sets, so that its name, its default, its range and its meaning
+// stand in one place.
+#pragma once
+
+#include <charconv>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "algorithms/core/options.h"
+
+namespace hermesh {
+
+/// The options that set members of `Settings`. The default of an option is the value that its member has in a `Settings`
+/// that nobody has touched.
+template <class Settings>
+class OptionTable {
+ public:
+  struct Range {
+    double minimum = 0.0, maximum = 1e300;  ///< 1e300: no limit
+  };
+
+  /// Declares a number. `only_with` is that of OptionSpec.
+  template <class Number>
+  OptionTable&& number(const std::string& name, Number Settings::*member, Range range, std::string help,
+                       std::vector<std::string> only_with = {}) && {
+    char buffer[32];
+    const auto fallback = std::to_chars(buffer, buffer + sizeof buffer, Settings{}.*member).ptr;
+    entries_.push_back({{.name = name,
+                         .fallback = {buffer, fallback},
+                         .help = std::move(help),
+                         .minimum = range.minimum,
+                         .maximum = range.maximum,
+                         .only_with = std::move(only_with)},
+                        [=](Settings& settings, const Options& options) {
+                          settings.*member = static_cast<Number>(options.number(name));
+                        }});
+    return std::move(*this);
+  }
+
+  /// Declares a choice among named values. @throws std::logic_error if the member's own value has no name.
+  template <class Value>
+  OptionTable&& choice(const std::string& name, Value Settings::*member, std::vector<std::pair<std::string, Value>> values,
+                       std::string help, std::vector<std::string> only_with = {}) && {
+    OptionSpec spec{.name = name, .fallback = "", .help = std::move(help), .only_with = std::move(only_with)};
+    for (const auto& [word, value] : values) {
+      spec.choices.push_back(word);
+      if (value == Settings{}.*member) spec.fallback = word;
+    }
+    if (spec.fallback.empty()) throw std::logic_error("the default of option " + name + " has no name");
+    entries_.push_back({std::move(spec), [=, named = std::map<std::string, Value>(values.begin(), values.end())](
+                                            Settings& settings, const Options& options) {
+                          settings.*member = named.at(options.text(name));
+                        }});
+    return std::move(*this);
+  }
+
+  /// The declarations, in the order in which they were made, for the variant's entry in the table.
+  std::vector<OptionSpec> specs() const {
+    std::vector<OptionSpec> specs;
+    for (const Entry& entry : entries_) specs.push_back(entry.spec);
+    return specs;
+  }
+
+  /// The settings that checked options ask for. Options may hold others besides. @throws std::logic_error if they lack one.
+  Settings read(const Options& options) const {
+    Settings settings{};
+    for (const Entry& entry : entries_) entry.set(settings, options);
+    return settings;
+  }
+
+  /// Makes a table of all options but one, whose member keeps its default.
+  OptionTable without(const std::string& name) const {
+    OptionTable others = *this;
+    std::erase_if(others.entries_, [&](const Entry& entry) { return entry.spec.name == name; });
+    return others;
+  }
+
+ private:
+  struct Entry {
+    OptionSpec spec;
+    std::function<void(Settings&, const Options&)> set;
+  };
+  std::vector<Entry> entries_;
+};
+
+}  // namespace hermesh
