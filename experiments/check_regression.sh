@@ -10,6 +10,6 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 rm -rf "$folder"
 # Exit codes 1 and 3 say that a variant failed or broke a promise, as some of those accepted do; the comparison tells.
 code=0
-"$program" run "$root/experiments/$experiment.toml" --out "$folder" --quiet >/dev/null || code=$?
+"$program" run "$experiment" --out "$folder" --quiet >/dev/null || code=$?
 case $code in 0 | 1 | 3) ;; *) exit "$code" ;; esac
 exec "$program" compare "$root/results/baselines/$experiment" "$folder" --times no

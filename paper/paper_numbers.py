@@ -365,7 +365,7 @@ class Paper:
             for experiment, commit, labels in changed_since(self.root, self.rows.rows_of[table]):
                 left = [label for label in labels if label not in stands.get("labels", [])]
                 if left:
-                    raise PaperError(f"results/{table} is stale: experiments/{experiment}.toml has changed {', '.join(left)} since "
+                    raise PaperError(f"results/{table} is stale: {experiment}.toml has changed {', '.join(left)} since "
                                      f"commit {commit[:12]} made the rows; make these anew, or say in paper/paper.toml why they stand")
 
 
@@ -377,7 +377,10 @@ def changed_since(root, rows):
         path = next(iter(sorted((root / "experiments").glob(f"**/{experiment}.toml"))), None)
         if path is None:
             continue
-        shown = subprocess.run(["git", "-C", str(root), "show", f"{commit}:{path.relative_to(root)}"], capture_output=True, text=True)
+        there = subprocess.run(["git", "-C", str(root), "ls-tree", "-r", "--name-only", commit, "experiments"],
+                               capture_output=True, text=True).stdout.split("\n")
+        place = next((name for name in there if name.endswith(f"/{experiment}.toml")), "")  # files move between commits
+        shown = subprocess.run(["git", "-C", str(root), "show", f"{commit}:{place}"], capture_output=True, text=True)
         if shown.returncode != 0:
             continue
         old, new = tomllib.loads(shown.stdout), tomllib.loads(path.read_text())

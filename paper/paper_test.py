@@ -157,7 +157,7 @@ class Doctored(Case):
     @unittest.skipUnless(shutil.which("git"), "needs git")
     def test_an_experiment_that_was_changed_after_its_rows(self):
         (self.root / "experiments").unlink()
-        for file in ("harness/columns.cpp", "ledger/row_database.cpp", "headline.toml"):
+        for file in ("harness/columns.cpp", "ledger/row_database.cpp", "questions/meshes/headline.toml"):
             (self.root / "experiments" / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / "experiments" / file, self.root / "experiments" / file)
 
@@ -172,7 +172,7 @@ class Doctored(Case):
         self.change_rows(lambda row: row.update(commit=commit))
         seal(self.root)
         Paper(self.root).write(self.out)
-        path = self.root / "experiments/headline.toml"
+        path = self.root / "experiments/questions/meshes/headline.toml"
         text = path.read_text()
         path.write_text(text.replace("tolerance = 7,", "tolerance = 8,"))
         self.assertNotEqual(path.read_text(), text)

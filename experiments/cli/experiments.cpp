@@ -45,7 +45,7 @@ void add_run(CLI::App& app, Session& session) {
   auto name = std::make_shared<std::string>();
   command
       ->add_option("EXPERIMENT", *name,
-                   "Experiment file (.toml), the name of one in experiments/, or a table or figure of the thesis "
+                   "Experiment file (.toml), the name of one of experiments/questions, or a table or figure of the thesis "
                    "that it makes (figure_9_8)")
       ->required();
   command->add_option("--tier", settings->tier, "Sizes to run (default: quick)")
@@ -286,7 +286,7 @@ void add_claims(CLI::App& app, Session& session) {
 
 }  // namespace
 
-/// One variant on the shapes of experiments/conform.toml, with one thread and with all.
+/// One variant on the shapes of experiments/questions/upkeep/conform.toml, with one thread and with all.
 int conform(const std::string& variant, std::filesystem::path out, Session& session) {
   if (out.empty()) out = std::filesystem::path("results/local") / ("conform-" + variant);
   RunSettings settings{experiment_file("conform"), "quick", out, ""};

@@ -8,7 +8,7 @@
 
 namespace hermesh {
 
-/// The rows with the plots of experiments/NAME.toml in place of their own, where `folder` is one that the
+/// The rows with the plots of the experiment's own file in place of their own, where `folder` is one that the
 /// project keeps (provenance.h) and the checkout has the experiment NAME that a row is of; others keep theirs,
 /// for somebody's own experiment may have the name of one of the project's. What is drawn can so be mended
 /// without making rows anew. @throws Error for a file with an error.

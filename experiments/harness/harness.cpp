@@ -532,10 +532,10 @@ class Run {
 
 std::vector<ExperimentInfo> list_experiments() {
   std::vector<std::filesystem::path> files;
-  for (const std::filesystem::path& folder : {experiments_folder(), experiments_folder() / "ablations" / "predictions"})
+  for (const std::filesystem::path& folder : {experiments_folder() / "questions", experiments_folder() / "ablations" / "predictions"})
     if (std::filesystem::is_directory(folder))
-      for (const auto& entry : std::filesystem::directory_iterator(folder))
-        if (entry.path().extension() == ".toml" && entry.path().filename() != "cases.toml") files.push_back(entry.path());
+      for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+        if (entry.path().extension() == ".toml") files.push_back(entry.path());
   std::ranges::sort(files, {}, [](const std::filesystem::path& file) { return file.filename(); });
   std::vector<ExperimentInfo> experiments;
   for (const auto& file : files) {
@@ -546,14 +546,21 @@ std::vector<ExperimentInfo> list_experiments() {
 }
 
 std::filesystem::path experiment_file(const std::string& name) {
-  if (const std::filesystem::path path = name; path.extension() == ".toml" || path.has_parent_path()) return path;
+  const std::filesystem::path path = name;
+  const bool is_path = path.extension() == ".toml" || path.has_parent_path();
+  std::error_code error;
+  if (is_path && std::filesystem::exists(path, error)) return path;
   std::vector<std::string> known;
   for (const ExperimentInfo& experiment : list_experiments()) {
+    if (is_path && experiment.name == path.stem())
+      throw Error("there is no file " + shown(name) + "; the project's experiment of that name is run by it: hermesh run " +
+                  experiment.name);
     if (experiment.name == name || std::ranges::find(experiment.shows, name) != experiment.shows.end())
       return experiment.file;
     known.push_back(experiment.name);
     known.insert(known.end(), experiment.shows.begin(), experiment.shows.end());
   }
+  if (is_path) return path;
   throw Error("there is no experiment \"" + shown(name) + "\"; there are " + joined(likest_first(known, name)));
 }
 

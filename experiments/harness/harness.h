@@ -23,11 +23,12 @@ struct ExperimentInfo {
   std::filesystem::path file;
   std::vector<std::string> shows;  ///< tables and figures of the thesis that it makes, "table_9_2" or "figure_9_8"
 };
-/// The experiments/*.toml that come with the project.
+/// The experiments that come with the project: the files below experiments/questions/, and the predictions of ablations.
 std::vector<ExperimentInfo> list_experiments();
 
 /// The file of an experiment: `name` is its path, its name, or a table or figure of the thesis that it makes.
-/// @throws Error for a name that is none of these, with those most like it.
+/// @throws Error for a name that is none of these, with those most like it, and for a path to no file that ends in the name of
+/// an experiment.
 std::filesystem::path experiment_file(const std::string& name);
 
 /// What a quick look takes in place of what the file says; empty leaves that as it is.

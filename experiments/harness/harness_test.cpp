@@ -261,6 +261,14 @@ TEST(ListExperiments, AreFoundByPathNameAndNumber) {
   EXPECT_EQ(experiment_file("anywhere/mine.toml"), "anywhere/mine.toml");
   EXPECT_EQ(experiment_file("mine.toml"), "mine.toml");
   EXPECT_EQ(experiment_file("headline").filename(), "headline.toml");
+  EXPECT_EQ(experiment_file(experiment_file("headline").string()), experiment_file("headline"));
+  try {
+    experiment_file("elsewhere/headline.toml");
+    ADD_FAILURE() << "a path to no file was taken";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "there is no file elsewhere/headline.toml; the project's experiment of that name is run by it: hermesh run headline");
+  }
   EXPECT_EQ(experiment_file("figure_9_9").filename(), "table_9_2.toml");
   try {
     experiment_file("figure_9_99");

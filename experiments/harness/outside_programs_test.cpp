@@ -1,5 +1,5 @@
 // Outside programs as variants: what they are given, what they may say of themselves, and what becomes of
-// absent ones. The peers of experiments/peers.toml are run where they are installed.
+// absent ones. The peers of experiments/questions/meshes/peers.toml are run where they are installed.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -110,7 +110,7 @@ TEST_F(OutsidePrograms, GetOurUniformMeshMultiplesOfAVoxelAndTheSources) {
           "{ label = \"voxels\", command = \"case {0.25 voxel}/{3 voxel} in "
           "0.0312499*/0.37499999*|0.03125/0.375) "
           "cp {in} {out};; *) exit 9;; esac\" }, "
-          "{ label = \"sources\", command = \"test -f {source}/experiments/peers.toml && test -d {build} && "
+          "{ label = \"sources\", command = \"test -f {source}/experiments/questions/meshes/peers.toml && test -d {build} && "
           "cp {in} {out}\" }"),
       0);
   const auto found = rows();

@@ -270,8 +270,8 @@ void Damage::raw(int count) {
 
 void Damage::toml(int count) {
   Files whole;
-  for (const auto& entry : fs::directory_iterator(experiments_folder()))
-    if (entry.path().extension() == ".toml" && entry.path().filename() != "cases.toml") whole.push_back(bytes_of(entry.path()));
+  for (const auto& entry : fs::recursive_directory_iterator(experiments_folder() / "questions"))
+    if (entry.path().extension() == ".toml") whole.push_back(bytes_of(entry.path()));
   std::ranges::sort(whole);  // a folder has no order
   ASSERT_GE(whole.size(), 10u);
   std::vector<std::string> cases;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what the peers need (README.md): Debian's packages, and the npm packages of package-lock.json into node_modules here.
-# What cannot be installed is named, and the others go on; experiments/peers.toml notes an absent peer.
+# What cannot be installed is named, and the others go on; experiments/questions/meshes/peers.toml notes an absent peer.
 set -u
 cd "$(dirname "$0")"
 

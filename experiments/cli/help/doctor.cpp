@@ -41,7 +41,7 @@ Check of_experiments() {
               "export HERMESH_EXPERIMENTS=CHECKOUT/experiments, from a clone of the project"};
   const fs::path folder = experiments_folder();
   std::error_code error;
-  if (fs::exists(folder / "headline.toml", error)) check.found = folder.string();
+  if (fs::exists(folder / "questions", error)) check.found = folder.string();
   return check;
 }
 
