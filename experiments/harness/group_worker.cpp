@@ -52,7 +52,8 @@ std::vector<VariantEntry> chosen(const std::vector<VariantEntry>& variants, cons
     std::vector<std::string> known;
     for (const auto& each : table) known.push_back(each.name);
     if (std::ranges::find(known, name) == known.end()) {
-      for (const VariantEntry& variant : variants) known.push_back(variant.label);
+      for (const VariantEntry& variant : variants)
+        if (std::ranges::find(known, variant.label) == known.end()) known.push_back(variant.label);
       throw Error("there is no variant \"" + shown(name) + "\"; there are " + joined(likest_first(known, name)));
     }
     left.push_back({name, name, {}});
