@@ -455,7 +455,7 @@ void expect_survived(const std::vector<Kind>& kinds, const Kind& kind, std::uint
                                  << (WTERMSIG(status) == SIGPROF ? ", it takes too long" : "");
   EXPECT_STREQ(account.fault, "") << "trial " << account.trial;
   EXPECT_GT(account.refused, trials / 20);
-  EXPECT_GT(account.read, trials / 100);
+  EXPECT_GT(account.read, trials / 200);
   EXPECT_EQ(munmap(shared, sizeof(Account)), 0);
 }
 

@@ -38,8 +38,7 @@ void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const
 
 /// Writes a mesh as 3MF in millimetres. Quads become two triangles; triangles with a corner twice, which the
 /// format forbids, are left out with a note. Numbers are the shortest text of the double; the origin of the
-/// mesh is the translation of the build's item. @throws Error where the text is longer than an archive's
-/// lengths of 32 bits can say.
+/// mesh is the translation of the build's item. The packed file waits in memory until it is whole.
 void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, const std::string& file,
                     RunContext& context);
 

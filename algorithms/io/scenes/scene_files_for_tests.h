@@ -43,9 +43,9 @@ inline std::string glb_of(std::string json, std::string binary) {
 
 inline std::string zip_of(const std::vector<std::pair<std::string, std::string>>& members) {
   mesh_formats::ZipWriter archive;
-  for (const auto& [name, bytes] : members) archive.begin(name), archive.add(bytes);
+  for (const auto& [name, bytes] : members) archive.add(name, bytes);
   std::string result;
-  for (const std::string& piece : archive.finish()) result += piece;
+  archive.write([&result](std::string_view piece) { result += piece; });
   return result;
 }
 

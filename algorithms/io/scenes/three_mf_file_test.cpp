@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cstdlib>
+
 #include "algorithms/io/scenes/scene_files_for_tests.h"
 #include "algorithms/io/test_mesh_files.h"
 
@@ -147,9 +150,11 @@ TEST_F(ThreeMfFileTest, DamageIsASentence) {
   expect_error(with("x=\"1\"", "x=\"nan\""), "x has 'nan', which is not a finite number");
   expect_error(with("x=\"1\"", "x=\"1e999\""), "not a finite number");
   expect_error(with("x=\"1\"", ""), "a vertex without x");
-  expect_error(with("x=\"1\"", "x=1"), "without quotation marks");
-  expect_error(with("</mesh>", ""), "ends that did not begin there");
-  expect_error(with("</vertices>", "</vertices"), "ends that did not begin");
+  expect_error(with("x=\"1\"", "x=1"), "not well-formed");
+  expect_error(with("</mesh>", ""), "mismatched tag");
+  expect_error(with("</vertices>", "</vertices"), "not well-formed");
+  expect_error(with("x=\"1\"", "x=\"1\" x=\"1\""), "duplicate attribute");
+  expect_error(with("x=\"1\"", "x=\"&one;\""), "undefined entity");
   expect_error(model_of(object_of(1, kTriangle), "<item objectid=\"1\" transform=\"1 0 0 0 1\"/>"),
                "not a finite number");
   expect_error(
@@ -159,8 +164,9 @@ TEST_F(ThreeMfFileTest, DamageIsASentence) {
                "the extension 'urn:lattices'");
   expect_error("<!DOCTYPE model [<!ENTITY a \"aaaa\">]><model/>", "a document type");
   expect_error("<svg/>", "no model");
-  expect_error("words", "breaks off");
-  expect_error("\xFF\xFE<", "UTF-16");
+  expect_error("words", "syntax error");
+  expect_error("", "breaks off");
+  expect_error("\xFF\xFE<", "breaks off");
   const std::string whole = model_of(object_of(1, kTriangle), item);
   for (std::size_t size = 1; size + 2 < whole.size(); ++size)
     EXPECT_NE(error_of(whole.substr(0, size)), "") << size;
@@ -192,6 +198,68 @@ TEST_F(ThreeMfFileTest, TheArchiveIsChecked) {
   EXPECT_NE(changed(24, char(whole[entry + 24] + 1)).find("does not unpack"), std::string::npos);
   EXPECT_NE(changed(27, 127).find("a length that it cannot have"), std::string::npos);
   EXPECT_NE(changed(44, 127).find("is not where"), std::string::npos);
+  // Marks of an end in a comment: a few are passed over, thousands are refused before the directory is read for each.
+  const auto with_marks = [&](int count) {
+    std::string bytes = whole, comment;
+    for (int i = 0; i < count; ++i) comment += "PK\5\6 some comment of 22";
+    bytes[bytes.size() - 2] = char(comment.size() & 255);
+    bytes[bytes.size() - 1] = char(comment.size() >> 8);
+    return error("a.3mf", bytes + comment);
+  };
+  EXPECT_EQ(with_marks(2), "");
+  EXPECT_NE(with_marks(2900).find("more ends than one"), std::string::npos);
+}
+
+TEST_F(ThreeMfFileTest, EncodingsAndCharactersByNumberAreRead) {
+  std::string mesh = kTriangle;
+  mesh.replace(mesh.find("x=\"1\""), 5, "x=\"&#49;&#x32;\"");
+  const std::string text = model_of(object_of(1, mesh), "<item objectid=\"1\"/>");
+  EXPECT_EQ(read("\xEF\xBB\xBF" + text).points[1], Vector3d(12, 0, 0));
+  // The format is in UTF-8 or UTF-16.
+  std::string wide = "\xFF\xFE";
+  for (const char c : text.substr(text.find('\n') + 1)) wide += {c, '\0'};
+  EXPECT_EQ(read(wide).points[1], Vector3d(12, 0, 0));
+}
+
+TEST_F(ThreeMfFileTest, WhatStandsBehindTheModelIsPassedOver) {
+  const std::string text = model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>");
+  EXPECT_EQ(read(text + std::string(100, '\0') + "<& ").triangles.size(), 1u);
+}
+
+/// A parser keeps every name and the tag that it is in.
+TEST_F(ThreeMfFileTest, XmlMadeToDoHarmDoesNotEatMemory) {
+  expect_error("<model a=\"" + std::string(std::size_t(1) << 24, 'a') + "\"/>", "a tag of millions of bytes");
+  std::string names;
+  for (int i = 0; i < 300000; ++i) names += "<e" + std::to_string(i) + "/>";
+  expect_error(model_of(names, ""), "as many names");
+  std::string deep;
+  for (int i = 0; i < 2000; ++i) deep += "<a>";
+  expect_error(model_of(deep, ""), "nested too deeply");
+}
+
+TEST_F(ThreeMfFileTest, TheSameMeshGivesTheSameBytesInAnyTimeZone) {
+  const char* const before = std::getenv("TZ");
+  const std::string zone = before ? before : "";
+  std::vector<std::string> archives;
+  for (const char* each : {"UTC", "America/New_York", "Asia/Tokyo"}) {
+    setenv("TZ", each, 1);
+    tzset();
+    write_mesh(folder / "a.3mf", random_mesh(1, {1, 2, 3}), context);
+    archives.push_back(bytes_of(folder / "a.3mf"));
+  }
+  before ? setenv("TZ", zone.c_str(), 1) : unsetenv("TZ");
+  tzset();
+  EXPECT_EQ(archives[0], archives[1]);
+  EXPECT_EQ(archives[0], archives[2]);
+  // Time and date of the last entry in the directory: midnight of 1 January 1980.
+  EXPECT_EQ(archives[0].substr(archives[0].rfind("PK\1\2") + 12, 4), std::string("\0\0\x21\0", 4));
+}
+
+TEST_F(ThreeMfFileTest, WritingCanBeCancelled) {
+  const std::atomic<bool> cancel = true;
+  context.cancel = &cancel;
+  EXPECT_THROW(write_mesh(folder / "a.3mf", random_mesh(1, {0, 0, 0}), context), Cancelled);
+  EXPECT_TRUE(files().empty());
 }
 
 /// Ten objects of ten components each would be ten thousand million triangles.

@@ -1,5 +1,6 @@
 // 3MF (3MF Consortium, core specification 1.3, production extension 1.1): XML in a ZIP archive.
 #include <map>
+#include <memory>
 
 #include "algorithms/io/scenes/scene_files.h"
 #include "algorithms/io/scenes/scene_part.h"
@@ -49,8 +50,8 @@ struct SceneObject {
   int height = 0;      ///< levels of components beneath it
 };
 
-/// Reads one file. Models are gone through once, element by element; what the build places is put together afterwards, since
-/// an object may be composed of others.
+/// Reads one file. Models are gone through once, element by element; what the build places is put together
+/// afterwards, since an object may be composed of others.
 class ThreeMfReader {
  public:
   ThreeMfReader(std::string_view bytes, MeshBuilder& builder)
@@ -76,13 +77,12 @@ class ThreeMfReader {
     constexpr const char* usual = "3D/3dmodel.model";
     std::string result;
     if (archive_.has(relationships)) {
-      const std::string text = archive_.member(relationships);
-      XmlReader xml(text, relationships, builder_);
-      xml.open_root();
-      xml.for_each_child([&] {
+      XmlReader xml(archive_.open(relationships), relationships, builder_);
+      const auto find_model = [&] {
         const auto type = xml.attribute("Type"), target = xml.attribute("Target");
-        if (result.empty() && type && target && type->ends_with("/3dmodel")) result = xml_text(*target);
-      });
+        if (result.empty() && type && target && type->ends_with("/3dmodel")) result = *target;
+      };
+      xml.read([&] { xml.for_each_child(find_model); });
     }
     if (result.starts_with('/')) result.erase(0, 1);
     if (result.empty()) result = usual;
@@ -95,31 +95,35 @@ class ThreeMfReader {
   /// Reads the objects of a model, and the items of its build where it is the root.
   void read_model(const std::string& name, bool root) {
     models_.push_back(name);
-    const std::string text = archive_.member(name);
-    XmlReader xml(text, "model", builder_);
-    xml.open_root();
-    if (xml.name() != "model")
-      xml.fail("the first element is no model; the file is damaged or of another kind");
-    check_extensions(xml);
-    if (root) note_unit(xml.attribute("unit").value_or("millimeter"));
-    // Names of files stand in attributes of the production extension, under the prefix that this model gives
-    // it.
-    path_attribute_ = std::string(xml.prefix_for("/3dmanufacturing/production/").value_or("p")) + ":path";
-    xml.for_each_child([&] {
-      if (xml.is("resources"))
-        xml.for_each_child([&] {
-          if (xml.is("object")) read_object(xml, name);
-        });
-      else if (root && xml.is("metadata") && xml.attribute("name") == "Application")
-        by_hermesh_ = trimmed(xml.text()) == "hermesh";
-      else if (root && xml.is("build"))
-        xml.for_each_child([&] {
-          if (xml.is("item")) items_.push_back(read_component(xml, name));
-        });
+    XmlReader xml(archive_.open(name), "model", builder_);
+    xml.read([&] {
+      if (xml.name() != "model")
+        xml.fail("the first element is no model; the file is damaged or of another kind");
+      check_extensions(xml);
+      if (root) note_unit(xml.attribute("unit").value_or("millimeter"));
+      // Names of files stand in attributes of the production extension, under the prefix that this model
+      // gives it.
+      path_attribute_ = std::string(xml.prefix_for("/3dmanufacturing/production/").value_or("p")) + ":path";
+      xml.for_each_child([&] { read_part(xml, name, root); });
     });
   }
 
-  /// Refuses a model that says itself that it cannot be read without knowing an extension by which shapes change.
+  /// Reads what stands directly in a model.
+  void read_part(XmlReader& xml, const std::string& model, bool root) {
+    if (xml.is("resources"))
+      xml.for_each_child([&] {
+        if (xml.is("object")) read_object(xml, model);
+      });
+    else if (root && xml.is("metadata") && xml.attribute("name") == "Application")
+      xml.for_text([this](std::string_view text) { by_hermesh_ = trimmed(text) == "hermesh"; });
+    else if (root && xml.is("build"))
+      xml.for_each_child([&] {
+        if (xml.is("item")) items_.push_back(read_component(xml, model));
+      });
+  }
+
+  /// Refuses a model that says itself that it cannot be read without knowing an extension by which shapes
+  /// change.
   void check_extensions(XmlReader& xml) {
     // A list of prefixes, which stand for addresses that the same element declares.
     std::string_view required = trimmed(xml.attribute("requiredextensions").value_or(""));
@@ -160,20 +164,26 @@ class ThreeMfReader {
   /// Reads a mesh, and makes points with equal coordinates one: the format wants them shared, and some
   /// programs write each triangle with points of its own.
   void read_mesh(XmlReader& xml, ScenePart& part) {
-    PointMerger merger(part.points);
-    std::vector<std::uint32_t> numbers;
-    xml.for_each_child([&] {
-      if (xml.is("vertices"))
-        xml.for_each_child([&] {
-          if (xml.is("vertex"))
-            numbers.push_back(merger.add({coordinate(xml, "x"), coordinate(xml, "y"), coordinate(xml, "z")}));
-        });
-      else if (xml.is("triangles"))
-        xml.for_each_child([&] {
-          if (xml.is("triangle"))
-            part.triangles.push_back(
-                {corner(xml, "v1", numbers), corner(xml, "v2", numbers), corner(xml, "v3", numbers)});
-        });
+    struct Points {
+      PointMerger merger;
+      std::vector<std::uint32_t> numbers;
+    };
+    // It lives as long as somebody may be called who adds to it.
+    const auto points = std::make_shared<Points>(Points{PointMerger(part.points), {}});
+    const auto add_point = [&xml, points] {
+      if (xml.is("vertex"))
+        points->numbers.push_back(
+            points->merger.add({coordinate(xml, "x"), coordinate(xml, "y"), coordinate(xml, "z")}));
+    };
+    const auto add_triangle = [&xml, &part, points] {
+      const std::vector<std::uint32_t>& numbers = points->numbers;
+      if (xml.is("triangle"))
+        part.triangles.push_back(
+            {corner(xml, "v1", numbers), corner(xml, "v2", numbers), corner(xml, "v3", numbers)});
+    };
+    xml.for_each_child([&xml, add_point, add_triangle] {
+      if (xml.is("vertices")) xml.for_each_child(add_point);
+      if (xml.is("triangles")) xml.for_each_child(add_triangle);
     });
   }
 
@@ -181,7 +191,7 @@ class ThreeMfReader {
   Component read_component(XmlReader& xml, const std::string& model) {
     const std::optional<std::string_view> path = xml.attribute(path_attribute_);
     Component result;
-    result.object = {path ? model_named(xml, xml_text(*path)) : model, whole_number(xml, "objectid")};
+    result.object = {path ? model_named(xml, std::string(*path)) : model, whole_number(xml, "objectid")};
     const std::optional<std::string_view> transform = xml.attribute("transform");
     if (transform) result.placement = placement_of(xml, *transform), result.is_placed = true;
     return result;

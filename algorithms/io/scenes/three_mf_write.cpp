@@ -20,104 +20,111 @@ constexpr std::string_view kHead =
 <model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <metadata name="Application">hermesh</metadata>
 )";
+constexpr std::string_view kObject = "<resources>\n<object id=\"1\" type=\"model\"><mesh><vertices>\n";
 constexpr std::size_t kPiece = std::size_t(1) << 16;
 
-/// Gathers text and hands it to the archive in large pieces.
-// A call of the archive for each number would cost more than the number.
-class ModelWriter {
+/// The text of a model: the object, and the build with it. It is made piece by piece, and may be gone through
+/// more than once. It must stay where it is.
+class ModelText {
  public:
-  explicit ModelWriter(ZipWriter& archive) : archive_(archive) {}
-
-  ModelWriter& text(std::string_view text) {
-    piece_ += text;
-    if (piece_.size() >= kPiece) flush();
-    return *this;
+  explicit ModelText(const PolygonMesh& mesh) : mesh_(mesh) {
+    if (mesh.empty()) {
+      parts_ = {{1, [this](std::size_t) { text(kHead).text("<resources/>\n<build/>\n</model>\n"); }}};
+      return;
+    }
+    parts_ = {{1, [this](std::size_t) { text(kHead).text(kObject); }},
+              {mesh.points.size(), [this](std::size_t i) { add_point(mesh_.points[i]); }},
+              {1, [this](std::size_t) { text("</vertices><triangles>\n"); }},
+              {mesh.triangles.size(), [this](std::size_t i) { add_triangle(mesh_.triangles[i]); }},
+              {mesh.quads.size(), [this](std::size_t i) { add_quad(mesh_.quads[i]); }},
+              {1, [this](std::size_t) { add_build(); }}};
   }
+
+  /// The next piece, which stays until the next call; an empty one at the end, behind which the text begins
+  /// anew.
+  std::string_view next() {
+    piece_.clear();
+    if (part_ == 0) left_out_ = 0;
+    while (part_ < parts_.size() && piece_.size() < kPiece) {
+      if (element_ < parts_[part_].elements)
+        parts_[part_].add(element_++);
+      else
+        element_ = 0, ++part_;
+    }
+    if (piece_.empty()) part_ = 0;
+    return piece_;
+  }
+  /// Triangles that were left out of the text that was gone through last.
+  std::size_t left_out() const { return left_out_; }
+
+ private:
+  struct Part {
+    std::size_t elements;
+    std::function<void(std::size_t)> add;
+  };
+
+  ModelText& text(std::string_view text) { return piece_ += text, *this; }
   /// Adds the shortest text that reads back as the same number. Text is read in double precision, so points
   /// are written as doubles: the few digits that would identify a float among floats are another double.
   template <class T>
-  ModelWriter& number(T value) {
+  ModelText& number(T value) {
     char digits[32];
     return text({digits, std::to_chars(digits, digits + sizeof digits, value).ptr});
   }
-  void flush() {
-    archive_.add(piece_);
-    piece_.clear();
+  void add_point(const Eigen::Vector3f& point) {
+    text("<vertex x=\"").number(double(point.x())).text("\" y=\"").number(double(point.y()));
+    text("\" z=\"").number(double(point.z())).text("\"/>\n");
   }
-
- private:
-  ZipWriter& archive_;
-  std::string piece_;
-};
-
-/// Writes the object's triangles. @returns how many were left out
-std::size_t write_triangles(ModelWriter& out, const PolygonMesh& mesh) {
-  std::size_t left_out = 0;
-  const auto triangle = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    if (a == b || b == c || c == a) return void(++left_out);
-    out.text("<triangle v1=\"")
-        .number(a)
-        .text("\" v2=\"")
-        .number(b)
-        .text("\" v3=\"")
-        .number(c)
-        .text("\"/>\n");
-  };
-  for (const auto& [a, b, c] : mesh.triangles) triangle(a, b, c);
-  for (const auto& [a, b, c, d] : mesh.quads) triangle(a, b, c), triangle(a, c, d);
-  return left_out;
-}
-
-/// Writes the model: the object, and the build with it. @returns how many triangles were left out
-std::size_t write_model(ModelWriter& out, const PolygonMesh& mesh) {
-  out.text(kHead);
-  std::size_t left_out = 0;
-  if (mesh.empty()) {
-    out.text("<resources/>\n<build/>\n</model>\n");
-  } else {
-    out.text("<resources>\n<object id=\"1\" type=\"model\"><mesh><vertices>\n");
-    for (const Eigen::Vector3f& point : mesh.points) {
-      out.text("<vertex x=\"").number(double(point.x())).text("\" y=\"").number(double(point.y()));
-      out.text("\" z=\"").number(double(point.z())).text("\"/>\n");
-    }
-    out.text("</vertices><triangles>\n");
-    left_out = write_triangles(out, mesh);
-    out.text("</triangles></mesh></object>\n</resources>\n<build><item objectid=\"1\"");
+  void add_triangle(const Triangle& corners) {
+    const auto [a, b, c] = corners;
+    if (a == b || b == c || c == a) return void(++left_out_);
+    text("<triangle v1=\"").number(a).text("\" v2=\"").number(b).text("\" v3=\"").number(c).text("\"/>\n");
+  }
+  void add_quad(const Quad& corners) {
+    const auto [a, b, c, d] = corners;
+    add_triangle({a, b, c}), add_triangle({a, c, d});
+  }
+  void add_build() {
+    text("</triangles></mesh></object>\n</resources>\n<build><item objectid=\"1\"");
     // The origin is the item's place. Readers in single precision then lose no more of the shape than there
     // is to lose.
-    if (const std::optional<Eigen::Vector3d> origin = stated_origin(mesh)) {
-      out.text(" transform=\"1 0 0 0 1 0 0 0 1");
-      for (const double x : *origin) out.text(" ").number(x);
-      out.text("\"");
+    if (const std::optional<Eigen::Vector3d> origin = stated_origin(mesh_)) {
+      text(" transform=\"1 0 0 0 1 0 0 0 1");
+      for (const double x : *origin) text(" ").number(x);
+      text("\"");
     }
-    out.text("/></build>\n</model>\n");
+    text("/></build>\n</model>\n");
   }
-  out.flush();
-  return left_out;
-}
+
+  const PolygonMesh& mesh_;
+  std::vector<Part> parts_;
+  std::string piece_;
+  std::size_t part_ = 0, element_ = 0, left_out_ = 0;
+};
 
 }  // namespace
 
 void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, const std::string& file,
                     RunContext& context) {
-  // The order is that in which readers look for them: what kinds of files there are, where the model is, the model.
-  ZipWriter archive;
-  std::size_t left_out = 0;
-  try {
-    archive.begin("[Content_Types].xml");
-    archive.add(kTypes);
-    archive.begin("_rels/.rels");
-    archive.add(kRelationships);
-    archive.begin("3D/3dmodel.model");
-    ModelWriter model(archive);
-    left_out = write_model(model, mesh);
-  } catch (const Error& error) {
-    throw Error("cannot write " + in_quotes(file) + ": " + error.what() + "; write .ply");
-  }
-  if (left_out > 0)
-    context.note(in_quotes(file) + ": " + std::to_string(left_out) +
+  ModelText model(mesh);
+  const auto next = [&] {
+    context.check();
+    return model.next();
+  };
+  // The archive wants the length first. To make the text is quick beside packing it, and it may be too long
+  // to be kept.
+  std::uint64_t size = 0;
+  for (std::string_view piece = next(); !piece.empty(); piece = next()) size += piece.size();
+  if (model.left_out() > 0)
+    context.note(in_quotes(file) + ": " + std::to_string(model.left_out()) +
                  " triangles with a corner twice were left out, which 3MF forbids");
-  for (const std::string& piece : archive.finish()) out(piece);
+  // The order is that in which readers look for them: what kinds of files there are, where the model is, the
+  // model.
+  ZipWriter archive;
+  archive.add("[Content_Types].xml", std::string(kTypes));
+  archive.add("_rels/.rels", std::string(kRelationships));
+  archive.add("3D/3dmodel.model", size, next);
+  archive.write(out);
 }
 
 }  // namespace hermesh::mesh_formats

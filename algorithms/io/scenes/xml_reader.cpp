@@ -1,186 +1,171 @@
 #include "algorithms/io/scenes/xml_reader.h"
 
+#include <malloc.h>
+
 #include <algorithm>
+#include <cstdlib>
+#include <new>
 
 namespace hermesh::mesh_formats {
 
 namespace {
 
 constexpr std::size_t kDeepest = 1000;
-constexpr std::pair<std::string_view, char> kEntities[] = {
-    {"amp", '&'}, {"lt", '<'}, {"gt", '>'}, {"quot", '"'}, {"apos", '\''}};
+constexpr std::size_t kPiece = std::size_t(1) << 18;
+/// Bytes of an element's text that are kept; only short words are ever asked for.
+constexpr std::size_t kMostText = 1000;
+/// Memory that the parsers of a thread may take. They keep each name once, and the tag that they are in as a
+/// whole, of which only what was made to do harm has millions of bytes.
+constexpr std::size_t kMostTaken = std::size_t(1) << 23;
+thread_local std::size_t taken = 0;
 
-/// Whether a name ends before this character. Which characters a name may have is not checked: none that is asked for has others.
-bool ends_name(char c) {
-  return is_space(c) || c == '=' || c == '>' || c == '/' || c == '<' || c == '"' || c == '\'';
+void* take_again(void* old, std::size_t size) {
+  const std::size_t before = malloc_usable_size(old);
+  if (size > kMostTaken - std::min(taken - before, kMostTaken)) return nullptr;
+  void* const now = std::realloc(old, size);
+  if (now) taken += malloc_usable_size(now) - before;
+  return now;
 }
+void* take(std::size_t size) { return take_again(nullptr, size); }
+void give_back(void* memory) {
+  taken -= malloc_usable_size(memory);
+  std::free(memory);
+}
+constexpr XML_Memory_Handling_Suite kMemory = {take, take_again, give_back};
+
+XmlReader& reader(void* user) { return *static_cast<XmlReader*>(user); }
 
 }  // namespace
 
-XmlReader::XmlReader(std::string_view text, std::string what, MeshBuilder& builder)
-    : text_(without_byte_order_mark(without_padding(text))), what_(std::move(what)), builder_(builder) {
-  if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))
-    fail("text in UTF-16, which is not read; save it as UTF-8");
+XmlReader::XmlReader(ZipMember text, std::string what, MeshBuilder& builder)
+    : text_(std::move(text)),
+      what_(std::move(what)),
+      builder_(builder),
+      parser_(XML_ParserCreate_MM(nullptr, &kMemory, nullptr)) {
+  XML_Parser const parser = parser_.get();
+  if (!parser) throw std::bad_alloc();
+  XML_SetUserData(parser, this);
+  XML_SetElementHandler(
+      parser,
+      [](void* user, const char* name, const char** attributes) { reader(user).start(name, attributes); },
+      [](void* user, const char*) { reader(user).end(); });
+  XML_SetCharacterDataHandler(parser, [](void* user, const char* piece, int size) {
+    std::string& kept = reader(user).passed_text_;
+    if (reader(user).text_visit_ && kept.size() < kMostText)
+      reader(user).guard([&] { kept.append(piece, static_cast<std::size_t>(size)); });
+  });
+  // It is told of before the first entity is declared.
+  XML_SetStartDoctypeDeclHandler(parser, [](void* user, const char*, const char*, const char*, int) {
+    reader(user).guard([&] { reader(user).fail("a document type, which files of this kind must not have"); });
+  });
 }
 
-void XmlReader::fail(const std::string& what) const {
-  const auto line =
-      1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, text_.size())),
-                     '\n');
-  builder_.fail("line " + std::to_string(line) + " of its " + what_ + ": " + what);
+/// Work that the parser asks for is done within: the parser calls from C, which no exception may pass
+/// through.
+template <class Work>
+void XmlReader::guard(Work&& work) {
+  // It may tell of the end of an element even though it was stopped at its start.
+  if (thrown_) return;
+  try {
+    work();
+  } catch (...) {
+    thrown_ = std::current_exception();
+    XML_StopParser(parser_.get(), XML_FALSE);
+  }
 }
 
-void XmlReader::fail_truncated() const { fail("the text breaks off; the file is truncated or damaged"); }
+void XmlReader::read(const Visit& visit) {
+  visits_ = {visit};
+  XML_ParsingStatus state = {XML_INITIALIZED, XML_FALSE};
+  while (state.parsing != XML_FINISHED) {
+    builder_.context().check();
+    void* const room = XML_GetBuffer(parser_.get(), kPiece);
+    if (!room) fail_by(XML_GetErrorCode(parser_.get()));
+    const std::size_t size = text_.read({static_cast<char*>(room), kPiece});
+    const XML_Status status = XML_ParseBuffer(parser_.get(), static_cast<int>(size), size == 0);
+    if (thrown_) std::rethrow_exception(thrown_);
+    XML_GetParsingStatus(parser_.get(), &state);
+    // Stopped at the end of the first element, which is the end of all that counts.
+    const XML_Error error = XML_GetErrorCode(parser_.get());
+    if (status != XML_STATUS_OK && error != XML_ERROR_ABORTED) fail_by(error);
+  }
+  read_rest();
+}
 
-std::string_view XmlReader::local(std::string_view name) { return name.substr(name.find(':') + 1); }
+/// Reads what is left of the archive's member, whose checksum is known at its end alone.
+void XmlReader::read_rest() {
+  std::string room(kPiece, '\0');
+  while (text_.read(room) > 0) builder_.context().check();
+}
 
-std::string_view XmlReader::prefix_of(std::string_view name) {
-  const std::size_t colon = name.find(':');
-  return name.substr(0, colon == std::string_view::npos ? 0 : colon);
+void XmlReader::start(const char* name, const char** attributes) {
+  guard([&] {
+    builder_.tick(text_.done(), text_.size());
+    // Only what is damaged, or made to do harm, nests deeper.
+    if (visits_.size() > kDeepest) fail("elements are nested too deeply; the file is damaged");
+    name_ = name, attributes_ = attributes;
+    if (visits_.size() == 1) root_prefix_ = prefix();
+    visits_.emplace_back();
+    if (const Visit& visit = visits_[visits_.size() - 2]) visit();
+  });
+}
+
+void XmlReader::end() {
+  guard([&] {
+    if (text_visit_ && visits_.size() == text_level_) std::exchange(text_visit_, nullptr)(passed_text_);
+    visits_.pop_back();
+    if (visits_.size() == 1) XML_StopParser(parser_.get(), XML_FALSE);
+  });
+}
+
+void XmlReader::for_text(std::function<void(std::string_view)> visit) {
+  text_visit_ = std::move(visit);
+  text_level_ = visits_.size();
+  passed_text_.clear();
+}
+
+std::string_view XmlReader::name() const { return name_.substr(name_.find(':') + 1); }
+
+std::string_view XmlReader::prefix() const {
+  const std::size_t colon = name_.find(':');
+  return name_.substr(0, colon == std::string_view::npos ? 0 : colon);
 }
 
 std::optional<std::string_view> XmlReader::attribute(std::string_view name) const {
-  for (const auto& [key, value] : attributes_)
-    if (key == name) return value;
+  for (const char** each = attributes_; *each; each += 2)
+    if (each[0] == name) return each[1];
   return std::nullopt;
 }
 
 std::optional<std::string_view> XmlReader::prefix_for(std::string_view part) const {
-  for (const auto& [key, value] : attributes_)
-    if (key.starts_with("xmlns:") && value.find(part) != std::string_view::npos) return local(key);
+  constexpr std::string_view declares = "xmlns:";
+  for (const char** each = attributes_; *each; each += 2)
+    if (std::string_view(each[0]).starts_with(declares) &&
+        std::string_view(each[1]).find(part) != std::string_view::npos)
+      return each[0] + declares.size();
   return std::nullopt;
 }
 
-// Comments and the like end at a fixed word, whatever stands between.
-void XmlReader::pass(std::string_view end) {
-  const std::size_t found = text_.find(end, at_);
-  if (found == std::string_view::npos) fail_truncated();
-  at_ = found + end.size();
+void XmlReader::fail(const std::string& what) {
+  const std::string line = std::to_string(XML_GetCurrentLineNumber(parser_.get()));
+  // Where the archive is damaged the text may say anything, and is not to blame.
+  read_rest();
+  builder_.fail("line " + line + " of its " + what_ + ": " + what);
 }
 
-void XmlReader::pass_space() {
-  while (at_ < text_.size() && is_space(text_[at_])) ++at_;
-}
-
-std::string_view XmlReader::read_name() {
-  const std::size_t start = at_;
-  while (at_ < text_.size() && !ends_name(text_[at_])) ++at_;
-  if (at_ == start) fail("a name is missing; the file is damaged");
-  return text_.substr(start, at_ - start);
-}
-
-void XmlReader::open_root() {
-  if (!next()) fail("there is no element");
-  root_prefix_ = prefix();
-}
-
-/// Goes to the next tag. @returns whether it starts an element, whose name is on top then; one that ends is
-/// taken off.
-bool XmlReader::next() {
-  // An element without content begins and ends in one tag, and is told of in two steps.
-  if (ends_at_once_) {
-    ends_at_once_ = false;
-    names_.pop_back();
-    return false;
+/// Says what the parser found.
+void XmlReader::fail_by(XML_Error error) {
+  switch (error) {
+    case XML_ERROR_NO_ELEMENTS:
+    case XML_ERROR_UNCLOSED_TOKEN:
+    case XML_ERROR_PARTIAL_CHAR:
+    case XML_ERROR_UNCLOSED_CDATA_SECTION:
+      fail("the text breaks off; the file is truncated or damaged");
+    case XML_ERROR_NO_MEMORY:
+      fail("a tag of millions of bytes, or as many names; the file is damaged");
+    default:
+      fail(std::string(XML_ErrorString(error)) + "; the file is damaged");
   }
-  while (true) {
-    builder_.tick(at_, text_.size());
-    const std::size_t tag = text_.find('<', at_);
-    if (tag == std::string_view::npos) {
-      at_ = text_.size();
-      fail_truncated();
-    }
-    at_ = tag;
-    // From the longest beginning to the shortest, since some are the beginnings of others.
-    const std::string_view rest = text_.substr(at_);
-    if (rest.starts_with("<!--")) {
-      at_ += 4;
-      pass("-->");
-    } else if (rest.starts_with("<![CDATA[")) {
-      pass("]]>");
-    } else if (rest.starts_with("<?")) {
-      pass("?>");
-    } else if (rest.starts_with("<!")) {
-      fail("a document type, which files of this kind must not have");
-    } else if (rest.starts_with("</")) {
-      read_end();
-      return false;
-    } else {
-      return read_start();
-    }
-  }
-}
-
-void XmlReader::read_end() {
-  at_ += 2;
-  const std::string_view name = read_name();
-  pass_space();
-  if (at_ == text_.size()) fail_truncated();
-  if (names_.empty() || names_.back() != name || text_[at_] != '>')
-    fail("an element ends that did not begin there; the file is damaged");
-  ++at_;
-  names_.pop_back();
-}
-
-bool XmlReader::read_start() {
-  ++at_;
-  const std::string_view name = read_name();
-  // Only what is damaged, or made to do harm, nests deeper.
-  if (names_.size() == kDeepest) fail("elements are nested too deeply; the file is damaged");
-  attributes_.clear();
-  for (pass_space(); at_ < text_.size() && text_[at_] != '>' && text_[at_] != '/'; pass_space()) {
-    const std::string_view key = read_name();
-    pass_space();
-    if (at_ == text_.size()) fail_truncated();
-    if (text_[at_] != '=') fail("an attribute without a value; the file is damaged");
-    ++at_;
-    pass_space();
-    if (at_ == text_.size()) fail_truncated();
-    const char quote = text_[at_];
-    if (quote != '"' && quote != '\'')
-      fail("an attribute's value without quotation marks; the file is damaged");
-    const std::size_t end = text_.find(quote, ++at_);
-    if (end == std::string_view::npos) fail_truncated();
-    const std::string_view value = text_.substr(at_, end - at_);
-    // A mark that was lost would make all up to the next one the value.
-    if (value.find('<') != std::string_view::npos)
-      fail("an attribute's value with a '<' in it; the file is damaged");
-    attributes_.emplace_back(key, value);
-    at_ = end + 1;
-  }
-  if (at_ == text_.size()) fail_truncated();
-  ends_at_once_ = text_[at_] == '/';
-  at_ += ends_at_once_;
-  if (at_ >= text_.size()) fail_truncated();
-  if (text_[at_] != '>') fail("a tag that does not end; the file is damaged");
-  ++at_;
-  names_.push_back(name);
-  return true;
-}
-
-std::string xml_text(std::string_view value) {
-  std::string result;
-  for (std::size_t at = 0; at < value.size(); ++at) {
-    const std::size_t end = value[at] == '&' ? value.find(';', at) : std::string_view::npos;
-    const std::string_view entity = end == std::string_view::npos ? "" : value.substr(at + 1, end - at - 1);
-    char c = value[at];
-    bool known = false;
-    for (const auto& [name, meaning] : kEntities)
-      if (entity == name) c = meaning, known = true;
-    if (entity.starts_with('#')) {
-      const bool hexadecimal = entity.substr(1).starts_with('x');
-      const char* const digits = entity.data() + (hexadecimal ? 2 : 1);
-      int number = 0;
-      const auto [rest, error] =
-          std::from_chars(digits, entity.data() + entity.size(), number, hexadecimal ? 16 : 10);
-      known = error == std::errc() && rest == entity.data() + entity.size() && number >= ' ' && number < 127;
-      if (known) c = static_cast<char>(number);
-    }
-    // An entity that is not known stays as it is.
-    result += c;
-    if (known) at = end;
-  }
-  return result;
 }
 
 }  // namespace hermesh::mesh_formats
