@@ -1,6 +1,7 @@
-// CGAL: edge collapse with Garland and Heckbert's quadrics, alone and within a polyhedral envelope, and alpha
-// wrapping.
-//   cgal_peer garland-heckbert IN.obj OUT.obj FRACTION      keeps this fraction of the edges
+// CGAL: edge collapse with Garland and Heckbert's quadrics or Lindstrom and Turk's costs, the latter within a
+// polyhedral envelope, too, and alpha wrapping.
+//   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many stay
+//   cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER          the same
 //   cgal_peer envelope IN.obj OUT.obj TOLERANCE             as far as an envelope of that width allows; world
 //   units cgal_peer alpha-wrap IN.obj OUT.obj ALPHA OFFSET        world units
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -59,8 +60,9 @@ peers::Mesh from_cgal(Surface& surface) {
 }
 
 /// The user manual's example edge_collapse_garland_heckbert.cpp.
-peers::Mesh garland_heckbert(const peers::Mesh& mesh, double fraction) {
+peers::Mesh garland_heckbert(const peers::Mesh& mesh, double number) {
   Surface surface = to_cgal(mesh);
+  const double fraction = double(peers::kept_triangles(mesh, number)) / double(mesh.triangles.size());
   peers::measured([&] {
     using Policies = simplification::GarlandHeckbert_plane_policies<Surface, Kernel>;
     const Policies policies(surface);
@@ -68,6 +70,16 @@ peers::Mesh garland_heckbert(const peers::Mesh& mesh, double fraction) {
         policies.get_placement());
     simplification::edge_collapse(surface, simplification::Count_ratio_stop_predicate<Surface>(fraction),
                                   CGAL::parameters::get_cost(policies.get_cost()).get_placement(placement));
+  });
+  return from_cgal(surface);
+}
+
+/// What `edge_collapse` does where nothing else is asked for, down to a number of edges.
+peers::Mesh lindstrom_turk(const peers::Mesh& mesh, double number) {
+  Surface surface = to_cgal(mesh);
+  const std::size_t edges = peers::kept_triangles(mesh, number) * 3 / 2;
+  peers::measured([&] {
+    simplification::edge_collapse(surface, simplification::Count_stop_predicate<Surface>(edges + 1));
   });
   return from_cgal(surface);
 }
@@ -101,10 +113,11 @@ int main(int argc, char** argv) {
     const std::string method = argc > 1 ? argv[1] : "";
     if (argc != (method == "alpha-wrap" ? 6 : 5))
       throw std::runtime_error(
-          "cgal_peer garland-heckbert|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA OFFSET");
+          "cgal_peer garland-heckbert|lindstrom-turk|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA OFFSET");
     const peers::Mesh mesh = peers::read_obj(argv[2]);
     const double number = std::atof(argv[4]);
     peers::write_obj(argv[3], method == "garland-heckbert" ? garland_heckbert(mesh, number)
+                              : method == "lindstrom-turk" ? lindstrom_turk(mesh, number)
                               : method == "envelope"       ? envelope(mesh, number)
                               : method == "alpha-wrap"
                                   ? alpha_wrap(mesh, number, std::atof(argv[5]))

@@ -1,6 +1,7 @@
-// OpenMesh: its decimater with quadrics for the order, and the modules that bound the Hausdorff distance and
-// forbid flips.
-//   openmesh_peer IN.obj OUT.obj TOLERANCE     world units
+// OpenMesh: its decimater with quadrics for the order and the module that forbids flips, within a Hausdorff
+// distance or to a number of triangles.
+//   openmesh_peer IN.obj OUT.obj TOLERANCE             world units
+//   openmesh_peer quadric IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many stay
 #include <OpenMesh/Core/IO/MeshIO.hh>
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
@@ -18,7 +19,8 @@ struct Traits : OpenMesh::DefaultTraits {
 };
 using Surface = OpenMesh::TriMesh_ArrayKernelT<Traits>;
 
-peers::Mesh decimated(const peers::Mesh& mesh, double tolerance) {
+/// Down to `triangles`, or where there are none as far as the tolerance allows.
+peers::Mesh decimated(const peers::Mesh& mesh, double tolerance, std::size_t triangles) {
   Surface surface;
   std::vector<Surface::VertexHandle> handles;
   for (const auto& p : mesh.points) handles.push_back(surface.add_vertex({p[0], p[1], p[2]}));
@@ -32,13 +34,16 @@ peers::Mesh decimated(const peers::Mesh& mesh, double tolerance) {
     OpenMesh::Decimater::ModHausdorffT<Surface>::Handle hausdorff;
     OpenMesh::Decimater::ModNormalFlippingT<Surface>::Handle flipping;
     decimater.add(quadric);
-    decimater.add(hausdorff);
+    if (triangles == 0) decimater.add(hausdorff);
     decimater.add(flipping);
     // One module gives the order, so the quadric's has no bound, which would make it a yes or no.
     decimater.module(quadric).unset_max_err();
-    decimater.module(hausdorff).set_tolerance(tolerance);
+    if (triangles == 0) decimater.module(hausdorff).set_tolerance(tolerance);
     if (!decimater.initialize()) throw std::runtime_error("OpenMesh's decimater could not be set up");
-    decimater.decimate();  // as far as the modules allow
+    if (triangles == 0)
+      decimater.decimate();  // as far as the modules allow
+    else
+      decimater.decimate_to_faces(0, triangles);
     surface.garbage_collection();
   });
   peers::Mesh result;
@@ -57,7 +62,11 @@ peers::Mesh decimated(const peers::Mesh& mesh, double tolerance) {
 
 int main(int argc, char** argv) {
   return peers::guarded([&] {
-    if (argc != 4) throw std::runtime_error("openmesh_peer IN OUT TOLERANCE");
-    peers::write_obj(argv[2], decimated(peers::read_obj(argv[1]), std::atof(argv[3])));
+    if (argc == 5 && std::string(argv[1]) == "quadric") {
+      const peers::Mesh mesh = peers::read_obj(argv[2]);
+      return peers::write_obj(argv[3], decimated(mesh, 0, peers::kept_triangles(mesh, std::atof(argv[4]))));
+    }
+    if (argc != 4) throw std::runtime_error("openmesh_peer IN OUT TOLERANCE, or quadric IN OUT NUMBER");
+    peers::write_obj(argv[2], decimated(peers::read_obj(argv[1]), std::atof(argv[3]), 0));
   });
 }

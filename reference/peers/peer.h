@@ -55,6 +55,11 @@ inline void write_obj(const std::string& path, const Mesh& mesh) {
   if (std::fclose(file) != 0) throw std::runtime_error("cannot write " + path);
 }
 
+/// How many triangles of a mesh are to stay where its user says a share below 1, or how many.
+inline std::size_t kept_triangles(const Mesh& mesh, double number) {
+  return static_cast<std::size_t>(number < 1 ? number * double(mesh.triangles.size()) : number);
+}
+
 /// A line such as "VmHWM:  1234 kB" of /proc/self/status, in bytes; 0 where there is none.
 inline double status_bytes(const std::string& key) {
   std::ifstream status("/proc/self/status");

@@ -1,6 +1,6 @@
 // VTK: vtkFlyingEdges3D, vtkQuadricDecimation and vtkDecimatePro.
 //   vtk_peer flying-edges VOLUME.vdb OUT.obj THREADS
-//   vtk_peer quadric IN.obj OUT.obj FRACTION             keeps this fraction of the triangles
+//   vtk_peer quadric IN.obj OUT.obj NUMBER               a share of the triangles, or from 1 on how many stay
 //   vtk_peer decimate-pro IN.obj OUT.obj TOLERANCE       world units
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
@@ -80,11 +80,13 @@ peers::Mesh flying_edges(const std::string& volume, int threads) {
   return from_vtk(edges->GetOutput());
 }
 
-peers::Mesh quadric(const peers::Mesh& mesh, double fraction) {
+peers::Mesh quadric(const peers::Mesh& mesh, double number) {
   const auto input = to_vtk(mesh);
   vtkNew<vtkQuadricDecimation> decimation;
   decimation->SetInputData(input);
-  decimation->SetTargetReduction(1.0 - fraction);
+  // VTK stops once the share that is gone reaches the target, which half a triangle keeps clear of rounding.
+  const double all = double(mesh.triangles.size()), kept = double(peers::kept_triangles(mesh, number));
+  decimation->SetTargetReduction(1.0 - (kept + 0.5) / all);
   decimation->VolumePreservationOn();
   peers::measured([&] { decimation->Update(); });
   return from_vtk(decimation->GetOutput());
