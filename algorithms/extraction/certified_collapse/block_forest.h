@@ -17,10 +17,11 @@ namespace hermesh {
 /// @param fine the mesh, in index space
 /// @param tolerance by point, voxels
 /// @param pinned by point: points that are in no set
+/// @param moment greatest cost of a collapse, voxels⁴ (decimation.h), of which a set may take its share; 0 for none
 /// @param file rounds places to the file's precision
 /// @param context asked whether to stop
 /// @throws Cancelled
 MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
-                         const FilePoints& file, const RunContext& context);
+                         double moment, const FilePoints& file, const RunContext& context);
 
 }  // namespace hermesh

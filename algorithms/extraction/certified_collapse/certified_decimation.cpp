@@ -5,6 +5,7 @@
 #include "algorithms/extraction/certified_collapse/block_forest.h"
 #include "algorithms/extraction/certified_collapse/decimation.h"
 #include "algorithms/extraction/certified_collapse/merge_proof.h"
+#include "algorithms/extraction/certified_collapse/relaxation.h"
 
 namespace hermesh {
 namespace {
@@ -17,7 +18,7 @@ constexpr int kMostPasses = 3;
 
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
-                                 RunContext& context) {
+                                 RunContext& context, const Nearness& nearness) {
   // Where no distance is allowed nothing may move, whatever the caller has pinned.
   pinned.resize(tolerance.size());
   for (std::size_t p = 0; p < tolerance.size(); ++p)
@@ -30,11 +31,11 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
   // quadrics alone. Only the topology is looked at yet: distances are proved once edges have been collapsed
   // with care, too.
   MergeForest forest =
-      timed("decimate", [&] { return block_forest(fine, tolerance, pinned, file, context); });
+      timed("decimate", [&] { return block_forest(fine, tolerance, pinned, nearness.moment, file, context); });
   MergeProof proof(forest, fine, tolerance, context);
   const auto collapse = [&](std::span<const std::uint8_t> where, Collapses kind) {
     timed("decimate", [&] {
-      collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, file, context);
+      collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, nearness.moment, file, context);
     });
   };
   timed("decimate", [&] { proof.sort_out(); });
@@ -49,6 +50,12 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     collapse(brought_back, Collapses::careful);
     timed("certify", [&] { proof.prove(); });
     if (double(proof.merged().leaders.size()) > (1.0 - kWorthAnother) * before) break;
+  }
+  if (nearness.relaxation > 0) {
+    timed("relax", [&] {
+      propose_relaxation(forest, proof.merged(), fine, tolerance, pinned, nearness.relaxation, file, context);
+    });
+    timed("certify", [&] { proof.prove(); });
   }
   const MergedMesh& merged = proof.merged();
   return {merged.mesh->points(), merged.mesh->triangles(), merged.origin};

@@ -27,6 +27,14 @@ struct CertifiedMesh {
   std::vector<std::uint32_t> fine_triangle;
 };
 
+/// What is done for the root mean square distance, beside the bound of the greatest one.
+struct Nearness {
+  /// Greatest cost of a collapse, voxels⁴ (collapse_edges()); 0 for none, so that triangles are as few as the tolerance allows.
+  double moment = 0;
+  /// Sweeps of propose_relaxation() over the mesh; 0 for none.
+  int relaxation = 0;
+};
+
 /// Merges points of a fine mesh where the outcome is proved: the same topology, no two triangles that meet, and the
 /// distance both ways. A triangle's tolerance is the least of its corners. Each place of the fine mesh is within its
 /// triangle's tolerance and kDistanceSlack of the coarse one, and for each place of the coarse one there is a fine
@@ -39,8 +47,10 @@ struct CertifiedMesh {
 ///   its ends must be pinned; so a complex of patches keeps their rims.
 /// @param file rounds places to the file's precision
 /// @param context told of progress, and asked whether to stop
+/// @param nearness for the root mean square distance
 /// @throws Cancelled
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
-                                 std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context);
+                                 std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context,
+                                 const Nearness& nearness = {});
 
 }  // namespace hermesh

@@ -46,6 +46,25 @@ WideQuadric CubeCollapse::quadric_about(std::uint32_t u, std::uint32_t v, const 
   return sum;
 }
 
+WideQuadric CubeCollapse::quadric_of_faces(std::uint32_t u, std::uint32_t v, const Vector3d& anchor) const {
+  WideQuadric sum;
+  const auto add = [&](std::uint32_t f) {
+    const auto& c = local_.faces[f].corners;
+    const Vector3d corner = local_.vertices[c[0]].point - anchor;
+    const Vector3d normal = (local_.vertices[c[1]].point - local_.vertices[c[0]].point)
+                                .cross(local_.vertices[c[2]].point - local_.vertices[c[0]].point);
+    const double size = normal.norm();
+    if (size > 0) sum.add_plane(normal / size, -normal.dot(corner) / size, 0.5 * size);
+  };
+  local_.for_each_face(u, [&](std::uint32_t f, int) { add(f); });
+  // The two faces beside the edge are around both ends.
+  local_.for_each_face(v, [&](std::uint32_t f, int) {
+    const auto& c = local_.faces[f].corners;
+    if (c[0] != u && c[1] != u && c[2] != u) add(f);
+  });
+  return sum;
+}
+
 bool CubeCollapse::gather(std::uint32_t going, std::uint32_t v, const Vector3d& x) {
   // Points stay in the cube, or triangles that belong to it could reach into another one.
   if (!cube_.holds(x)) {

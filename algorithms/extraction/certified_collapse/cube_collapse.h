@@ -29,6 +29,11 @@ class CubeCollapse {
   /// Sum of the quadrics of two vertices, about `anchor`.
   WideQuadric quadric_about(std::uint32_t u, std::uint32_t v, const Eigen::Vector3d& anchor) const;
 
+  /// Squared distances to the planes of the faces around two vertices, weighted by area, about `anchor`.
+  WideQuadric quadric_of_faces(std::uint32_t u, std::uint32_t v, const Eigen::Vector3d& anchor) const;
+
+  /// What a collapse may cost, voxels⁴, or 0 where the tests alone say.
+  double moment() const { return mesh_.moment; }
   float tolerance_at(std::uint32_t v) const { return mesh_.least_tolerance[local_.vertices[v].global]; }
   bool is_dirty(std::uint32_t v) const { return mesh_.dirty[local_.vertices[v].global] != 0; }
   /// Has the edges at a vertex looked at in the next round: what failed there may succeed then.

@@ -68,15 +68,19 @@ class EdgeCollapses {
     const CubeMesh::Vertex &at_u = mesh_.vertices[u], &at_v = mesh_.vertices[v];
     const Vector3d middle = 0.5 * (at_u.point + at_v.point);
     const WideQuadric q = collapses_.quadric_about(u, v, middle);
+    const bool forgets = collapses_.moment() > 0;
+    const WideQuadric cost = forgets ? collapses_.quadric_of_faces(u, v, middle) : q;
     Vector3d x = !at_u.free   ? Vector3d(at_u.point - middle)
                  : !at_v.free ? Vector3d(at_v.point - middle)
-                              : q.minimiser();
+                              : cost.minimiser();
     const double squared = (at_u.point - at_v.point).squaredNorm();
     // Planes that are nearly parallel meet far away: no farther than the edge is long.
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();
     const double off = q(x), tolerance = std::min(collapses_.tolerance_at(u), collapses_.tolerance_at(v));
+    const double now = forgets ? cost(x) : off;
+    const bool hopeless = off > hopeless_ * tolerance * tolerance * q.a.trace() || (forgets && now > collapses_.moment());
     // Where planes tell nothing apart, as on flat parts, short edges come before long ones.
-    return {middle + x, off + kPull * q.a.trace() * squared, off > hopeless_ * tolerance * tolerance * q.a.trace()};
+    return {middle + x, now + kPull * cost.a.trace() * squared, hopeless};
   }
 
   void propose(std::uint32_t u, std::uint32_t v) {

@@ -198,10 +198,11 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::sp
 
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
                     const FineMesh& fine, std::span<const float> tolerance,
-                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file,
+                    std::span<const std::uint8_t> pinned, Collapses kind, double moment, const FilePoints& file,
                     RunContext& context) {
   DecimatedMesh mesh = begin(forest, merged, where, fine, tolerance, context);
   mesh.pinned = pinned;
+  mesh.moment = moment;
   if (kind == Collapses::careful) attach_samples(mesh, forest, merged, context);
   Bounds box;
   for (const Vector3d& p : merged.mesh->points()) box.add(p);

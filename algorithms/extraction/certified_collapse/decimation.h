@@ -30,6 +30,7 @@ struct DecimatedMesh {
   std::vector<PlaneQuadric> quadrics;    ///< planes that the point stands for, about the point
   std::vector<float> least_tolerance;    ///< least among the samples that the point stands for
   std::vector<std::uint8_t> unmoved;     ///< 1 for samples that are points, and where they were
+  double moment = 0;                     ///< what a collapse may cost (collapse_edges()), or 0
   // Numbered by triangle, but for `next_sample`:
   std::vector<Triangle> triangles;           ///< first corner kNoTriangle: no longer there
   std::vector<std::uint32_t> fine_triangle;  ///< the one of the fine mesh that each began as
@@ -61,12 +62,16 @@ enum class Collapses { bold, careful };
 /// @param tolerance by point of `fine`, voxels
 /// @param pinned by point of `fine`: points that stay as and where they are
 /// @param kind how collapses are tested
+/// @param moment 0: collapses cost the squared distances to the planes of all that the new point stands for, and go on as
+///   far as the tests allow. Else the greatest cost of a collapse, voxels⁴, which is the sum of squared distances of the new
+///   point to the planes of the triangles around the edge as they are now, weighted by their areas: without a memory, and
+///   the cheapest first, as Lindstrom & Turk's (1998)
 /// @param file rounds places to the file's precision
 /// @param context told of progress, and asked whether to stop
 /// @throws Cancelled
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
                     const FineMesh& fine, std::span<const float> tolerance,
-                    std::span<const std::uint8_t> pinned, Collapses kind, const FilePoints& file,
+                    std::span<const std::uint8_t> pinned, Collapses kind, double moment, const FilePoints& file,
                     RunContext& context);
 
 }  // namespace hermesh

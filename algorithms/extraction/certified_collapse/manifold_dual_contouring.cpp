@@ -7,14 +7,14 @@
 namespace hermesh {
 namespace {
 
-CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance, const FilePoints& file,
-                               RunContext& context) {
+CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, double tolerance,
+                               const Nearness& nearness, const FilePoints& file, RunContext& context) {
   const FineMesh fine(std::move(uniform.points),
                       all_triangles(std::move(uniform.triangles), std::exchange(uniform.quads, {})), context);
   std::vector<float> asked(fine.points().size());
   parallel_blocks(asked.size(), context,
                   [&](std::size_t i) { asked[i] = field.tolerance(fine.points()[i], tolerance); });
-  CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context);
+  CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context, nearness);
   CertifiedPolygons result{std::move(coarse.points), std::move(coarse.triangles), {}, {}};
   if (field.leaves_out_outside())
     // What has moved was merged; what is in the mask has a tolerance.
@@ -36,12 +36,15 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
   const bool merges = options.tolerance > 0 || at_points.simplifies();
   return finished(uniform.points.empty() || !merges
                       ? as_they_are(std::move(uniform))
-                      : by_collapses(std::move(uniform), at_points, options.tolerance, file, context),
+                      : by_collapses(std::move(uniform), at_points, options.tolerance, options.nearness, file, context),
                   at_points, file, context);
 }
 
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
-  ManifoldDualContouringOptions options{.uniform = read_dual_contouring_options(input)};
+  ManifoldDualContouringOptions options{
+      .nearness = {.moment = input.options.number("moment"),
+                   .relaxation = static_cast<int>(input.options.number("relaxation"))},
+      .uniform = read_dual_contouring_options(input)};
   return contour_certified(input, "manifold-dual-contouring",
                            options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
@@ -52,6 +55,17 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
   std::vector<OptionSpec> options = tolerance_options();
+  options.push_back({.name = "moment",
+                     .fallback = "0",
+                     .help = "greatest sum of squared distances to the planes of the triangles around, weighted by their areas, "
+                             "that the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives triangles "
+                             "to where they lower the root mean square distance most; 0 for as few as the tolerance allows",
+                     .maximum = 1e30});
+  options.push_back({.name = "relaxation",
+                     .fallback = "0",
+                     .help = "sweeps that move the points to where the root mean square distance to the uniform mesh is least, "
+                             "as far as the tolerance and the freedom from self-intersection are proved; 3 get most of it",
+                     .maximum = 100});
   for (OptionSpec& option : dual_contouring_options()) options.push_back(std::move(option));
   return options;
 }

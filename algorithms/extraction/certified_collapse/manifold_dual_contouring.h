@@ -5,6 +5,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/variant.h"
+#include "algorithms/extraction/certified_collapse/certified_decimation.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/hermite/hermite_view.h"
 
@@ -14,6 +15,8 @@ struct ManifoldDualContouringOptions {
   /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer polygons.
   /// 0 gives the uniform mesh itself.
   double tolerance = 0.1;
+  /// What is done for the root mean square distance (certified_decimation.h).
+  Nearness nearness = {};
   DualContouringOptions uniform;  ///< placement of the uniform mesh's points
 };
 

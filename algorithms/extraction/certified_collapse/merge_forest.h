@@ -10,9 +10,10 @@
 
 namespace hermesh {
 
-/// A forest: a node is a set of two or more points, its children are the sets and single points that it is made of. The
-/// points that a mesh has are the greatest sets that merge, and those that are in none. A set that is split gives way to
-/// its children; so whatever was unproven is taken back right there, and at last one has the fine mesh again.
+/// A forest: a node is a set of points, its children are the sets and single points that it is made of; a node with one
+/// child is a move of that. The points that a mesh has are the greatest sets that merge, and those that are in none. A set
+/// that is split gives way to its children; so whatever was unproven is taken back right there, and at last one has the
+/// fine mesh again.
 class MergeForest {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -21,6 +22,7 @@ class MergeForest {
     std::uint32_t parent = kNone;
     std::uint32_t first;    ///< one of its points, which it goes by
     bool merges = false;
+    bool moves = false;     ///< its only child is the set or single point that it moves
     Eigen::Vector3d place;  ///< where its points go, rounded for the file
     PlaneQuadric quadric;   ///< about `place`
   };
@@ -28,7 +30,8 @@ class MergeForest {
   /// `nodes` has children before their parents; `node_of` has for each point the least set that holds it, or kNone.
   MergeForest(std::vector<Node> nodes, std::vector<std::uint32_t> node_of);
 
-  /// Makes two points of the mesh one, in the place of `node`, whose `first` is the one that stays.
+  /// Makes two points of the mesh one, in the place of `node`, whose `first` is the one that stays. Where `going` is `first`,
+  /// too, that point moves to the place of `node`.
   void join(std::uint32_t going, Node node);
   /// Finds the sets and members anew. To be called after join(), before anything else is asked.
   void settle();

@@ -145,12 +145,17 @@ void MergeProof::build() {
 /// Calls the set at a fine triangle's corners unproven that was joined last: before that join its merged
 /// triangle was another one, which most likely was good. (The fandisk at 400 voxels has 4 % fewer triangles so
 /// than where the set with the largest error is split, scans as many.) Whatever fails has a set to blame, so
-/// the proof goes on.
+/// the proof goes on. Moves are taken back before anything is split that was joined.
 void MergeProof::call_unproven(std::uint32_t t) {
+  const auto moves = [&](std::uint32_t p) {
+    const std::uint32_t set = forest_.set_of(p);
+    return set != kNone && forest_.node(set).moves;
+  };
+  const bool any_moves = std::ranges::any_of(fine_.triangles()[t], moves);
   std::uint32_t last = kNone;
   for (const std::uint32_t p : fine_.triangles()[t]) {
     const std::uint32_t set = forest_.set_of(p);
-    if (set == kNone) continue;
+    if (set == kNone || (any_moves && !moves(p))) continue;
     if (splits_ >= kPatience) std::atomic_ref(unproven_[set]).store(1, std::memory_order_relaxed);
     if (last == kNone || set > last) last = set;
   }

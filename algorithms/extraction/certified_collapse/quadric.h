@@ -56,6 +56,12 @@ struct WideQuadric {
     b += v - moved;
     c += q.c - 2 * v.dot(shift) + shift.dot(moved);
   }
+  /// Adds the plane of all x with unit_normal · x + offset = 0, x from this one's anchor.
+  void add_plane(const Eigen::Vector3d& unit_normal, double offset, double weight) {
+    a += weight * unit_normal * unit_normal.transpose();
+    b += weight * offset * unit_normal;
+    c += weight * offset * offset;
+  }
   double operator()(const Eigen::Vector3d& x) const { return std::max(0.0, x.dot(a * x) + 2 * b.dot(x) + c); }
   /// The quadric about a place, given from the anchor.
   PlaneQuadric about(const Eigen::Vector3d& x) const {
