@@ -3,13 +3,16 @@
 #pragma once
 
 #include <charconv>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "algorithms/core/error.h"
 #include "algorithms/core/options.h"
 
 namespace hermesh {
@@ -23,7 +26,7 @@ class OptionTable {
     double minimum = 0.0, maximum = 1e300;  ///< 1e300: no limit
   };
 
-  /// Declares a number. `only_with` is that of OptionSpec.
+  /// Declares a number, which has to be whole where its member is an integer. `only_with` is that of OptionSpec.
   template <class Number>
   OptionTable&& number(const std::string& name, Number Settings::*member, Range range, std::string help,
                        std::vector<std::string> only_with = {}) && {
@@ -36,7 +39,10 @@ class OptionTable {
                          .maximum = range.maximum,
                          .only_with = std::move(only_with)},
                         [=](Settings& settings, const Options& options) {
-                          settings.*member = static_cast<Number>(options.number(name));
+                          const double value = options.number(name);
+                          if (std::is_integral_v<Number> && value != std::floor(value))
+                            throw Error("option '" + name + "' takes whole numbers, not " + options.text(name));
+                          settings.*member = static_cast<Number>(value);
                         }});
     return std::move(*this);
   }
@@ -65,7 +71,8 @@ class OptionTable {
     return specs;
   }
 
-  /// The settings that checked options ask for. Options may hold others besides. @throws std::logic_error if they lack one.
+  /// The settings that checked options ask for. Options may hold others besides. @throws Error for a number that has to be
+  /// whole; std::logic_error if they lack one.
   Settings read(const Options& options) const {
     Settings settings{};
     for (const Entry& entry : entries_) entry.set(settings, options);

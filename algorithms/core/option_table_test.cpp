@@ -53,6 +53,7 @@ TEST(OptionTable, GivenValuesSetTheirMembersAlone) {
   EXPECT_FALSE(read({{"closed", "false"}}).closed);
   EXPECT_EQ(read({{"closed", "false"}}).seed, 7u);
   EXPECT_THROW(read({{"width", "2.5"}}), Error);
+  EXPECT_THROW(read({{"seed", "1.5"}}), Error);
   EXPECT_THROW(read({{"shape", "flat"}}), Error);
   EXPECT_THROW(read({{"shape", "round"}, {"width", "1"}}), Error);
 }

@@ -1,5 +1,6 @@
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
 #include "algorithms/extraction/certified_mesh.h"
@@ -40,11 +41,27 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
                   at_points, file, context);
 }
 
+namespace {
+
+/// The options that the collapses have beyond those of all certified extractors.
+const OptionTable<Nearness>& option_table() {
+  static const auto table =
+      OptionTable<Nearness>()
+          .number("moment", &Nearness::moment, {.maximum = 1e30},
+                  "greatest sum of squared distances to the planes of the triangles around, weighted by their areas, that "
+                  "the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives triangles to where they "
+                  "lower the root mean square distance most; 0 for as few as the tolerance allows")
+          .choice("relaxation", &Nearness::relaxation, {{"0", 0}, {"1", 1}, {"3", 3}, {"6", 6}},
+                  "sweeps that move the points to where the root mean square distance to the uniform mesh is least, as far "
+                  "as the tolerance and the freedom from self-intersection are proved; 3 get most of it");
+  return table;
+}
+
+}  // namespace
+
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
-  ManifoldDualContouringOptions options{
-      .nearness = {.moment = input.options.number("moment"),
-                   .relaxation = static_cast<int>(input.options.number("relaxation"))},
-      .uniform = read_dual_contouring_options(input)};
+  ManifoldDualContouringOptions options{.nearness = option_table().read(input.options),
+                                        .uniform = read_dual_contouring_options(input)};
   return contour_certified(input, "manifold-dual-contouring",
                            options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
@@ -55,17 +72,7 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
   std::vector<OptionSpec> options = tolerance_options();
-  options.push_back({.name = "moment",
-                     .fallback = "0",
-                     .help = "greatest sum of squared distances to the planes of the triangles around, weighted by their areas, "
-                             "that the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives triangles "
-                             "to where they lower the root mean square distance most; 0 for as few as the tolerance allows",
-                     .maximum = 1e30});
-  options.push_back({.name = "relaxation",
-                     .fallback = "0",
-                     .help = "sweeps that move the points to where the root mean square distance to the uniform mesh is least, "
-                             "as far as the tolerance and the freedom from self-intersection are proved; 3 get most of it",
-                     .maximum = 100});
+  for (OptionSpec& option : option_table().specs()) options.push_back(std::move(option));
   for (OptionSpec& option : dual_contouring_options()) options.push_back(std::move(option));
   return options;
 }
