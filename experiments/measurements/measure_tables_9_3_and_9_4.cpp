@@ -92,9 +92,7 @@ Splash make_splash(double length, const MeasurementInput& input) {
     const PolygonMesh mesh = make_recipe(
         "splash", {{"length", length}, {"seed", double(input.seed)}, {"part", part}}, input.context);
     splash.triangles += mesh.triangle_count();
-    const Bounds box = bounds(mesh);
-    splash.box.add(box.lower);
-    splash.box.add(box.upper);
+    splash.box.add(bounds(mesh));
     splash.seconds += timed([&] {
       const LevelSet made = voxelize(mesh, recipe, input.context);
       splash.level_set = part == 1.0 ? made : united(splash.level_set, made);

@@ -130,9 +130,7 @@ class Measurer {
 
   void add_picture(Sheet& sheet, const std::string& extractor, const PolygonMesh& mesh) const {
     if (pixels_ == 0 || mesh.empty()) return;
-    const Bounds box = bounds(mesh);
-    sheet.frame.add(box.lower);
-    sheet.frame.add(box.upper);
+    sheet.frame.add(bounds(mesh));
     sheet.pictures.push_back(
         {extractor, {readable(double(mesh.triangle_count())) + " triangles"}, [mesh] { return mesh; }});
   }

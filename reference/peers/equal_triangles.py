@@ -11,7 +11,6 @@ seconds are a processor's, without making or reading the uniform mesh. Defects a
 import argparse
 import json
 import os
-import re
 import subprocess
 import tempfile
 
@@ -48,10 +47,10 @@ class Comparison:
     def row(self, label, user):
         out, _ = seconds_of([self.hermesh, "validate", self.mesh, "--reference", self.uniform, "--json", "--samples", "100000"])
         report = json.loads(out)
-        sentences = report["result"]["sentences"]
-        rms = [float(re.search(r"rms ([0-9.e+-]+)", s)[1]) / self.voxel for s in sentences if s.startswith("From ")]
-        most = [float(re.search(r"at most ([0-9.e+-]+)", s)[1]) / self.voxel for s in sentences if s.startswith("From ")]
-        defects = "" if sentences[0].endswith("watertight.") else sentences[0]
+        distances = [report["to_reference"], report["from_reference"]]
+        rms, most = ([each[key] / self.voxel for each in distances] for key in ("rms", "max"))
+        verdict = report["result"]["sentences"][0]
+        defects = "" if verdict.endswith("watertight.") else verdict
         print(f"{self.model:10} {label:22} {report['triangles']:7} rms {rms[0]:.5f} {rms[1]:.5f} most {most[0]:.3f} {most[1]:.3f}"
               f" {user:6.2f} s {defects}", flush=True)
 

@@ -267,18 +267,20 @@ const OptionTable<DualContouringOptions>& option_table() {
   return table;
 }
 
-}  // namespace
-
-DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
-  DualContouringOptions options = option_table().read(input.options);
+DualContouringOptions read(const OptionTable<DualContouringOptions>& table, const ExtractionInput& input) {
+  DualContouringOptions options = table.read(input.options);
   options.linear_crossings = !wants_polygons(input);
   return options;
 }
 
+}  // namespace
+
+DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
+  return read(option_table(), input);
+}
+
 DualContouringOptions read_placement_options(const ExtractionInput& input) {
-  DualContouringOptions options = option_table().without("reach").read(input.options);
-  options.linear_crossings = !wants_polygons(input);
-  return options;
+  return read(option_table().without("reach"), input);
 }
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {

@@ -100,7 +100,7 @@ SampleFormat format_of(const Header& header, RunContext& context) {
 }
 
 /// Sets the box's dimensions; axes beyond the third are frames. @returns how many boxes there are.
-std::int64_t read_dims(const Header& header, StoredSamples& box) {
+std::int64_t read_dims(const Header& header, StoredSamples& stored) {
   const int axes = header.number<std::int16_t>(40);
   if (axes < 1 || axes > 7) header.fail("is damaged: it says that it has " + std::to_string(axes) + " dimensions");
   std::int64_t frames = 1;
@@ -108,11 +108,11 @@ std::int64_t read_dims(const Header& header, StoredSamples& box) {
     const std::int64_t dim = header.number<std::int16_t>(42 + 2 * static_cast<std::size_t>(axis));
     if (dim < 1) header.fail("is damaged: its dimension " + std::to_string(axis + 1) + " is " + std::to_string(dim));
     if (axis < 3)
-      box.dims[axis] = dim;
+      stored.dims[axis] = dim;
     else
       frames *= dim;  // at most 2^60
   }
-  for (int axis = axes; axis < 3; ++axis) box.dims[axis] = 1;
+  for (int axis = axes; axis < 3; ++axis) stored.dims[axis] = 1;
   return frames;
 }
 
@@ -208,7 +208,7 @@ Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
 
 /// Moves the box on to the frame that is asked for. @throws Error where there is none.
 void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame_bytes, const ImportOptions& options,
-                  StoredSamples& box, RunContext& context) {
+                  StoredSamples& stored, RunContext& context) {
   const std::int64_t frame = options.frame.value_or(0);
   if (frame < 0 || frame >= frames)
     header.fail("has no frame " + std::to_string(frame) + "; it has " + std::to_string(frames) + ", numbered from 0");
@@ -216,7 +216,7 @@ void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame
   if (double(frame) * double(frame_bytes) > 0x1p62) header.fail("is truncated: that frame cannot be in it");
   if (frames > 1 && !options.frame)
     context.note(header.file() + " holds " + std::to_string(frames) + " frames; the first was taken (--frame N takes another)");
-  box.offset += static_cast<std::uint64_t>(frame) * frame_bytes;
+  stored.offset += static_cast<std::uint64_t>(frame) * frame_bytes;
 }
 
 /// The file of the same name with another extension, also gzipped.
@@ -249,28 +249,28 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const fs::path header_path = unpacked_name(path).second == ".img" ? companion(path, ".hdr") : path;
   ByteSource first(header_path);
   const Header header(first, header_path.string(), context);
-  StoredSamples box{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
-  const std::int64_t frames = read_dims(header, box);
+  StoredSamples stored{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
+  const std::int64_t frames = read_dims(header, stored);
   // scl_slope and scl_inter: value = slope · stored + intercept.
   const double slope = header.number<float>(112);
   if (!std::isfinite(slope)) context.note(header.file() + " has a scl_slope that is not finite; its samples were not scaled");
   if (std::isfinite(slope) && slope != 0.0) {  // 0: the samples are not scaled
-    box.slope = slope;
-    box.intercept = header.real(116, "scl_inter");
+    stored.slope = slope;
+    stored.intercept = header.real(116, "scl_inter");
   }
-  box.to_world = transform_of(header, context);
+  stored.to_world = transform_of(header, context);
   // Of two files the header names neither: the samples lie in the one of the same name.
   std::optional<ByteSource> second;
   if (!header.one_file()) {
-    box.file = companion(header_path, ".img").string();
-    second.emplace(box.file);
+    stored.file = companion(header_path, ".img").string();
+    second.emplace(stored.file);
   }
   ByteSource& source = second ? *second : first;
   // Twice: the first time for one frame, whose size the offset of the frame needs, the second time with that offset.
-  const std::uint64_t frame_bytes = check_stored(box, source.at_most());
-  choose_frame(header, frames, frame_bytes, options, box, context);
-  check_stored(box, source.at_most());
-  return read_stored(source, box, options, context);
+  const std::uint64_t frame_bytes = check_stored(stored, source.at_most());
+  choose_frame(header, frames, frame_bytes, options, stored, context);
+  check_stored(stored, source.at_most());
+  return read_stored(source, stored, options, context);
 }
 
 }  // namespace hermesh

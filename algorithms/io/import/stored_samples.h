@@ -21,11 +21,11 @@ struct StoredSamples {
 
 /// Bytes that the samples take. @throws Error for dimensions below 1 or beyond what a grid's index can be, for more than
 /// `at_most` bytes in all, and for more memory than there is; nothing is allocated.
-std::uint64_t check_stored(const StoredSamples& box, std::uint64_t at_most);
+std::uint64_t check_stored(const StoredSamples& stored, std::uint64_t at_most);
 
 /// Reads the samples from the source, which stands at or before the first, into a grid as import_volume.h describes
 /// it. @throws Error for a source that ends early or is damaged, for samples that are not finite unless they are
 /// replaced, and for a transform that OpenVDB does not take. @throws Cancelled.
-LevelSet read_stored(ByteSource& source, const StoredSamples& box, const ImportOptions& options, RunContext& context);
+LevelSet read_stored(ByteSource& source, const StoredSamples& stored, const ImportOptions& options, RunContext& context);
 
 }  // namespace hermesh
