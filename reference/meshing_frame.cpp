@@ -1,5 +1,6 @@
 #include "reference/meshing_frame.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <atomic>

@@ -1,5 +1,7 @@
 #include "algorithms/core/level_set.h"
 
+#include <openvdb/openvdb.h>
+
 #include <cmath>
 #include <mutex>
 

@@ -3,11 +3,8 @@
 // threads.
 #pragma once
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,14 +13,32 @@
 
 namespace hermesh {
 
+/// A reference to a function of the ends of a range, which it must not outlive.
+class RangeFunction {
+ public:
+  template <class F>
+  explicit RangeFunction(const F& f)
+      : function_(&f), call_([](const void* function, std::size_t begin, std::size_t end) {
+          (*static_cast<const F*>(function))(begin, end);
+        }) {}
+  void operator()(std::size_t begin, std::size_t end) const { call_(function_, begin, end); }
+
+ private:
+  const void* function_;
+  void (*call_)(const void* function, std::size_t begin, std::size_t end);
+};
+
+/// Calls f(begin, end) for ranges that together are 0…n−1, in parallel, and looks for cancellation before each. (TBB stays
+/// out of this header, for nearly every file would read its headers, half a second each.) @throws Cancelled.
+void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f);
+
 /// Calls f(i) for i in 0…n−1, in parallel, and looks for cancellation every few blocks. @throws Cancelled.
 template <class F>
 void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      context.check();
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
-                    });
+  const auto range = [&f](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) f(i);
+  };
+  parallel_ranges(n, context, RangeFunction(range));
 }
 
 /// Array of `n` copies of `value`, written in parallel, so that no thread alone touches all its pages.
@@ -36,23 +51,10 @@ LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
 }
 
 /// Checks that indices of 32 bits can number `total` elements. `what` is their name in the plural. @throws Error
-inline void check_indices(std::uint64_t total, const std::string& what) {
-  if (total > std::numeric_limits<std::uint32_t>::max())
-    throw Error("the mesh would have " + std::to_string(total) + " " + what +
-                ", more than 32-bit indices can number; use larger voxels");
-}
+void check_indices(std::uint64_t total, const std::string& what);
 
 /// Replaces each count by the sum of the counts before it and returns the total. @throws Error if the total cannot be
 /// an index of 32 bits; `what` names the counted things in the plural.
-inline std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what) {
-  std::uint64_t total = 0;
-  for (std::uint64_t& count : counts) {
-    const std::uint64_t before = total;
-    total += count;
-    count = before;
-  }
-  check_indices(total, what);
-  return total;
-}
+std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what);
 
 }  // namespace hermesh

@@ -1,5 +1,7 @@
 #include "algorithms/extraction/volume_attributes.h"
 
+#include <openvdb/openvdb.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>

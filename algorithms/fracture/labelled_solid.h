@@ -61,11 +61,8 @@ struct LabelledSolid {
   std::uint32_t piece_count() const { return static_cast<std::uint32_t>(code_of.size()) - 1; }
   std::uint64_t samples = 0;  ///< how many samples are inside
 
-  /// A sample, or the cell whose first corner it is.
-  struct Place {
-    std::int32_t block;  ///< −1 if no block holds the sample, which is outside then
-    int sample;
-  };
+  /// A sample, which is outside where no block holds it, or the cell whose first corner it is.
+  using Place = LatticePlace;
   /// One number for a place in a block; ascending numbers are ascending places.
   static std::uint64_t key(const Place& at) {
     return static_cast<std::uint64_t>(at.block) << 9 | static_cast<std::uint64_t>(at.sample);
@@ -82,9 +79,7 @@ struct LabelledSolid {
 
   /// The sample at local coordinates of a block, each from −8 to 15, in the block or one beside it.
   Place locate(std::int32_t block, int x, int y, int z) const {
-    const std::int32_t there =
-        blocks[static_cast<std::size_t>(block)].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
-    return {there, sample_index(x & 7, y & 7, z & 7)};
+    return hermesh::locate(blocks[static_cast<std::size_t>(block)].neighbours, x, y, z);
   }
   /// The label of a sample; 0 where there is no block.
   std::uint32_t label(const Place& at) const { return at.block < 0 ? 0 : labels(at.block, at.sample); }

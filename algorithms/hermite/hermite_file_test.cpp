@@ -1,6 +1,7 @@
 #include "algorithms/hermite/hermite_file.h"
 
 #include <gtest/gtest.h>
+#include <openvdb/io/File.h>
 #include <openvdb/tools/Prune.h>
 #include <unistd.h>
 

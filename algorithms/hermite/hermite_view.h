@@ -22,7 +22,7 @@ class HermiteView {
   struct Block {
     std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample
     std::int32_t leaf;                  ///< number among the leaves that own crossings; −1 for none
-    BlockMask inside;
+    BlockMask inside;                   ///< also where there is no leaf: then all samples are of one sign
     std::array<BlockMask, 3> crossing;  ///< samples whose up-wind edge is crossed, by axis
     std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
     /// Numbers of the blocks around, by neighbour_slot(); −1 where there is none.
@@ -68,6 +68,44 @@ class HermiteView {
 
 /// Sets `neighbours` of blocks in ascending order of (x, y, z).
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
+
+/// The cells of a block with a crossing edge, by their first corners.
+BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block);
+
+/// The four cells around an edge as steps along the two axes after its own: counter-clockwise seen along it.
+inline constexpr int kAroundEdge[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
+
+/// The cells around the edges along one axis that start in a block: who goes over its crossing edges looks the blocks
+/// up once.
+class CellsAroundEdges {
+ public:
+  CellsAroundEdges(const HermiteView::Blocks& blocks, std::size_t block, int axis)
+      : u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
+    for (int side = 0; side < 4; ++side) {
+      int d[3] = {0, 0, 0};
+      d[(axis + 1) % 3] = -(side & 1);
+      d[(axis + 2) % 3] = -(side >> 1);
+      block_[side] = blocks[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
+      // Coordinate −1 is 7 in the neighbour.
+      shift_[side] = 8 * ((side & 1) * u_ + (side >> 1) * v_);
+    }
+  }
+
+  /// The cells around the edge that starts at a sample, in the order of kAroundEdge. Around a crossing edge there is a
+  /// block for each.
+  std::array<LatticePlace, 4> operator()(int sample) const {
+    // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
+    const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
+    const auto cell = [&](int side, int down) { return LatticePlace{block_[side], sample - down + shift_[side]}; };
+    return {cell(low_u + low_v, u_ + v_), cell(low_v, v_), cell(0, 0), cell(low_u, u_)};
+  }
+
+ private:
+  static constexpr int kStep[3] = {64, 8, 1};
+  const int u_, v_;
+  std::int32_t block_[4];
+  int shift_[4];
+};
 
 /// View of sparse data. `Read` turns a crossing of the data into an EdgeCrossing.
 template <class Crossing, class Read>

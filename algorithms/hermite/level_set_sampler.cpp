@@ -1,4 +1,6 @@
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 #include <tbb/scalable_allocator.h>
 #include <tbb/task_group.h>
 

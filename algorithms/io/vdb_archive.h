@@ -1,6 +1,8 @@
 // What reading and writing .vdb files of any content have in common. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
+#include <openvdb/io/File.h>
+
 #include <filesystem>
 #include <memory>
 #include <new>

@@ -1,5 +1,7 @@
 #include "algorithms/io/vdb_file.h"
 
+#include <openvdb/openvdb.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>

@@ -1,6 +1,7 @@
 #include "algorithms/io/vdb_file.h"
 
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
 #include <openvdb/io/Stream.h>
 #include <unistd.h>
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 
 namespace hermesh {
 
@@ -24,33 +25,48 @@ constexpr std::uint64_t last_layers(bool y, bool z) {
 }
 inline constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
+/// The eight words of a mask to read, be it a BlockMask or the plain array of a struct that vector code reads, too.
+using MaskWords = std::span<const std::uint64_t, 8>;
+
 constexpr int sample_index(int x, int y, int z) { return 64 * x + 8 * y + z; }
-constexpr bool test(const BlockMask& mask, int sample) { return (mask[sample >> 6] >> (sample & 63)) & 1; }
-constexpr int count(const BlockMask& mask) {
+constexpr bool test(MaskWords mask, int sample) { return (mask[sample >> 6] >> (sample & 63)) & 1; }
+constexpr int count(MaskWords mask) {
   int sum = 0;
   for (const std::uint64_t word : mask) sum += std::popcount(word);
   return sum;
 }
 /// Number of set bits before `sample`.
-constexpr std::uint32_t rank_in(const BlockMask& mask, int sample) {
+constexpr std::uint32_t rank_in(MaskWords mask, int sample) {
   int before = std::popcount(mask[sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1));
   for (int word = 0; word < sample >> 6; ++word) before += std::popcount(mask[word]);
   return static_cast<std::uint32_t>(before);
 }
-constexpr bool any(const BlockMask& mask) {
+constexpr bool any(MaskWords mask) {
   std::uint64_t all = 0;
   for (const std::uint64_t word : mask) all |= word;
   return all != 0;
 }
 /// Calls f(sample) for every set bit, in ascending order.
 template <class F>
-void for_each_bit(const BlockMask& mask, F&& f) {
+void for_each_bit(MaskWords mask, F&& f) {
   for (int x = 0; x < 8; ++x)
     for (std::uint64_t word = mask[x]; word != 0; word &= word - 1) f(64 * x + std::countr_zero(word));
 }
 
 /// Place of a neighbour in a list of 27, each offset −1, 0 or 1.
 constexpr int neighbour_slot(int dx, int dy, int dz) { return 9 * (dx + 1) + 3 * (dy + 1) + (dz + 1); }
+
+/// A sample of a lattice of numbered blocks, or the cell whose first corner it is.
+struct LatticePlace {
+  std::int32_t block;  ///< negative where no block is there
+  int sample;
+};
+/// The place at coordinates from −8 to 15 relative to a block's first sample; `neighbours` are the numbers of the blocks
+/// around that one, by neighbour_slot(), its own in the middle.
+constexpr LatticePlace locate(const std::array<std::int32_t, 27>& neighbours, int x, int y, int z) {
+  // Arithmetic shifts make the offset of the block, −1, 0 or 1, of each.
+  return {neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)], sample_index(x & 7, y & 7, z & 7)};
+}
 
 /// Values that stand in place of a block's index where there is no block: all samples there are outside, or all inside.
 inline constexpr std::int32_t kUniformOutside = -1, kUniformInside = -2;

@@ -198,14 +198,10 @@ class LeafTable : public LeafPlaces {
   }
   /// The edges along each axis that start in the leaf and change sign, at the bits of their first samples.
   std::array<BlockMask, 3> crossing_edges(std::size_t leaf) const;
-  struct Location {
-    std::int32_t leaf;
-    int sample;
-  };
   /// Leaf and sample for coordinates from −8 to 15, relative to the first sample of a leaf, where there is a leaf: at
   /// the start of every edge with a change of sign. For any other sample neighbour() tells whether there is a leaf.
   /// @throws Error that names the sample if there is none, or if a coordinate is beyond.
-  Location locate(std::size_t leaf, int x, int y, int z) const {
+  LatticePlace locate(std::size_t leaf, int x, int y, int z) const {
     constexpr auto is_beyond = [](int i) { return static_cast<unsigned>(i + 8) > 23u; };
     if (is_beyond(x) || is_beyond(y) || is_beyond(z)) throw_no_leaf(leaf, x, y, z);
     const std::int32_t there = neighbour(leaf, x >> 3, y >> 3, z >> 3);

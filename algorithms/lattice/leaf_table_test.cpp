@@ -184,7 +184,7 @@ TEST_F(LeafTableTest, LookingUpWhereThereIsNoLeafIsRefusedInASentence) {
   grid->tree().setValue(Coord(3, 3, 3), -1.0f);
   const LeafTable leaves = table(grid);
   ASSERT_EQ(leaves.size(), 1u);
-  EXPECT_EQ(leaves.locate(0, 3, 4, 5).leaf, 0);
+  EXPECT_EQ(leaves.locate(0, 3, 4, 5).block, 0);
   EXPECT_EQ(leaves.locate(0, 3, 4, 5).sample, sample_index(3, 4, 5));
   const auto sentence = [&](int x, int y, int z) -> std::string {
     try {

@@ -120,8 +120,8 @@ struct Place {
 /// The neighbour of a voxel of a block, once the blocks are linked.
 inline Place neighbour(const Band& band, const BandBlock& block, int sample, const std::array<int, 3>& step) {
   const int x = (sample >> 6) + step[0], y = ((sample >> 3) & 7) + step[1], z = (sample & 7) + step[2];
-  const std::int32_t number = block.neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
-  return {number == kNoBlock ? nullptr : &band.block(number), sample_index(x & 7, y & 7, z & 7)};
+  const LatticePlace there = locate(block.neighbours, x, y, z);
+  return {there.block == kNoBlock ? nullptr : &band.block(there.block), there.sample};
 }
 
 /// A mask of a block and of one voxel more to every side, on which neighbours are found by shifts.

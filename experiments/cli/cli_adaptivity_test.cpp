@@ -1,3 +1,4 @@
+#include <openvdb/openvdb.h>
 #include <openvdb/io/File.h>
 
 #include "algorithms/core/openvdb_trees.h"

@@ -1,4 +1,5 @@
 // What comes from outside, damaged or odd: the program's answer to single files, its limits and signals.
+#include <openvdb/io/File.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 

@@ -113,8 +113,8 @@ Extractor careless_extractor() {
     const LeafTable table(input.level_set, input.isovalue, input.context);
     PolygonMesh mesh;
     for (std::size_t leaf = 0; leaf < table.size(); ++leaf) {
-      const LeafTable::Location far = table.locate(leaf, 8, 8, 8);
-      mesh.points.emplace_back(table.values(far.leaf)[far.sample], 0, 0);
+      const LatticePlace far = table.locate(leaf, 8, 8, 8);
+      mesh.points.emplace_back(table.values(far.block)[far.sample], 0, 0);
     }
     return mesh;
   };

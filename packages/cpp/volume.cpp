@@ -1,4 +1,5 @@
 // Volumes: arrays, values, files, OpenVDB's grids.
+#include <openvdb/openvdb.h>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Dense.h>
 #include <openvdb/tools/Interpolation.h>

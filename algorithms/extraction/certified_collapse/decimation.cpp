@@ -1,6 +1,7 @@
 #include "algorithms/extraction/certified_collapse/decimation.h"
 
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <Eigen/Geometry>

@@ -108,7 +108,7 @@ class CellRegions {
   }
   /// The active cells of a block that are alone.
   BlockMask alone(std::int32_t block) const {
-    BlockMask result = cells_[block].active;
+    BlockMask result = cells_[block].active_mask();
     for (std::size_t word = 0; word < 8; ++word) result[word] &= ~merged(block)[word];
     return result;
   }

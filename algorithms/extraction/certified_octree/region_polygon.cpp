@@ -101,7 +101,7 @@ RegionPolygon polygon_of(const CellRegions& regions, const CellBlocks::Edge& edg
   polygon.start = cells.corner(edge.block, edge.sample);
   polygon.start[edge.axis] -= before;
   polygon.length = 1 << level;
-  polygon.outwards = test(cells[edge.block].inside, edge.sample);
+  polygon.outwards = test(cells.source(edge.block).inside, edge.sample);
   const double margin = cells.margin();
   const double hit =
       before + std::clamp(double(cells.grid().crossing(edge.block, edge.sample, edge.axis).offset), margin,

@@ -168,9 +168,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   const auto block = static_cast<std::int32_t>(b);
   const CellBlocks::Block& own = cells_[block];
   shell_kernels::Block& described = blocks_[b];
-  described.active = own.active.data();
-  described.points_before = own.rank.data();
-  described.first_point = own.first_point;
+  described.cells = &own;
   const std::uint32_t points = cells_.points_in(block), cells = cells_.cells_in(block);
   described.first_later = own.first_point + cells;
   described.later_points = points - cells;
@@ -350,7 +348,7 @@ void RegionShell::Search::gather() {
       }
   // The kernels want windows ascending (tell_points()).
   std::ranges::sort(buffers_.windows, {},
-                    [](const shell_kernels::Window& window) { return window.block->first_point; });
+                    [](const shell_kernels::Window& window) { return window.block->cells->first_point; });
 }
 
 /// Adds the part of a block whose corner is at `corner` from the base, and its fans, which the kernels do not know.

@@ -392,7 +392,7 @@ bool RegionSlabs::holds(const Region& cube) const {
 /// Whether sample `to` is inside: by the crossings on the way from `from`, a sample of the block, whose bit
 /// is known. The other may be where there is no block.
 bool RegionSlabs::is_inside(std::int32_t block, std::array<int, 3> from, const std::array<int, 3>& to) const {
-  bool inside = test(cells_[block].inside, sample_index(from[0], from[1], from[2]));
+  bool inside = test(cells_.source(block).inside, sample_index(from[0], from[1], from[2]));
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     while (from[a] != to[a]) {

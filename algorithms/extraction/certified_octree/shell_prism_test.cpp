@@ -96,10 +96,9 @@ class KernelBlock {
     for (auto& axis : axes_) axis.resize(certain_.size());
     const auto first = [](std::size_t n) { return n < 64 ? (std::uint64_t{1} << n) - 1 : ~std::uint64_t{0}; };
     const std::size_t in_cells = std::min<std::size_t>(points.size(), 64);
-    active_[0] = first(in_cells);
+    cells_.active[0] = first(in_cells);
     crossing_[1][0] = first(quads_.size());
-    block_.active = active_.data();
-    block_.points_before = before_.data();
+    block_.cells = &cells_;
     block_.first_later = static_cast<std::uint32_t>(in_cells);
     block_.later_points = static_cast<std::uint32_t>(points.size() - in_cells);
     for (int axis = 0; axis < 3; ++axis) {
@@ -139,9 +138,9 @@ class KernelBlock {
   std::vector<std::uint8_t> upright_;
   std::vector<std::uint16_t> certain_;
   std::vector<shell_kernels::Candidate> candidates_;
-  std::array<std::uint64_t, 8> active_{}, none_{};
+  ActiveCells cells_{};
+  std::array<std::uint64_t, 8> none_{};
   std::array<std::array<std::uint64_t, 8>, 3> crossing_{};
-  std::array<std::uint32_t, 8> before_{};
   shell_kernels::Block block_{};
 };
 

@@ -9,6 +9,7 @@
 #include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/hermite_input.h"
+#include "algorithms/lattice/active_cells.h"
 
 namespace hermesh {
 namespace {
@@ -22,15 +23,10 @@ constexpr double kCellMargin = 1.0 / 1024.0;
 constexpr double kWorthLeaving = 0.1;
 
 /// What one block adds to the mesh, and where in it.
-struct BlockOutput {
-  BlockMask active{};
-  std::array<std::uint32_t, 8> rank{};  ///< points of this block before each word
-  std::uint32_t first_point = 0, first_quad = 0;
+struct BlockOutput : ActiveCells {
+  std::uint32_t first_quad;
 
-  std::uint32_t point_in(int cell) const {
-    const std::uint64_t before = active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
-    return first_point + rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
-  }
+  std::uint32_t point_in(int cell) const { return first_point + rank_of(*this, cell); }
 };
 
 class Contourer {
@@ -48,7 +44,8 @@ class Contourer {
     {
       Stage stage(context, "count");
       parallel_blocks(blocks, context, [&](std::size_t b) {
-        points[b] = find_active_cells(static_cast<std::int32_t>(b));
+        std::ranges::copy(cells_with_crossings(grid_.blocks(), b), outputs_[b].active);
+        points[b] = count_before(outputs_[b]);
         for (const BlockMask& axis : grid_.blocks()[b].crossing)
           quads[b] += static_cast<std::uint64_t>(count(axis));
       });
@@ -72,43 +69,6 @@ class Contourer {
   }
 
  private:
-  struct Location {
-    std::int32_t block;
-    int sample;
-  };
-  Location locate(std::int32_t block, int x, int y, int z) const {
-    // Coordinates from −8 to 15: arithmetic shifts make −1, 0 or 1 of them.
-    const std::int32_t there = grid_.blocks()[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)];
-    return {there, sample_index(x & 7, y & 7, z & 7)};
-  }
-
-  /// A cell is active if any of its twelve edges is crossed.
-  std::uint64_t find_active_cells(std::int32_t b) {
-    static constexpr BlockMask kNone{};
-    const HermiteView::Block& block = grid_.blocks()[b];
-    BlockOutput& output = outputs_[b];
-    for (int axis = 0; axis < 3; ++axis)
-      for (int step = 0; step < 4; ++step) {
-        int d[3] = {0, 0, 0};
-        // The four edges of a cell along an axis start at its corners of the face across that axis: masks of edges,
-        // shifted back to the cell's first corner.
-        d[(axis + 1) % 3] = step & 1;
-        d[(axis + 2) % 3] = step >> 1;
-        const BlockMask shifted =
-            shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
-              const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
-              return there >= 0 ? grid_.blocks()[there].crossing[axis] : kNone;
-            });
-        for (int word = 0; word < 8; ++word) output.active[word] |= shifted[word];
-      }
-    std::uint32_t before = 0;
-    for (int word = 0; word < 8; ++word) {
-      output.rank[word] = before;
-      before += static_cast<std::uint32_t>(std::popcount(output.active[word]));
-    }
-    return before;
-  }
-
   Qef gather(std::int32_t b, const int (&cell)[3], const Eigen::Vector3d& corner) const {
     // About the cell's centre, from which no crossing is farther than the corners are.
     Qef qef(corner + Eigen::Vector3d::Constant(0.5));
@@ -117,7 +77,8 @@ class Contourer {
         int d[3] = {0, 0, 0};
         d[(axis + 1) % 3] = step & 1;
         d[(axis + 2) % 3] = step >> 1;
-        const Location at = locate(b, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
+        const LatticePlace at =
+            locate(grid_.blocks()[b].neighbours, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
         // Where there is no block no edge is crossed.
         if (at.block < 0) continue;
         if (!test(grid_.blocks()[at.block].crossing[axis], at.sample)) continue;
@@ -152,21 +113,14 @@ class Contourer {
     const HermiteView::Block& block = grid_.blocks()[b];
     const IndexToWorld& placement = grid_.placement();
     Quad* next = mesh.quads.data() + outputs_[b].first_quad;
-    for (int axis = 0; axis < 3; ++axis)
+    for (int axis = 0; axis < 3; ++axis) {
+      const CellsAroundEdges around(grid_.blocks(), static_cast<std::size_t>(b), axis);
       for_each_bit(block.crossing[axis], [&](int sample) {
         const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
-        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-        constexpr int kAround[4][2] = {
-            {-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise seen along the axis
+        const std::array<LatticePlace, 4> cells = around(sample);
         Quad quad;
-        for (int i = 0; i < 4; ++i) {
-          int cell[3] = {at[0], at[1], at[2]};
-          cell[u] += kAround[i][0];
-          cell[v] += kAround[i][1];
-          const Location there = locate(b, cell[0], cell[1], cell[2]);
-          // Around a crossing edge all cells are active, and the view has a block for each active cell.
-          quad[i] = outputs_[there.block].point_in(there.sample);
-        }
+        // Around a crossing edge all cells are active, and the view has a block for each active cell.
+        for (int i = 0; i < 4; ++i) quad[i] = outputs_[cells[i].block].point_in(cells[i].sample);
         Eigen::Vector3d hit;
         for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
         hit[axis] += grid_.crossing(b, sample, axis).offset;
@@ -176,6 +130,7 @@ class Contourer {
         if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
         *next++ = quad;
       });
+    }
   }
 
   /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.

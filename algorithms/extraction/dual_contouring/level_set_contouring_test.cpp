@@ -43,22 +43,6 @@ auto order_in_tree(const std::array<std::int32_t, 3>& lower) {
   return std::tuple(at(12), at(7), at(3));
 }
 
-BlockMask active_cells(const HermiteView& view, const HermiteView::Block& block) {
-  static constexpr BlockMask kNone{};
-  BlockMask active{};
-  for (int axis = 0; axis < 3; ++axis)
-    for (int step = 0; step < 4; ++step) {
-      int d[3] = {0, 0, 0};
-      d[(axis + 1) % 3] = step & 1, d[(axis + 2) % 3] = step >> 1;
-      const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int x, int y, int z) -> const BlockMask& {
-        const std::int32_t there = block.neighbours[neighbour_slot(x, y, z)];
-        return there >= 0 ? view.blocks()[static_cast<std::size_t>(there)].crossing[axis] : kNone;
-      });
-      for (int word = 0; word < 8; ++word) active[word] |= shifted[word];
-    }
-  return active;
-}
-
 /// Numbers of the general way's points and quads in the order of the fast one's, and the function that places a point.
 class Correspondence {
  public:
@@ -69,7 +53,7 @@ class Correspondence {
     const HermiteView::Blocks& blocks = view_.blocks();
     std::vector<std::uint32_t> first_point{0}, first_quad{0};
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-      for_each_bit(active_cells(view_, blocks[b]), [&](int cell) { cells_.emplace_back(b, cell); });
+      for_each_bit(cells_with_crossings(blocks, b), [&](int cell) { cells_.emplace_back(b, cell); });
       std::uint32_t edges = 0;
       for (const BlockMask& axis : blocks[b].crossing) edges += static_cast<std::uint32_t>(count(axis));
       first_point.push_back(static_cast<std::uint32_t>(cells_.size()));
@@ -97,8 +81,7 @@ class Correspondence {
       for (int step = 0; step < 4; ++step) {
         int p[3] = {cell >> 6, cell >> 3 & 7, cell & 7};
         p[(axis + 1) % 3] += step & 1, p[(axis + 2) % 3] += step >> 1;
-        const std::int32_t there = block.neighbours[neighbour_slot(p[0] >> 3, p[1] >> 3, p[2] >> 3)];
-        const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
+        const auto [there, sample] = locate(block.neighbours, p[0], p[1], p[2]);
         if (there < 0 || !test(view_.blocks()[static_cast<std::size_t>(there)].crossing[axis], sample)) continue;
         const EdgeCrossing crossing = view_.crossing(there, sample, axis);
         Eigen::Vector3d place(p[0], p[1], p[2]);

@@ -38,30 +38,21 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     is_plain[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
-  // A block that was added for its cells alone stores no signs: all of them are that of the nearest owner above.
-  parallel_blocks(n, context, [&](std::size_t b) {
-    const HermiteView::Block& source = grid.blocks()[b];
-    blocks_[b] = {};
-    blocks_[b].inside = source.inside;
-    if (source.leaf < 0 && sign_of_added(source)) blocks_[b].inside.fill(~std::uint64_t{0});
-  });
   // Count, scan, fill (core/parallel.h): each block finds its active cells by itself, and a prefix sum numbers them, so
   // that numbers do not depend on threads.
   std::vector<std::vector<std::uint8_t>> found(n);
   parallel_blocks(n, context, [&](std::size_t b) {
-    Block& block = blocks_[b];
+    Block& block = blocks_[b] = {};
     const std::array<BlockMask, 8> signs = corner_signs(static_cast<std::int32_t>(b));
     block.joints = cells_with_cuts(static_cast<std::int32_t>(b));
-    std::uint32_t before = 0;
     for (int word = 0; word < 8; ++word) {
       std::uint64_t all = ~std::uint64_t{0}, some = 0;
       // Active are cells whose corners differ, eight words at a time, and joints: the ends of a cut may both be inside.
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
-      block.rank[word] = before;
-      before += static_cast<std::uint32_t>(std::popcount(block.active[word]));
     }
-    found[b].reserve(before);
+    codes[b] = count_before(block);
+    found[b].reserve(codes[b]);
     for_each_bit(block.active, [&](int cell) {
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
@@ -70,11 +61,10 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
         block.special[static_cast<std::size_t>(cell >> 6)] |= std::uint64_t{1} << (cell & 63);
     });
     for (std::size_t word = 0; word < 8; ++word) block.special[word] |= block.joints[word];
-    codes[b] = before;
   });
   codes_.resize(exclusive_scan(codes, "cells"));
   parallel_blocks(n, context, [&](std::size_t b) {
-    blocks_[b].first_code = static_cast<std::uint32_t>(codes[b]);
+    blocks_[b].first_cell = static_cast<std::uint32_t>(codes[b]);
     const std::vector<std::uint8_t> own = std::move(found[b]);  // freed here, in parallel
     std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
@@ -121,8 +111,8 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
     });
   });
   std::vector<std::uint8_t> joined(codes_.size());  // faces, by active cell
-  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& { return joined[code_at(at.block, at.cell)]; };
-  const auto code = [&](const Cell& at) { return codes_[code_at(at.block, at.cell)]; };
+  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& { return joined[cell_number(at.block, at.cell)]; };
+  const auto code = [&](const Cell& at) { return codes_[cell_number(at.block, at.cell)]; };
   // Both cells beside a face note how it is cut, so their segments on it agree and the surface stays closed.
   const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
     joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
@@ -145,7 +135,7 @@ void CellBlocks::cut_ambiguous_faces(RunContext& context) {
   // Only cells that differ from kCellSheets keep sheets of their own: few cells, except in noise.
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     for_each_bit(blocks_[b].special, [&](int cell) {
-      const std::size_t at = code_at(static_cast<std::int32_t>(b), cell);
+      const std::size_t at = cell_number(static_cast<std::int32_t>(b), cell);
       if (joined[at] == 0) return;
       blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
       joined_sheets_.at(b).emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));
@@ -170,7 +160,7 @@ bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
     const Eigen::Vector3d along = (points[j] - points[i]).normalized();
     return std::abs(normals[i].dot(along)) + std::abs(normals[j].dot(along));
   };
-  const int inside = (codes_[code_at(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
+  const int inside = (codes_[cell_number(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
   // The two edges that meet in a corner are the one before it and its own; the corner opposite is two on.
   const auto cut_off = [&](int corner) {
     return slant((corner + 3) % 4, corner % 4) + slant((corner + 1) % 4, (corner + 2) % 4);
@@ -190,16 +180,6 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
   int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
   at[face >> 1] += face & 1 ? 1 : -1;
   return locate(block, at[0], at[1], at[2]);
-}
-
-/// The sign of a block that owns no crossing edge. All of its samples have one sign, and so have the blocks that are
-/// not there, up to the nearest owner above: no edge on the way is crossed.
-bool CellBlocks::sign_of_added(const HermiteView::Block& block) const {
-  for (int d = 1; d < 8; ++d) {
-    const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
-    if (there >= 0 && source_[there].leaf >= 0) return (source_[there].inside[0] & 1) != 0;
-  }
-  return false;
 }
 
 /// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any of the four
@@ -238,7 +218,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
     });
   };
   std::array<BlockMask, 8> signs;
-  signs[0] = blocks_[b].inside;
+  signs[0] = block.inside;
   const auto step = [&](int from, int axis) {
     const BlockMask edges = crossed(axis, from & 1, (from >> 1) & 1, from >> 2);
     BlockMask& to = signs[from | 1 << axis];
@@ -300,8 +280,7 @@ const CellSheets* CellBlocks::find_told(std::int32_t block, int cell) const {
 
 std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const {
   const Block& block = blocks_[number];
-  if (sheet == 0)
-    return block.first_point + static_cast<std::uint32_t>(code_at(number, cell) - block.first_code);
+  if (sheet == 0) return block.first_point + rank_of(block, cell);
   // Behind the points of all first sheets come those of further sheets, in the order of cells and sheets.
   const auto& several = several_[number];
   const auto at = std::lower_bound(several.begin(), several.end(), cell,

@@ -19,6 +19,7 @@
 #include "algorithms/extraction/embedded_mesh/by_block.h"
 #include "algorithms/extraction/embedded_mesh/cell_sheets.h"
 #include "algorithms/hermite/hermite_view.h"
+#include "algorithms/lattice/active_cells.h"
 #include "algorithms/lattice/placement.h"
 
 namespace hermesh {
@@ -31,8 +32,7 @@ using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 class CellGrid {
  public:
   virtual ~CellGrid() = default;
-  /// The blocks. The signs of a block whose `leaf` is −1 are not stored, but are all the same (it owns no crossing
-  /// edge).
+  /// The blocks, with the signs of all their samples.
   virtual const HermiteView::Blocks& blocks() const = 0;
   virtual const IndexToWorld& placement() const = 0;
   /// The crossing of an edge that is crossed; its offset is in voxels from the edge's first sample.
@@ -56,16 +56,15 @@ class CellGrid {
 /// relative to the placement's base. Constant once it is made, so any number of threads may read it.
 class CellBlocks {
  public:
-  /// What is known of the cells of one block. (Without initializers, so that many can be made without writing them
-  /// twice.)
-  struct Block {
-    BlockMask inside;
-    BlockMask active;   ///< cells with a crossing edge, by their first corner
-    BlockMask joints;   ///< active cells with a cut
-    BlockMask special;  ///< active cells that are joints, or have several sheets or an ambiguous face
-    BlockMask joined;   ///< active cells with an ambiguous face whose inside is joined
-    std::uint32_t first_point, first_code;
-    std::array<std::uint32_t, 8> rank;  ///< active cells before each word
+  /// What is known of the cells of one block. The points of its active cells' first sheets are numbered first, as
+  /// ActiveCells tells, and then those of all further sheets.
+  struct Block : ActiveCells {
+    BlockMask joints;          ///< active cells with a cut
+    BlockMask special;         ///< active cells that are joints, or have several sheets or an ambiguous face
+    BlockMask joined;          ///< active cells with an ambiguous face whose inside is joined
+    std::uint32_t first_cell;  ///< number of the first active cell, see cell_number()
+
+    BlockMask active_mask() const { return std::to_array(active); }
   };
   struct Edge {
     std::int32_t block;
@@ -103,7 +102,7 @@ class CellBlocks {
   std::size_t cell_count() const { return codes_.size(); }
   /// The number of an active cell, from 0, ascending by block and cell.
   std::uint32_t cell_number(std::int32_t block, int cell) const {
-    return static_cast<std::uint32_t>(code_at(block, cell));
+    return blocks_[block].first_cell + rank_of(blocks_[block], cell);
   }
   /// The inside bits of all cells of a block, a mask for each of the eight corners.
   std::array<BlockMask, 8> corner_signs(std::int32_t block) const;
@@ -125,7 +124,7 @@ class CellBlocks {
   const CellSheets& sheets(std::int32_t block, int cell) const {
     if (const CellSheets* told = told_sheets(block, cell)) return *told;
     if (test(blocks_[block].joined, cell)) return find(joined_sheets_[block], cell);
-    return kCellSheets[codes_[code_at(block, cell)]];
+    return kCellSheets[codes_[cell_number(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
   /// Whether a face of an active cell is pinched, see sheets(). Only faces of joints are: all others that were pinched
@@ -140,11 +139,10 @@ class CellBlocks {
   /// How many active cells a block has.
   std::uint32_t cells_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
-    const std::size_t end = next < blocks_.size() ? blocks_[next].first_code : codes_.size();
-    return static_cast<std::uint32_t>(end) - blocks_[block].first_code;
+    const std::size_t end = next < blocks_.size() ? blocks_[next].first_cell : codes_.size();
+    return static_cast<std::uint32_t>(end) - blocks_[block].first_cell;
   }
-  /// How many points the cells of a block have. The points of its active cells' first sheets are numbered first,
-  /// ascending by cell, and then those of all further sheets.
+  /// How many points the cells of a block have.
   std::uint32_t points_in(std::int32_t block) const {
     const auto next = static_cast<std::size_t>(block) + 1;
     const std::size_t end = next < blocks_.size() ? blocks_[next].first_point : points_;
@@ -153,8 +151,8 @@ class CellBlocks {
   /// The place of a sample, which is the first corner of the cell of that number; relative to the placement's base.
   Eigen::Vector3d corner(std::int32_t block, int sample) const;
   Cell locate(std::int32_t block, int x, int y, int z) const {
-    return {source_[block].neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)],
-            sample_index(x & 7, y & 7, z & 7)};
+    const LatticePlace there = hermesh::locate(source_[block].neighbours, x, y, z);
+    return {there.block, there.sample};
   }
   /// Calls f(Cell) for the active cells at most `steps` cells away from `cell` along each axis, that one included.
   template <class F>
@@ -180,8 +178,8 @@ class CellBlocks {
   /// Cell i of the four around a crossing edge, in the order of around().
   Cell cell_around(const Edge& edge, int i) const {
     int at[3] = {edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7};
-    at[(edge.axis + 1) % 3] += kAround[i][0];
-    at[(edge.axis + 2) % 3] += kAround[i][1];
+    at[(edge.axis + 1) % 3] += kAroundEdge[i][0];
+    at[(edge.axis + 2) % 3] += kAroundEdge[i][1];
     return locate(edge.block, at[0], at[1], at[2]);
   }
 
@@ -191,9 +189,8 @@ class CellBlocks {
     for (int i = 0; i < 4; ++i) {
       const Cell cell = cell_around(edge, i);
       const Block& block = blocks_[cell.block];
-      const std::size_t number = code_at(cell.block, cell.cell);
       if (test(block.special, cell.cell)) return false;
-      points[i] = block.first_point + static_cast<std::uint32_t>(number - block.first_code);
+      points[i] = block.first_point + rank_of(block, cell.cell);
     }
     return true;
   }
@@ -220,20 +217,13 @@ class CellBlocks {
   }
 
  private:
-  /// The four cells around an edge, as steps along the two other axes.
-  static constexpr int kAround[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
   /// The face of cell i that leads to cell i + 1.
   static constexpr int face_after(int axis, int i) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     return i == 0 ? 2 * u + 1 : i == 1 ? 2 * v + 1 : i == 2 ? 2 * u : 2 * v;
   }
-  static constexpr int edge_in(int axis, int i) { return 4 * axis - kAround[i][0] - 2 * kAround[i][1]; }
+  static constexpr int edge_in(int axis, int i) { return 4 * axis - kAroundEdge[i][0] - 2 * kAroundEdge[i][1]; }
 
-  std::size_t code_at(std::int32_t block, int cell) const {
-    const Block& b = blocks_[block];
-    const std::uint64_t before = b.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
-    return b.first_code + b.rank[cell >> 6] + static_cast<std::uint32_t>(std::popcount(before));
-  }
   const CellSheets* told_sheets(std::int32_t block, int cell) const {
     return is_joint(block, cell) && !told_.empty() ? find_told(block, cell) : nullptr;
   }
@@ -246,7 +236,6 @@ class CellBlocks {
     const CellSheets* told = told_sheets(block, cell);
     return told ? told->sheets : 1;
   }
-  bool sign_of_added(const HermiteView::Block& block) const;
   BlockMask cells_with_cuts(std::int32_t block) const;
 
   static constexpr double kLargestMargin = 0.25;

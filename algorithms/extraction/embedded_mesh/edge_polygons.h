@@ -68,7 +68,7 @@ class EdgePolygons {
   /// null where they are not at hand.
   template <class OnQuad, class OnTriangle>
   void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle, const PlainPoints* near = nullptr) const {
-    const bool outwards = test(cells_[edge.block].inside, edge.sample);  // along the axis
+    const bool outwards = test(cells_.source(edge.block).inside, edge.sample);  // along the axis
     if (!is_fanned(edge)) {
       std::array<std::uint32_t, 4> p;
       if (!(near ? near->around(edge, p) : cells_.plain_points(edge, p))) p = cells_.around(edge).points;

@@ -26,10 +26,8 @@ class PlainPoints {
         for (std::uint64_t word = own.active[static_cast<std::size_t>(x)] & rows; word != 0;
              word &= word - 1) {
           const int bit = std::countr_zero(word), cell = 64 * x + bit;
-          const std::uint32_t number = cells.cell_number(there, cell);
-          const bool plain = cells.is_plain(there, cell);
           point_[at(x - 8 * d[0], (bit >> 3) - 8 * d[1], (bit & 7) - 8 * d[2])] =
-              plain ? own.first_point + (number - own.first_code) : kNone;
+              cells.is_plain(there, cell) ? own.first_point + rank_of(own, cell) : kNone;
         }
     }
   }

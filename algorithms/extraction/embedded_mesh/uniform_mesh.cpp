@@ -129,7 +129,7 @@ class Contourer {
   /// Places the points of all active cells, in place of whatever points there are.
   void place_all_points(RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
-    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active; }, context);
+    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active_mask(); }, context);
   }
 
   /// Places the points of the cells in `wanted`: active ones, a mask per block, whose points are not there yet.
@@ -501,7 +501,7 @@ void UniformCells::place(std::span<const BlockMask> wanted, RunContext& context)
 
 void UniformCells::place_all(RunContext& context) {
   for (std::size_t b = 0; b < made_->placed.size(); ++b)
-    made_->placed[b] = cells()[static_cast<std::int32_t>(b)].active;
+    made_->placed[b] = cells()[static_cast<std::int32_t>(b)].active_mask();
   made_->contourer.place_all_points(context);
 }
 

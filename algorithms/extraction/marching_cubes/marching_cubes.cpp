@@ -140,9 +140,9 @@ void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<L
       for (int corner = 0; corner < 3; ++corner) {
         const CellEdge edge = kCellEdges[cell.triangles[t][mirrors ? 2 - corner : corner]];
         // An edge that changes sign starts in a leaf, as the table promises.
-        const LeafTable::Location at = leaves.table().locate(
+        const LatticePlace at = leaves.table().locate(
             leaf, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1), z + (edge.first_corner >> 2));
-        (*next)[corner] = outputs[static_cast<std::size_t>(at.leaf)].point_on(edge.axis, at.sample);
+        (*next)[corner] = outputs[static_cast<std::size_t>(at.block)].point_on(edge.axis, at.sample);
       }
   });
 }

@@ -21,43 +21,26 @@ struct MaskGrid {
   std::vector<std::uint64_t> first;   ///< first point of each block
 };
 
-/// The points of the cells around a crossing edge, in the order counter-clockwise seen along the axis.
-class CellsAround {
- public:
-  CellsAround(const HermiteView::Blocks& blocks, const MaskGrid& mask, std::size_t block, int axis)
-      : numbers_(mask.numbers.data()), u_(kStep[(axis + 1) % 3]), v_(kStep[(axis + 2) % 3]) {
-    for (int side = 0; side < 4; ++side) {
-      int d[3] = {0, 0, 0};
-      d[(axis + 1) % 3] = -(side & 1);
-      d[(axis + 2) % 3] = -(side >> 1);
-      const std::int64_t there = blocks[block].neighbours[neighbour_slot(d[0], d[1], d[2])];
-      // Coordinate −1 is 7 there. A block that is not there has no cell of a crossing edge, and is not asked for.
-      cell_[side] = 512 * there + 8 * ((side & 1) * u_ + (side >> 1) * v_);
-      first_[side] = there < 0 ? 0 : static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(there)]);
-    }
-  }
-
-  /// Writes the points of the four cells, and by how many levels the coarsest and the finest of their regions differ.
-  /// @return false if one of the cells has no point.
-  bool find(int sample, Quad& points, int& step) const {
-    // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
-    const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
-    const std::uint16_t n[4] = {numbers_[cell_[low_u + low_v] + sample - u_ - v_], numbers_[cell_[low_v] + sample - v_],
-                                numbers_[cell_[0] + sample], numbers_[cell_[low_u] + sample - u_]};
-    points = {first_[low_u + low_v] + point_of(n[0]), first_[low_v] + point_of(n[1]), first_[0] + point_of(n[2]),
-              first_[low_u] + point_of(n[3])};
-    const auto [finest, coarsest] = std::minmax({level_of(n[0]), level_of(n[1]), level_of(n[2]), level_of(n[3])});
-    step = coarsest - finest;
-    return n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
-  }
-
- private:
-  static constexpr int kStep[3] = {64, 8, 1};
-  const std::uint16_t* numbers_;
-  const int u_, v_;
-  std::int64_t cell_[4];
-  std::uint32_t first_[4];
+/// The points of the four cells around an edge.
+struct PointsAround {
+  Quad points;
+  int step;       ///< by how many levels the coarsest and the finest of their regions differ
+  bool complete;  ///< whether each of the cells has a point
 };
+
+PointsAround points_of(const MaskGrid& mask, const std::array<LatticePlace, 4>& cells) {
+  PointsAround result;
+  std::uint16_t n[4];
+  for (int i = 0; i < 4; ++i) {
+    // A block that is not there has no cell of a crossing edge, and is not asked for.
+    n[i] = mask.numbers[512 * static_cast<std::size_t>(cells[i].block) + static_cast<std::size_t>(cells[i].sample)];
+    result.points[i] = static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(cells[i].block)]) + point_of(n[i]);
+  }
+  const auto [finest, coarsest] = std::minmax({level_of(n[0]), level_of(n[1]), level_of(n[2]), level_of(n[3])});
+  result.step = coarsest - finest;
+  result.complete = n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
+  return result;
+}
 
 /// One run of adaptive_dual_contouring(), stage by stage.
 class Contourer {
@@ -168,11 +151,11 @@ class Contourer {
     const bool mirrors = placement_.mirrors();
     for (int axis = 0; axis < 3; ++axis) {
       if (!any(block.crossing[axis])) continue;
-      const CellsAround around(edges_.blocks(), mask_, b, axis);
+      const CellsAroundEdges around(edges_.blocks(), b, axis);
       for_each_bit(block.crossing[axis], [&](int sample) {
-        Quad polygon;
-        int corners = 0, step = 0;
-        if (!around.find(sample, polygon, step)) return;
+        auto [polygon, step, complete] = points_of(mask_, around(sample));
+        if (!complete) return;
+        int corners = 0;
         // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
         // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
         for (int i = 0; i < 4; ++i)

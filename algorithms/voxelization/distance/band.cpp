@@ -1,6 +1,8 @@
 #include "algorithms/voxelization/distance/band.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <cstring>
 #include <deque>

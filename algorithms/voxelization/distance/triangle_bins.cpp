@@ -1,5 +1,7 @@
 #include "algorithms/voxelization/distance/triangle_bins.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,8 @@
 #include "algorithms/voxelization/inside/interior_faces.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>

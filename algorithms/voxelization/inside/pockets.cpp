@@ -1,6 +1,7 @@
 #include "algorithms/voxelization/inside/pockets.h"
 
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <optional>

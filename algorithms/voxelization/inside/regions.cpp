@@ -1,5 +1,7 @@
 #include "algorithms/voxelization/inside/regions.h"
 
+#include <tbb/parallel_for.h>
+
 #include <memory>
 
 #include "algorithms/core/disjoint_sets.h"

@@ -1,5 +1,7 @@
 #include "algorithms/voxelization/inside/winding_signs.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <cmath>

@@ -91,14 +91,15 @@ template <int prisms>
 inline void tell_points(const Scan& scan, Found& found) {
   for (const Window* window = scan.windows; window < scan.windows + scan.window_count; ++window) {
     const Block& block = *window->block;
+    const ActiveCells& cells = *block.cells;
     for (int x = window->cells.first; x < window->cells.end; ++x) {
-      const std::uint64_t active = block.active[x], asked = active & window->cells.rows;
+      const std::uint64_t active = cells.active[x], asked = active & window->cells.rows;
       if (asked == 0) continue;
       // What lies between two rows is looked at, too.
       // Points are numbered cell by cell, so that those of a row of cells follow one another.
       const int first = popcount(active & before_first(asked)), end = popcount(active & until_last(asked));
       tell_points<prisms>(scan, window->corner,
-                          block.first_point + block.points_before[x] + static_cast<std::uint32_t>(first), end - first,
+                          cells.first_point + cells.before[x] + static_cast<std::uint32_t>(first), end - first,
                           found);
     }
     if (block.later_points > 0)

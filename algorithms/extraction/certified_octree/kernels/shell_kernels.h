@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "algorithms/lattice/active_cells.h"
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh::shell_kernels {
@@ -44,12 +45,10 @@ struct Surface {
   std::uint16_t* certain;
 };
 
-/// A block of the lattice: 8 words each for the cells and for the edges by first sample, of each layer bit
-/// 8y+z. Quads are in the order of samples, those of one sample in that of axes.
+/// What is looked at in a block of the lattice: its points and quads. Edges are eight words each, those of each layer at
+/// bit 8y+z by first sample. Quads are in the order of samples, those of one sample in that of axes.
 struct Block {
-  const std::uint64_t* active;         ///< cells with a point
-  const std::uint32_t* points_before;  ///< points of the block before each word of `active`
-  std::uint32_t first_point;
+  const ActiveCells* cells;
   std::uint32_t first_later, later_points;             ///< cells' further points: all of them are looked at
   const std::uint64_t *crossing[3], *without_quad[3];  ///< edges along each axis
   std::uint32_t first_quad;

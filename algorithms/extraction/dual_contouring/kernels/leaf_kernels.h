@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
+#include "algorithms/lattice/active_cells.h"
 
 namespace hermesh::leaf_kernels {
 
@@ -22,12 +23,9 @@ struct UpperSigns {
 /// Floats in the longest vectors.
 inline constexpr int kLargestVector = 8;
 
-/// Which cells of a leaf have a point, and which point. 96 bytes.
-struct LeafCells {
-  std::uint64_t active[8];    ///< cells with a crossing edge
-  std::uint16_t before[8];    ///< active cells before each word
-  std::uint32_t first_point;  ///< number of the first cell's point
-  std::uint32_t first_quad;   ///< number of the quad of the first crossing edge: by axis, in that by sample
+/// Which cells of a leaf have a point, and which quads its crossing edges have. 96 bytes.
+struct LeafCells : ActiveCells {
+  std::uint32_t first_quad;  ///< number of the quad of the first crossing edge: by axis, in that by sample
   std::uint16_t points, quads;
 };
 
