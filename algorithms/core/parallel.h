@@ -13,7 +13,7 @@
 
 namespace hermesh {
 
-/// A reference to a function of the ends of a range, which it must not outlive.
+/// Refers to a function of the two ends of a range; the function must outlive it.
 class RangeFunction {
  public:
   template <class F>

@@ -43,6 +43,7 @@ void LabelledGrid::find_edges(RunContext& context) {
         if (label > 0 && next > 0) cuts_[b][axis][sample >> 6] |= bit;
       }
     }
+    solid_.blocks[b].count_before();
     // Joints of one point and no ambiguous face need not be told (CellGrid::joint_sheets()). Most are such,
     // so the lists stay short.
     for (int cell = 0; cell < 512; ++cell) {
@@ -61,7 +62,7 @@ void LabelledGrid::find_edges(RunContext& context) {
 
 std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermite, const Cutters& cutters) {
   const auto block = static_cast<std::int32_t>(b);
-  const std::int32_t leaf = solid_.leaf_of[b];
+  const std::int32_t leaf = solid_.blocks[b].leaf;
   // The original surface's crossings come in the same order as here, with the cuts in between.
   const EdgeCrossing* original =
       leaf < 0 ? nullptr : hermite.crossings_of(static_cast<std::size_t>(leaf)).data();
@@ -114,11 +115,8 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
 }
 
 EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) const {
-  const auto& edges = solid_.blocks[static_cast<std::size_t>(block)].crossing;
-  // The same order as in fill_block(): the edges of lower axes come first.
-  std::uint32_t number = first_[static_cast<std::size_t>(block)] + rank_in(edges[axis], sample);
-  for (int a = 0; a < axis; ++a) number += static_cast<std::uint32_t>(count(edges[a]));
-  return crossings_[number];
+  // The same order as in fill_block().
+  return crossings_[first_[static_cast<std::size_t>(block)] + solid_.blocks[static_cast<std::size_t>(block)].rank(axis, sample)];
 }
 
 bool LabelledGrid::is_of_one_piece(std::int32_t block, int cell, int face) const {
@@ -150,7 +148,7 @@ void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const 
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(cells[block].special, [&](int cell) {
       const CellSheets& sheets = cells.sheets(block, cell);
-      const int signs = cells.corner_signs(cells.cell_number(block, cell));
+      const int signs = cells.corner_code(cells.cell_number(block, cell));
       const auto moved = [&](int steps) {  // a bit an axis, as of corners
         return solid.locate(block, (cell >> 6) + (steps & 1), ((cell >> 3) & 7) + ((steps >> 1) & 1),
                             (cell & 7) + (steps >> 2));

@@ -136,7 +136,6 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
   solid.placement = hermite.placement;
   const std::vector<Lower> lowers = with_those_below(blocks_with_samples(hermite));
   solid.blocks.resize(lowers.size());
-  solid.leaf_of.resize(lowers.size());
   solid.labels = LabelField(lowers.size());
   solid.codes = LabelField(lowers.size());
   // Each thread fills in whole blocks, and counts are summed after it.
@@ -145,14 +144,12 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
     ViewBlock& block = solid.blocks[b];
     block = {};
     block.lower = lowers[b];
-    // Not −1: CellGrid takes the signs of such a block for unknown, and here they are known of all.
-    block.leaf = static_cast<std::int32_t>(b);
     const SignLeaf* leaf = hermite.find(lowers[b]);
-    solid.leaf_of[b] = leaf ? static_cast<std::int32_t>(leaf - hermite.leaves.data()) : -1;
+    block.leaf = leaf ? static_cast<std::int32_t>(leaf - hermite.leaves.data()) : -1;
     if (leaf)
       block.inside = leaf->inside;
     else if (hermite.sign_without_leaf(lowers[b]))
-      block.inside.fill(~std::uint64_t{0});
+      block.inside = kAllInside;
     samples[b] = static_cast<std::uint64_t>(count(block.inside));
     LabelField::Values values{};
     // All of one piece and one code, until label_by_codes() tells more.

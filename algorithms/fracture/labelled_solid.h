@@ -46,10 +46,9 @@ class LabelField {
 struct LabelledSolid {
   IndexToWorld placement;
   /// Each block that holds an inside sample, and the seven below it, so that every cell with an inside corner
-  /// begins in one of them; ascending. Samples of no block are outside. In each block `leaf` is the block's
-  /// own number, never −1, and `crossing` is empty until a LabelledGrid is made.
+  /// begins in one of them; ascending. Samples of no block are outside. In each block `leaf` is that of
+  /// the Hermite data, and `crossing` is empty until a LabelledGrid is made.
   HermiteView::Blocks blocks;
-  std::vector<std::int32_t> leaf_of;  ///< each block's leaf of the Hermite data; −1 for none
   /// The cutters' code of each sample: 0 outside, else 1 + its place in `code_values`. Repairs and merges
   /// change labels, never codes.
   LabelField codes;

@@ -52,8 +52,8 @@ std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunCont
   return found;
 }
 
-/// The sign of a block that owns no crossing edge. All of its samples have one sign, and so have the blocks that are not
-/// there, up to the nearest owner above: no edge on the way is crossed.
+/// The sign of an added block, which has no leaf and owns no crossing edge. All of its samples have one sign, and so have the
+/// blocks that are not there, up to the nearest owner above: no edge on the way is crossed.
 bool sign_of_added(const HermiteView::Blocks& blocks, const HermiteView::Block& block) {
   for (int d = 1; d < 8; ++d) {
     const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
@@ -126,29 +126,16 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
     block.leaf = -1;
   }
   find_neighbours(blocks_, context);
-  for (std::size_t i = 0; i < added.size(); ++i) {
+  // Signs of added blocks are read off neighbours, so these must be known. Only signs of leaves are read, which no thread
+  // writes.
+  parallel_blocks(added.size(), context, [&](std::size_t i) {
     Block& block = blocks_[leaves_before[i] + i];
     if (sign_of_added(blocks_, block)) block.inside = kAllInside;
-  }
+  });
 }
 
 BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block) {
-  static constexpr BlockMask kNone{};
-  BlockMask result{};
-  for (int axis = 0; axis < 3; ++axis)
-    for (const auto& [u, v] : kAroundEdge) {
-      // The four edges of a cell along an axis start at its corners of the face across that axis: masks of edges, shifted
-      // back to the cell's first corner.
-      int d[3] = {0, 0, 0};
-      d[(axis + 1) % 3] = -u;
-      d[(axis + 2) % 3] = -v;
-      const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
-        const std::int32_t there = blocks[block].neighbours[neighbour_slot(ax, ay, az)];
-        return there >= 0 ? blocks[there].crossing[axis] : kNone;
-      });
-      for (int word = 0; word < 8; ++word) result[word] |= shifted[word];
-    }
-  return result;
+  return cells_with_edges(blocks, block, [&](std::int32_t there) -> const auto& { return blocks[there].crossing; });
 }
 
 }  // namespace hermesh

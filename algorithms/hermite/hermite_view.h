@@ -11,6 +11,7 @@
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/lattice/crossing_edges.h"
 #include "algorithms/lattice/placement.h"
 
 namespace hermesh {
@@ -19,31 +20,12 @@ namespace hermesh {
 /// to the data that it was made of, which must outlive it.
 class HermiteView {
  public:
-  struct Block {
+  struct Block : CrossingEdges {
     std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample
     std::int32_t leaf;                  ///< number among the leaves that own crossings; −1 for none
     BlockMask inside;                   ///< also where there is no leaf: then all samples are of one sign
-    std::array<BlockMask, 3> crossing;  ///< samples whose up-wind edge is crossed, by axis
-    std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
     /// Numbers of the blocks around, by neighbour_slot(); −1 where there is none.
     std::array<std::int32_t, 27> neighbours;
-
-    /// Rank of a crossing edge among those of the block, by axis and then by sample.
-    std::uint32_t rank(int axis, int sample) const {
-      const int word = sample >> 6;
-      return before[axis][word] +
-             static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
-    }
-    int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
-    /// Fills in `before` from `crossing`.
-    void count_before() {
-      int sum = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        for (int word = 0; word < 8; ++word) {
-          before[axis][word] = static_cast<std::uint16_t>(sum);
-          sum += std::popcount(crossing[axis][word]);
-        }
-    }
   };
 
   using Blocks = LargeArray<Block>;  ///< members of a new block are undefined until they are written
@@ -54,7 +36,7 @@ class HermiteView {
 
   /// The crossing of an edge, which must be crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
-  /// All crossings of a block, in the order of Block::rank(). `out` has room for as many, 1536 at most.
+  /// All crossings of a block, in the order of CrossingEdges::rank(). `out` has room for as many, 1536 at most.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const = 0;
 
  protected:
@@ -69,14 +51,19 @@ class HermiteView {
 /// Sets `neighbours` of blocks in ascending order of (x, y, z).
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
 
+/// The cells of a block that have an edge of a mask, by their first corners. `edges(block)` gives the masks of a block that is
+/// there, by axis.
+template <class Edges>
+BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block, Edges&& edges);
 /// The cells of a block with a crossing edge, by their first corners.
 BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block);
 
-/// The four cells around an edge as steps along the two axes after its own: counter-clockwise seen along it.
+/// The four cells around an edge as steps along the two axes after its own, counter-clockwise for a viewer whom the edge's
+/// axis points at.
 inline constexpr int kAroundEdge[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
 
-/// The cells around the edges along one axis that start in a block: who goes over its crossing edges looks the blocks
-/// up once.
+/// The cells around the edges along one axis that start in a block. The neighbouring blocks are looked up once, in the
+/// constructor, for all of these edges.
 class CellsAroundEdges {
  public:
   CellsAroundEdges(const HermiteView::Blocks& blocks, std::size_t block, int axis)
@@ -106,6 +93,26 @@ class CellsAroundEdges {
   std::int32_t block_[4];
   int shift_[4];
 };
+
+template <class Edges>
+BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block, Edges&& edges) {
+  static constexpr BlockMask kNone{};
+  BlockMask result{};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const auto& [u, v] : kAroundEdge) {
+      // The four edges of a cell along an axis start at its corners of the face across that axis: masks of edges, shifted
+      // back to the cell's first corner.
+      int d[3] = {0, 0, 0};
+      d[(axis + 1) % 3] = -u;
+      d[(axis + 2) % 3] = -v;
+      const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
+        const std::int32_t there = blocks[block].neighbours[neighbour_slot(ax, ay, az)];
+        return there >= 0 ? edges(there)[axis] : kNone;
+      });
+      for (int word = 0; word < 8; ++word) result[word] |= shifted[word];
+    }
+  return result;
+}
 
 /// View of sparse data. `Read` turns a crossing of the data into an EdgeCrossing.
 template <class Crossing, class Read>

@@ -89,7 +89,7 @@ TEST_P(HermiteViewTest, CellsAroundAnEdgeGoRoundItCounterClockwise) {
         const Index edge = index_of(blocks[b], sample);
         ASSERT_TRUE(crossed(axis, edge));
         const std::array<LatticePlace, 4> cells = around(sample);
-        // Seen along the axis, counter-clockwise about it: below in both, one step along u, then along v, then back.
+        // Below in both, then one step along u, one along v, and one back: counter-clockwise about the axis.
         const int steps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
         for (std::size_t i = 0; i < 4; ++i) {
           Index wanted = edge;

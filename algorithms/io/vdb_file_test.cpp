@@ -1,8 +1,8 @@
 #include "algorithms/io/vdb_file.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <cstring>

@@ -396,7 +396,7 @@ bool LeafPlaces::tiles_meet(const Node& node) const {
 }
 
 /// Whether all signs of the first layer along the axis are `inside`.
-bool LeafPlaces::is_first_layer(const BlockMask& signs, int axis, bool inside) {
+bool LeafPlaces::first_layer_is(const BlockMask& signs, int axis, bool inside) {
   const std::uint64_t layer = first_layers(axis == 1, axis == 2);
   for (int x = 0; x < (axis == 0 ? 1 : 8); ++x)
     if ((signs[x] & layer) != (inside ? layer : 0)) return false;

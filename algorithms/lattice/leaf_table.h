@@ -23,21 +23,22 @@ namespace hermesh {
 /// Refuses a volume of which a sample is not finite. @throws Error always
 [[noreturn]] void throw_not_finite();
 
-/// Where the leaves of a volume are, and where their samples; no sample is read. Leaves are numbered in the
-/// order of the tree, which is that of a walk over its lowest internal nodes.
+/// Where the leaves of a volume are, and where their samples; no sample is read. Leaves are numbered node by node, in the
+/// order in which the tree lists its lowest internal nodes, and within a node in ascending order of (x, y, z).
 class LeafPlaces {
  public:
-  /// @throws Error if the isovalue or the background is not finite.
+  /// @throws Error if the isovalue or the background is not finite, or if 32 bits cannot number the leaves; Cancelled.
   LeafPlaces(const LevelSet& level_set, double isovalue, RunContext& context);
   LeafPlaces(const LeafPlaces&) = delete;
   LeafPlaces& operator=(const LeafPlaces&) = delete;
 
   std::size_t size() const { return leaves_.size(); }
   const InsideRule& rule() const { return rule_; }
+  /// The volume's tree, or the copy that a LeafTable made of it.
   const openvdb::FloatTree& tree() const { return *tree_; }
 
   /// The 512 samples of a leaf, in the order of BlockMask. `leaf` may also be what neighbour() gives where there is no
-  /// leaf: all samples are then infinite.
+  /// leaf: then all samples are +infinity, be it inside or outside there, so that no sign may be read from them.
   const float* values(std::int64_t leaf) const { return values_[static_cast<std::size_t>(leaf + kUniforms)]; }
   /// Samples that are active in the tree: in a level set, those of the band.
   BlockMask active(std::size_t leaf) const;
@@ -49,18 +50,18 @@ class LeafPlaces {
     return nodes_[place.node].lower.offsetBy(at(8), at(4), at(0));
   }
 
-  /// Number of the leaf at an offset in leaves, each −1, 0 or 1, or kUniformOutside or
-  /// kUniformInside where there is none.
+  /// Number of the leaf at an offset in leaves, each −1, 0 or 1. Where there is none it is kUniformOutside or
+  /// kUniformInside (block_mask.h), by the sign of the tile or background there.
   std::int32_t neighbour(std::size_t leaf, int dx, int dy, int dz) const {
     return around_[leaf][kStepX * dx + kStepY * dy + dz];
   }
-  /// Prefetches the numbers of the neighbours above along x and y, which may lie where no cache has them.
+  /// Prefetches the numbers of the neighbours at +1 along x and along y; these numbers may lie where no cache has them.
   [[gnu::always_inline]] void ask_for_neighbours(std::size_t leaf) const {
     __builtin_prefetch(around_[leaf] + kStepX);
     __builtin_prefetch(around_[leaf] + kStepY);
   }
-  /// Numbers of the leaf itself and of its seven neighbours one step up (`side` 1) or down (−1) along each axis or not,
-  /// as neighbour() gives them: entry |dx| + 2|dy| + 4|dz|.
+  /// Numbers of the leaf at each offset whose parts are 0 or `side` (1 or −1), as neighbour() gives them; the leaf itself
+  /// is one of them. Offset (dx, dy, dz) is at entry |dx| + 2|dy| + 4|dz|.
   std::array<std::int32_t, 8> neighbours(std::size_t leaf, int side) const {
     std::array<std::int32_t, 8> result;
     for (int i = 0; i < 8; ++i) result[i] = neighbour(leaf, side * (i & 1), side * (i >> 1 & 1), side * (i >> 2));
@@ -74,9 +75,9 @@ class LeafPlaces {
         std::copy_n(around_[leaf] + kStepX * dx + kStepY * dy - 1, 3, &result[neighbour_slot(dx, dy, -1)]);
     return result;
   }
-  /// Leaves of the same x.
+  /// One layer of leaves across x. It may hold no leaf.
   struct Slab {
-    std::span<const std::uint32_t> nodes;  ///< numbers of nodes, in ascending order of their coordinates
+    std::span<const std::uint32_t> nodes;  ///< numbers of all nodes of one x, in ascending order of (y, z)
     int x;                                 ///< which layer of leaves within the nodes, 0 to 15
   };
   /// Slabs that together hold all leaves, in ascending order of x. They refer to this object.
@@ -84,30 +85,33 @@ class LeafPlaces {
   /// Calls f(leaf) for every leaf of the slab, in ascending order of (y, z).
   template <class F>
   void for_each_leaf(const Slab& slab, F&& f) const;
-  /// Calls f(first, end) for ranges that together are the numbers of all leaves of the slab, in any order.
+  /// Calls f(first, end) for ranges, some of them empty, that together are the numbers of all leaves of the slab.
   template <class F>
   void for_each_range(const Slab& slab, F&& f) const {
     for (const std::uint32_t node : slab.nodes) f(nodes_[node].first_at[slab.x], nodes_[node].first_at[slab.x + 1]);
   }
 
-  /// Whether a tile of one sign meets a tile of the other, so that edges change sign and start in no leaf.
+  /// Whether a tile of one sign shares a face with a tile of the other, the background included, so that edges change sign
+  /// and neither start nor end in a leaf.
   bool tiles_of_both_signs_meet(RunContext& context) const;
   /// Whether an edge along the axis that ends in the leaf changes sign and starts in no leaf;
   /// `inside` are the leaf's signs.
   bool differs_from_tile_below(std::size_t leaf, const BlockMask& inside, int axis) const {
     const std::int32_t there = neighbour(leaf, -(axis == 0), -(axis == 1), -(axis == 2));
-    return there < 0 && !is_first_layer(inside, axis, there == kUniformInside);
+    return there < 0 && !first_layer_is(inside, axis, there == kUniformInside);
   }
-  /// The signed value (InsideRule) nearest to the isovalue among inside tiles that are as small as a leaf;
-  /// nothing where there is no such tile.
+  /// The signed value (InsideRule), negative, of the inside tile that is nearest to the isovalue, among tiles as small as
+  /// a leaf; nothing where there is no such tile.
   std::optional<float> nearest_tile_inside() const;
 
  protected:
   /// Makes an object without leaves, for a class that numbers them itself and finds their samples.
   LeafPlaces(const LevelSet& level_set, double isovalue);
-  /// Numbers the leaves of tree_; with `with_values` their samples are found, too, so that values() holds.
+  /// Numbers the leaves of tree_. With `with_values` it finds their samples, too; else find_values() must be called for a
+  /// leaf before values() is.
   void number_leaves(RunContext& context, bool with_values);
-  /// Makes values() hold for the leaf, which lies where no cache has it: ask_for() it long before.
+  /// Notes where the leaf's samples are, for values(). It reads the leaf, which lies where no cache has it, so ask_for()
+  /// should be called long before.
   void find_values(std::size_t leaf) { values_[leaf + kUniforms] = leaves_[leaf]->buffer().data(); }
   [[gnu::always_inline]] void ask_for(std::size_t leaf) const { __builtin_prefetch(leaves_[leaf]); }
 
@@ -135,7 +139,7 @@ class LeafPlaces {
     NodeMask child{}, tile_inside{};
     std::array<std::uint32_t, 17> first_at{};   ///< number of the first leaf at every x, and behind the last
     std::array<std::int32_t, 27> neighbours{};  ///< a node's number or kUniform…, by neighbour_slot()
-    float nearest_inside = kNoTile;             ///< signed value of the inside tile that is nearest to the isovalue
+    float nearest_inside = kNoTile;             ///< signed value of the inside tile nearest to the isovalue, or kNoTile
   };
   struct Place {
     std::uint32_t node;
@@ -143,7 +147,8 @@ class LeafPlaces {
   };
 
   static constexpr int kUniforms = 2;  ///< kUniformOutside and kUniformInside are −1 and −2
-  static bool is_first_layer(const BlockMask& signs, int axis, bool inside);
+  /// Whether all samples of the first layer along the axis are `inside`.
+  static bool first_layer_is(const BlockMask& signs, int axis, bool inside);
 
   void find_tiles(Node& node) const;
   void number(Node& node, std::uint32_t index, std::uint32_t next);
@@ -164,7 +169,7 @@ class LeafPlaces {
 template <class F>
 void LeafPlaces::for_each_leaf(const Slab& slab, F&& f) const {
   const auto y_of = [&](std::size_t i) { return nodes_[slab.nodes[i]].lower.y(); };
-  std::vector<std::uint32_t> next;  // leaf of each node of a column; in a node their order is the same
+  std::vector<std::uint32_t> next;  // each node's next leaf; within a node numbers ascend with (y, z), too
   for (std::size_t column = 0, end; column < slab.nodes.size(); column = end) {
     next.clear();
     for (end = column; end < slab.nodes.size() && y_of(end) == y_of(column); ++end)
@@ -185,22 +190,24 @@ void LeafPlaces::for_each_leaf(const Slab& slab, F&& f) const {
 /// The leaves of a volume with the signs of their samples as bits.
 class LeafTable : public LeafPlaces {
  public:
-  /// Reads every sample once. Where a tile of one sign meets a tile of the other, or a leaf's first layer,
-  /// the tree is copied and the tile made a leaf, so that every edge with a change of sign starts in a leaf.
-  /// @throws Error if a sample, the isovalue or the background is not finite.
+  /// Reads every sample once. Where a tile of one sign shares a face with a tile of the other, or lies below a leaf whose
+  /// first layer holds the other sign, the tree is copied, the 8³ blocks of tiles along that border become leaves, and all
+  /// samples are read again: then every edge with a change of sign starts in a leaf.
+  /// @throws Error if a sample of a leaf, the isovalue or the background is not finite, or as tiles_between_signs() does,
+  ///   or if 32 bits cannot number the leaves; Cancelled.
   LeafTable(const LevelSet& level_set, double isovalue, RunContext& context);
 
   /// Which samples of the leaf are inside.
   const BlockMask& inside(std::size_t leaf) const { return inside_[leaf]; }
-  /// Which samples are inside of the leaf, or of what neighbour() gives where there is none.
+  /// The samples of a leaf that are inside; for what neighbour() gives where there is no leaf, all samples or none.
   const BlockMask& signs(std::int32_t leaf) const {
     return leaf >= 0 ? inside_[static_cast<std::size_t>(leaf)] : leaf == kUniformInside ? kAllInside : kAllOutside;
   }
   /// The edges along each axis that start in the leaf and change sign, at the bits of their first samples.
   std::array<BlockMask, 3> crossing_edges(std::size_t leaf) const;
-  /// Leaf and sample for coordinates from −8 to 15, relative to the first sample of a leaf, where there is a leaf: at
-  /// the start of every edge with a change of sign. For any other sample neighbour() tells whether there is a leaf.
-  /// @throws Error that names the sample if there is none, or if a coordinate is beyond.
+  /// Leaf and sample at coordinates from −8 to 15, relative to the first sample of `leaf`. There is a leaf at the first
+  /// sample of every edge with a change of sign; for any other sample neighbour() tells whether there is one.
+  /// @throws Error that names the sample if there is no leaf, or if a coordinate is not from −8 to 15.
   LatticePlace locate(std::size_t leaf, int x, int y, int z) const {
     constexpr auto is_beyond = [](int i) { return static_cast<unsigned>(i + 8) > 23u; };
     if (is_beyond(x) || is_beyond(y) || is_beyond(z)) throw_no_leaf(leaf, x, y, z);
@@ -208,7 +215,8 @@ class LeafTable : public LeafPlaces {
     if (there < 0) throw_no_leaf(leaf, x, y, z);
     return {there, sample_index(x & 7, y & 7, z & 7)};
   }
-  /// Whether a sample that is inside and not active is less than `distance` from the isovalue.
+  /// Whether a leaf has a sample that is inside, not active, and less than `distance` from the isovalue, in the grid's
+  /// values. Tiles are not looked at; nearest_tile_inside() tells of them.
   bool has_inactive_inside_nearer_than(float distance) const;
 
  private:
@@ -224,8 +232,9 @@ class LeafTable : public LeafPlaces {
 /// sample changes its side. @throws Error if the isovalue or the background is not finite.
 InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue);
 
-/// First samples of the 8³ blocks of tiles that meet a sample of the other sign in another tile, some of them more than
-/// once. @throws Error for more than 70,000 pairs of blocks: a surface of 4.5 million faces without samples.
+/// First samples of the 8³ blocks of tiles, on both sides, where tiles of different sign share a face; some of them are
+/// listed more than once. @throws Error for more than 70,000 such pairs of blocks, a surface of 4.5 million faces of voxels
+///   that no narrow band samples; Cancelled.
 std::vector<openvdb::Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
                                                 RunContext& context);
 

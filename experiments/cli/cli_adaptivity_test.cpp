@@ -1,5 +1,5 @@
-#include <openvdb/openvdb.h>
 #include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
 
 #include "algorithms/core/openvdb_trees.h"
 #include "experiments/cli/process_for_tests.h"

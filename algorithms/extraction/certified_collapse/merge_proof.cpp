@@ -215,7 +215,7 @@ class MergeProof::Above {
     const std::array<std::uint32_t, 3> leaders = proof_.leaders(fine_triangle);
     if (!proof_.touches(face_, leaders) || (out >= 0 && !is_near_beyond(fine_triangle, places, out, leaders)))
       return;
-    proof_.prove(fine_triangle, kCovered);
+    proof_.mark_proved(fine_triangle, kCovered);
   }
 
  private:
@@ -251,7 +251,7 @@ void MergeProof::look_at_merged() {
                             .holds(
                                 merged_.mesh->corners(face), t, [&](std::uint32_t f) { return bound(f); },
                                 Above(*this, face)))
-      prove(t, kNear);
+      mark_proved(t, kNear);
     else
       call_unproven(t);
   });
@@ -285,7 +285,7 @@ void MergeProof::look_at_fine() {
   parallel_blocks(open_.size(), context_, [&](std::size_t i) {
     const std::uint32_t t = open_[i];
     if (proofs_of(t) & kCovered) return;
-    if (is_single(t)) return prove(t, kCovered);
+    if (is_single(t)) return mark_proved(t, kCovered);
     const std::array<std::uint32_t, 3> leaders = this->leaders(t);
     // Not from a single point, which may be one of other patches too.
     int in_set = 0;
@@ -307,7 +307,7 @@ void MergeProof::look_at_fine() {
              .holds(fine_.corners(t), mesh.around(point).front(), hear, [](std::uint32_t, const Places&) {}))
       call_unproven(t);
     else if (known)
-      prove(t, touched ? kCovered : Proof(kCovered | kFar));
+      mark_proved(t, touched ? kCovered : Proof(kCovered | kFar));
   });
   std::erase_if(open_, [&](std::uint32_t t) {
     const bool done = proofs_[t] & kCovered;
@@ -320,7 +320,7 @@ void MergeProof::look_at_fine() {
 std::uint8_t MergeProof::proofs_of(std::uint32_t t) {
   return std::atomic_ref(proofs_[t]).load(std::memory_order_relaxed);
 }
-void MergeProof::prove(std::uint32_t t, Proof what) {
+void MergeProof::mark_proved(std::uint32_t t, Proof what) {
   std::atomic_ref(proofs_[t]).fetch_or(what, std::memory_order_relaxed);
 }
 

@@ -15,37 +15,43 @@
 
 namespace hermesh {
 
-/// The mesh that the merges of a forest make of a fine one: a triangle whose corners go into three sets
-/// stays, the others vanish.
+/// The mesh that the merges of a forest make of a fine one: a triangle stays if its corners go into three points, be they
+/// sets or single points; the others vanish.
 struct MergedMesh {
-  std::optional<FineMesh> mesh;
-  std::vector<std::uint32_t> leaders;  ///< for each of its points the fine one that its set goes by
+  std::optional<FineMesh> mesh;        ///< nothing before the first call of sort_out() or prove()
+  std::vector<std::uint32_t> leaders;  ///< for each of its points the fine one that it goes by (MergeForest::leader())
   std::vector<std::uint32_t> origin;   ///< for each of its triangles the fine one; ascending
-  std::vector<std::uint32_t> number;   ///< for each fine point that is a leader its point here; else kNone
+  /// For each fine point that a point here goes by, that point; else FineMesh::kNone, as for a leader without triangles.
+  std::vector<std::uint32_t> number;
 };
 
-/// Splits sets of a forest until the merged mesh is proved. What was proved of a triangle is kept until a set
-/// near it is split or joined. Sets are called unproven from many threads, by bits that are only ever set,
-/// and split by one: so the outcome does not depend on threads.
+/// Splits sets of a forest until the merged mesh is proved. Who makes and joins sets sees to it that each is a disc, and no
+/// two triangles of the fine mesh may meet, for what fails at single points has no set to split. What was proved of a
+/// triangle is kept until a set near it is split or joined. Many threads call sets unproven, by flags that they only set,
+/// and one thread splits these sets: so the outcome does not depend on threads.
 class MergeProof {
  public:
-  /// @param forest whose sets are split; others may join some between the calls of this
-  /// @param fine the fine mesh
-  /// @param tolerance by point of `fine`, voxels
+  /// @param forest whose sets are split; between calls others may join some, and settle() it; must outlive this
+  /// @param fine the fine mesh; must outlive this
+  /// @param tolerance by point of `fine`, voxels; not copied, and empty only if prove() is never called
   /// @param context asked whether to stop
   MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance,
              RunContext& context);
 
-  /// Splits sets until the merged mesh has the topology of the fine one, and returns it; nothing is promised
-  /// of distances and contacts. @throws Cancelled
+  /// Splits sets until no edge leads from one point to another twice, and returns the mesh. As sets are discs, it has the
+  /// topology of the fine one, but for parts of which no triangle is left, which only prove() brings back. Nothing is
+  /// promised of distances and contacts. @throws Cancelled
   const MergedMesh& sort_out();
-  /// Splits sets until the merged mesh keeps its promises, and returns it: the topology of the fine one, no
-  /// two triangles that meet, and each mesh within the tolerance of the other (certified_decimation.h). Of
-  /// the sets that a failure concerns the one that was joined last is split first. @throws Cancelled
+  /// Splits sets until the merged mesh keeps its promises, and returns it: the topology of the fine one, no two triangles that
+  /// meet but in shared corners and edges, and each mesh within the tolerance and kDistanceSlack of the other
+  /// (certified_decimation.h). Of the sets at a triangle that fails, the one that was joined last is split, and moves before
+  /// any other; after three rounds of splits all that may be to blame are split at once. sort_out() need not have been
+  /// called. @throws Cancelled
   const MergedMesh& prove();
 
   const MergedMesh& merged() const { return merged_; }
-  /// Flags by point of the fine mesh: 1 for points of the merged mesh that splits have brought back in the last call.
+  /// Flags by point of the fine mesh: 1 for the leaders of all parts of sets that were split in the last call of sort_out() or
+  /// prove(), also for those that were there before. The next call overwrites them.
   std::span<const std::uint8_t> brought_back() const { return brought_back_; }
 
  private:
@@ -54,11 +60,12 @@ class MergeProof {
   enum Proof : std::uint8_t {
     kStays = 1,    ///< it is a triangle of the merged mesh
     kNear = 2,     ///< the merged triangle is near the fine mesh
-    kApart = 4,    ///< the merged triangle meets no other one that is marked so
+    kApart = 4,    ///< the merged triangle has been tested against all others; it meets none, or waits for a split
     kCovered = 8,  ///< the fine triangle is near the merged mesh
-    kFar = 16,  ///< the proof of kCovered looked at a merged triangle that has none of its sets for a corner
-    kOpen = 32  ///< it waits for the proof of kCovered
+    kFar = 16,  ///< the proof of kCovered rests on a merged triangle, too, with no corner in the fine triangle's sets
+    kOpen = 32  ///< the fine triangle is in `open_`
   };
+  /// Takes fine triangles that lie over a merged triangle as proved to be near it, where they are.
   class Above;
 
   void run(bool geometry);
@@ -82,20 +89,20 @@ class MergeProof {
   void forget_covered(const std::vector<std::uint32_t>& changed);
   void forget_covered(std::uint32_t p, Proof which);
   std::uint8_t proofs_of(std::uint32_t t);
-  void prove(std::uint32_t t, Proof what);
+  void mark_proved(std::uint32_t t, Proof what);
 
   MergeForest& forest_;
   const FineMesh& fine_;
   const std::span<const float> tolerance_;
   RunContext& context_;
   std::vector<std::uint8_t> proofs_;    ///< of each fine triangle
-  std::vector<std::uint8_t> unproven_;  ///< sets to be split
+  std::vector<std::uint8_t> unproven_;  ///< by node of the forest: 1 for sets to be split
   std::vector<std::uint32_t> open_;     ///< fine triangles that are not proved to be covered
   std::vector<std::uint8_t> brought_back_;
-  double one_bound_ = 0;      ///< bound() of all fine triangles, or 0 if they differ
-  std::size_t known_ = 0;     ///< sets that the merged mesh was made with
+  double one_bound_ = 0;      ///< bound() of every fine triangle, or 0 where tolerances differ
+  std::size_t known_ = 0;     ///< how many nodes the forest had in the last call; later ones are new
   bool any_covered_ = false;  ///< whether anything has been proved to be covered
-  int splits_ = 0;
+  int splits_ = 0;            ///< rounds of splits in this call
   MergedMesh merged_;
   tbb::enumerable_thread_specific<TriangleOverlay> overlays_;
 };

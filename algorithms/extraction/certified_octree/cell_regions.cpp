@@ -201,7 +201,7 @@ std::array<BlockMask, 3> CellRegions::lone_edges(std::int32_t block) const {
 Vector3d CellRegions::normal(const Region& region) const {
   if (region.merged()) return cubes_[number(region)].normal.cast<double>();
   Vector3d sum = Vector3d::Zero();
-  const int signs = cells_.corner_signs(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints
+  const int signs = cells_.corner_code(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints
   for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
     const CellBlocks::Edge at = cells_.edge_of_cell(region.block, region.cell, std::countr_zero(edges));
     const auto n = cells_.grid().crossing(at.block, at.sample, at.axis).normal;

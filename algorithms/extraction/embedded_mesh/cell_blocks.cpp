@@ -69,7 +69,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
   // How faces are cut decides how many sheets a cell has, so it comes before points are numbered.
-  cut_ambiguous_faces(context);
+  draw_ambiguous_faces(context);
   // A first sheet's point has its cell's number within the block, which plain_points() relies on; the points of further
   // sheets come behind. Only special cells can have such.
   parallel_blocks(n, context, [&](std::size_t b) {
@@ -89,7 +89,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
 /// Cuts ambiguous faces first as the normals say, and then those that are pinched the other way. The second pass takes
 /// one face after the other, for what is done to one may help the next one of its cells; and one such pass is enough,
 /// for it parts sheets and joins none.
-void CellBlocks::cut_ambiguous_faces(RunContext& context) {
+void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   struct Face {
     std::int32_t block;
     int cell, face;
@@ -185,21 +185,9 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
 /// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any of the four
 /// corners of offset 0 along it.
 BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
-  static constexpr BlockMask kNone{};
-  BlockMask cells{};
-  if (cuts_.empty()) return cells;
-  const HermiteView::Block& block = source_[b];
-  for (int corner = 0; corner < 7; ++corner)
-    for (int axis = 0; axis < 3; ++axis) {
-      if ((corner >> axis) & 1) continue;
-      const BlockMask edges =
-          shifted_mask(corner & 1, (corner >> 1) & 1, corner >> 2, [&](int ax, int ay, int az) -> const BlockMask& {
-            const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
-            return there >= 0 ? cuts_[there][axis] : kNone;
-          });
-      for (int word = 0; word < 8; ++word) cells[word] |= edges[word];
-    }
-  return cells;
+  if (cuts_.empty()) return {};
+  return cells_with_edges(source_, static_cast<std::size_t>(b),
+                          [&](std::int32_t there) -> const auto& { return cuts_[static_cast<std::size_t>(there)]; });
 }
 
 /// Signs of the corners of every cell of a block, from the first corner's and the crossings on the way that are no

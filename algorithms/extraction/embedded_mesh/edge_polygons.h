@@ -104,7 +104,7 @@ class EdgePolygons {
   };
 
   bool is_explicit(const CellBlocks::Around& around, int i) const {
-    return cells_.is_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
+    return cells_.can_be_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
   }
   const BlockEdges& of(std::int32_t block) const { return edges_[static_cast<std::size_t>(block)]; }
   BlockEdges& of(std::int32_t block) { return edges_.at(static_cast<std::size_t>(block)); }

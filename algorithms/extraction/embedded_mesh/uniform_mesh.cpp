@@ -245,7 +245,7 @@ class Contourer {
 
   /// The place of a plain cell that the vector code has left over: its crossed edges follow from the signs.
   Vector3d place_plain(std::int32_t block, int cell) {
-    const int signs = cells_.corner_signs(cells_.cell_number(block, cell));
+    const int signs = cells_.corner_code(cells_.cell_number(block, cell));
     const Vector3d corner = cells_.corner(block, cell);
     Qef qef(corner + Vector3d::Constant(0.5));
     for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
@@ -381,7 +381,7 @@ class Contourer {
           const std::array<int, 3> offset = corner_offset(c);
           return Vector3d(corner + Vector3d(offset[0], offset[1], offset[2]));
         };
-        // Corners run counter-clockwise seen along the face's axis, so from the cell below to the one above.
+        // Corners run counter-clockwise for a viewer whom the face's axis points at.
         const double v = volume(at(corners[i]), at(corners[(i + 1) % 4]), point, beside[face]);
         if ((face & 1 ? v : -v) < kPositive) return false;
       }

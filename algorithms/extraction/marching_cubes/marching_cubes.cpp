@@ -9,6 +9,7 @@
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
 #include "algorithms/hermite/representation.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/crossing_edges.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
 
@@ -16,15 +17,10 @@ namespace hermesh {
 namespace {
 
 /// What one leaf adds to the mesh, and where in it.
-struct LeafOutput {
-  std::array<BlockMask, 3> edges{};
-  std::array<std::array<std::uint32_t, 8>, 3> rank{};  ///< points of this leaf before each word, by axis
-  std::uint32_t first_point = 0, first_triangle = 0;
+struct LeafOutput : CrossingEdges {
+  std::uint32_t first_point, first_triangle;
 
-  std::uint32_t point_on(int axis, int sample) const {
-    const std::uint64_t before = edges[axis][sample >> 6] & ((std::uint64_t{1} << (sample & 63)) - 1);
-    return first_point + rank[axis][sample >> 6] + static_cast<std::uint32_t>(std::popcount(before));
-  }
+  std::uint32_t point_on(int axis, int sample) const { return first_point + rank(axis, sample); }
 };
 
 /// The leaves, and cells and samples beyond them.
@@ -114,7 +110,7 @@ void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* he
   const SignLeaf* signs = hermite ? hermite->find({lower.x(), lower.y(), lower.z()}) : nullptr;
   const EdgeCrossing* crossing = signs ? hermite->crossings.data() + signs->first : nullptr;
   for (int axis = 0; axis < 3; ++axis)
-    for_each_bit(output.edges[axis], [&](int sample) {
+    for_each_bit(output.crossing[axis], [&](int sample) {
       const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
       const double from = leaves.signed_value(leaf, local[0], local[1], local[2]);
       const double to =
@@ -178,15 +174,9 @@ PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const Flo
     Stage stage(context, "count");
     parallel_blocks(leaves.size(), context, [&](std::size_t leaf) {
       LeafOutput& output = outputs[leaf];
-      output.edges = leaves.table().crossing_edges(leaf);
-      std::uint32_t before = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        for (int word = 0; word < 8; ++word) {
-          // Points are numbered by axis, in that by sample, as crossings are in Hermite data.
-          output.rank[axis][word] = before;
-          before += static_cast<std::uint32_t>(std::popcount(output.edges[axis][word]));
-        }
-      points[leaf] = before;
+      output.crossing = leaves.table().crossing_edges(leaf);
+      output.count_before();
+      points[leaf] = static_cast<std::uint64_t>(output.crossing_count());
       leaves.for_each_active_cell(
           leaf, [&](int, int, int, int pattern) { triangles[leaf] += kTriangulation[pattern].count; });
     });

@@ -21,7 +21,7 @@ struct MaskGrid {
   std::vector<std::uint64_t> first;   ///< first point of each block
 };
 
-/// The points of the four cells around an edge.
+/// The points of the four cells around a tagged edge, of which each has a block (EdgeSource::blocks()).
 struct PointsAround {
   Quad points;
   int step;       ///< by how many levels the coarsest and the finest of their regions differ
@@ -32,7 +32,6 @@ PointsAround points_of(const MaskGrid& mask, const std::array<LatticePlace, 4>& 
   PointsAround result;
   std::uint16_t n[4];
   for (int i = 0; i < 4; ++i) {
-    // A block that is not there has no cell of a crossing edge, and is not asked for.
     n[i] = mask.numbers[512 * static_cast<std::size_t>(cells[i].block) + static_cast<std::size_t>(cells[i].sample)];
     result.points[i] = static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(cells[i].block)]) + point_of(n[i]);
   }

@@ -42,23 +42,23 @@ void add_blocks_around(const Lower& lower, const std::array<BlockMask, 3>& tags,
 }  // namespace
 
 std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
-  // Also of blocks that own no crossing edge: none of their edges changes the sign, so all their samples have that of
-  // the sample before them.
+  // A block that is not there owns no crossing edge: none of its edges changes the sign, so all its samples have that of the
+  // sample before them.
   const HermiteView::Block& block = blocks()[number];
   std::array<SignLattice::Part, 8> parts;
   std::array<std::int32_t, 8> leaf;
   for (int part = 0; part < 8; ++part) {
     const std::int32_t there = block.neighbours[neighbour_slot(part >> 2, (part >> 1) & 1, part & 1)];
     leaf[part] = there >= 0 ? blocks()[there].leaf : -1;
-    if (leaf[part] >= 0) {
+    if (there >= 0) {
       parts[part].inside = &blocks()[there].inside;
-    } else if (part == 0) {
-      parts[part].uniform = hermite_.sign_without_leaf(block.lower);
-    } else {
-      // One step down from the part, along the lowest of its axes; that part has been looked at already.
-      const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
-      parts[part].uniform = leaf[before] >= 0 ? hermite_.leaves[leaf[before]].beyond[axis] & 1 : parts[before].uniform;
+      continue;
     }
+    // One step down from the part, along the lowest of its axes; that part has been looked at already, and part 0 is there.
+    const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
+    parts[part].uniform = leaf[before] >= 0      ? hermite_.leaves[leaf[before]].beyond[axis] & 1
+                          : parts[before].inside ? (*parts[before].inside)[0] & 1
+                                                 : parts[before].uniform;
   }
   return parts;
 }
@@ -105,12 +105,13 @@ PackedEdges::PackedEdges(ThesisDense hermite, RunContext& context) : hermite_(st
     voxels_[b] = found ? (*at)->buffer().data() : nullptr;
     if (!found) {
       // No sample of it owns a tagged edge, and all have one sign.
-      block.inside.fill(sign_without_block(block.lower) ? ~std::uint64_t{0} : 0);
+      block.inside = sign_without_block(block.lower) ? kAllInside : kAllOutside;
       return;
     }
     for (int sample = 0; sample < 512; ++sample)
       block.inside[sample >> 6] |= std::uint64_t{voxels_[b][sample].inside()} << (sample & 63);
     block.crossing = tagged_edges(voxels_[b]);
+    block.count_before();
   });
   find_neighbours(blocks_, context);
   count_edges(context);

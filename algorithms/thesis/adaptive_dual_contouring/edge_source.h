@@ -21,8 +21,8 @@ class EdgeSource {
   EdgeSource(const EdgeSource&) = delete;
   EdgeSource& operator=(const EdgeSource&) = delete;
 
-  /// Blocks in ascending order with their neighbours: one for each cell around a tagged edge, and for its owner. Of a
-  /// block its place, `crossing` (the tagged edges that it owns) and `neighbours` are set.
+  /// Blocks in ascending order with their neighbours: one for each cell around a tagged edge, and for its owner. All of
+  /// a block is set; `crossing` are the tagged edges that it owns, and a block without a leaf owns none.
   virtual const HermiteView::Blocks& blocks() const = 0;
   /// The signs of a block and of its upper neighbours, there or not: parts 4x + 2y + z.
   virtual std::array<SignLattice::Part, 8> signs(std::int32_t block) const = 0;

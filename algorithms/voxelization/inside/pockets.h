@@ -1,4 +1,4 @@
-// Voxels outside that no way along grid edges leads to, at the bottom of a crevice narrower than a voxel.
+// Voxels at the bottom of a crevice narrower than a voxel: they are outside, but no way along grid edges leads there.
 #pragma once
 
 #include "algorithms/voxelization/inside/regions.h"
@@ -6,12 +6,15 @@
 
 namespace hermesh {
 
-/// Joins regions of few voxels to the outside: where a straight way leads from one of their voxels to a voxel
-/// outside, at most six voxels off on each axis, without meeting a triangle, or to another such region that is
-/// joined; and, unless there are very many, where one along the crevice's walls does, from triangle to triangle. The
-/// latter only if the triangles around the region face it, for the inside of thin walls is many small regions, too.
-/// Large regions are left as they are: a hole narrower than a voxel must not empty a solid. The regions get other
-/// numbers only by becoming Regions::kOutside.
+/// Joins regions of at most 64 voxels to the outside. First come straight ways that meet no triangle, from one of a region's
+/// voxels to a voxel at most six off on each axis, which is outside or in a region already joined. Then come ways along the
+/// crevice's walls, from triangle to triangle, for one region after another until a fixed number of triangles has been
+/// looked at; regions after that stay closed. Walls are followed only if of the triangles next to the region's first voxel
+/// no more turn away than face it, for the inside of thin walls is many small regions, too. Large regions are left as they
+/// are, and so is a region whose walls lead to a large enclosed one first: a hole narrower than a voxel must not empty a
+/// solid. The components of a joined region get the number Regions::kOutside; all other numbers, and `regions.count`, stay.
+/// @param blocks those of `bins.blocks()`, by number
+/// @param regions find_regions() of the same blocks
 /// @throws Cancelled.
 void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
                   Regions& regions, const RunContext& context);

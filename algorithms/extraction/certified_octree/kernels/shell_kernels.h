@@ -45,8 +45,8 @@ struct Surface {
   std::uint16_t* certain;
 };
 
-/// What is looked at in a block of the lattice: its points and quads. Edges are eight words each, those of each layer at
-/// bit 8y+z by first sample. Quads are in the order of samples, those of one sample in that of axes.
+/// What is looked at in a block of the lattice: its points and quads. Masks of edges are eight words, one a layer x, with bit
+/// 8y+z for the edge's first sample. Quads are in the order of samples, those of one sample in that of axes.
 struct Block {
   const ActiveCells* cells;
   std::uint32_t first_later, later_points;             ///< cells' further points: all of them are looked at

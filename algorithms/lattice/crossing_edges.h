@@ -1,0 +1,36 @@
+// The crossing edges of a block and how they are numbered: as Hermite data keep their crossings, marching cubes its points.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "algorithms/lattice/block_mask.h"
+
+namespace hermesh {
+
+/// The crossing edges that a block owns, numbered by axis and then by first sample. (Without initializers, so that many can
+/// be made without writing them twice.)
+struct CrossingEdges {
+  std::array<BlockMask, 3> crossing;                   ///< samples whose up-wind edge is crossed, by axis
+  std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
+
+  /// Rank of a crossing edge among those of the block.
+  std::uint32_t rank(int axis, int sample) const {
+    const int word = sample >> 6;
+    return before[axis][word] +
+           static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+  }
+  int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
+  /// Fills in `before` from `crossing`.
+  void count_before() {
+    int sum = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      for (int word = 0; word < 8; ++word) {
+        before[axis][word] = static_cast<std::uint16_t>(sum);
+        sum += std::popcount(crossing[axis][word]);
+      }
+  }
+};
+
+}  // namespace hermesh
