@@ -44,11 +44,12 @@ check_odr() {
   # Two types of one name, which the linker must see before anything is made of its silence.
   local two
   two=$(mktemp -d)
-  trap 'rm -r "$two"' RETURN
-  echo 'struct S { int a; int f() const; }; int g(const S& s) { return s.a + s.f(); }' > "$two/a.cpp"
-  echo 'struct S { char a[9]; int f() const; }; int h(const S& s) { return s.a[0]; } int main() {}' > "$two/b.cpp"
-  "${CXX:-c++}" -O0 -flto=auto -Wodr -Wl,--unresolved-symbols=ignore-all "$two/a.cpp" "$two/b.cpp" -o "$two/both" 2>&1 |
-    grep -q Wodr || { echo "odr: this compiler does not tell of two types of one name"; exit 1; }
+  echo 'struct S { int a; int f() const { return a; } }; int g(const S& s) { return s.f(); }' > "$two/a.cpp"
+  echo 'struct S { char a[9]; int f() const { return a[0]; } }; int h(const S& s) { return s.f(); } int main() {}' > "$two/b.cpp"
+  "${CXX:-c++}" -O0 -flto=auto -Wodr "$two/a.cpp" "$two/b.cpp" -o "$two/both" 2> "$two/said"
+  grep -q Wodr "$two/said" || { echo "odr: this compiler does not tell of two types of one name"; exit 1; }
+  # The linker must speak anew: it would be silent where nothing has changed since it spoke last.
+  rm -rf "$two" build/odr/hermesh
   build build/odr -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O0 -flto=auto -Wodr" -DHERMESH_BUILD_PYTHON=OFF
   if grep -E 'Wodr|Wlto-type-mismatch|violates the C\+\+ One Definition Rule' build/odr.log; then exit 1; fi
   echo "odr: the program links without a word on definitions"
