@@ -91,7 +91,7 @@ class EndFinder {
   BlockMask active_of(std::size_t leaf, int dx, int dy, int dz) const {
     const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
     if (there >= 0) return table_.active(static_cast<std::size_t>(there));
-    return table_.tree().isValueOn(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)) ? kAll : kNone;
+    return table_.is_active_at(leaf, 8 * dx, 8 * dy, 8 * dz) ? kAll : kNone;
   }
 
   void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {
@@ -115,7 +115,8 @@ class EndFinder {
   }
 
   void add(std::size_t leaf, int sample, int axis, int side, std::vector<EndEdge>& found) const {
-    const Coord first = table_.lower(leaf).offsetBy(sample >> 6, (sample >> 3) & 7, sample & 7);
+    const auto [x, y, z] = table_.lower(leaf);
+    const Coord first(x + (sample >> 6), y + ((sample >> 3) & 7), z + (sample & 7));
     Coord second = first;
     ++second[axis];
     // An end above has its sample inside first, along the axis, and one below has it second.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <span>
 
@@ -112,6 +111,16 @@ BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block,
       for (int word = 0; word < 8; ++word) result[word] |= shifted[word];
     }
   return result;
+}
+
+/// Dual contouring's loop over the edges of a block, whatever is made of them: a quad, or a polygon between regions of cells.
+/// Calls f(axis, sample, cells) for each crossing edge, in the order of CrossingEdges::rank(); `cells` are the four around it,
+/// in the order of kAroundEdge.
+template <class F>
+void for_each_edge_with_cells(const HermiteView::Blocks& blocks, std::size_t block, F&& f) {
+  if (blocks[block].crossing_count() == 0) return;  // most blocks that exist for their cells alone
+  const CellsAroundEdges around[3] = {{blocks, block, 0}, {blocks, block, 1}, {blocks, block, 2}};
+  blocks[block].for_each([&](int axis, int sample) { f(axis, sample, around[axis](sample)); });
 }
 
 /// View of sparse data. `Read` turns a crossing of the data into an EdgeCrossing.

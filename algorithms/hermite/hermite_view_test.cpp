@@ -81,30 +81,29 @@ TEST_P(HermiteViewTest, ActiveCellsAreThoseWithAnEdgeThatIsCrossed) {
 
 TEST_P(HermiteViewTest, CellsAroundAnEdgeGoRoundItCounterClockwise) {
   std::size_t edges = 0;
-  for (std::size_t b = 0; b < blocks.size(); ++b)
-    for (int axis = 0; axis < 3; ++axis) {
-      const CellsAroundEdges around(blocks, b, axis);
-      for_each_bit(blocks[b].crossing[static_cast<std::size_t>(axis)], [&](int sample) {
-        ++edges;
-        const Index edge = index_of(blocks[b], sample);
-        ASSERT_TRUE(crossed(axis, edge));
-        const std::array<LatticePlace, 4> cells = around(sample);
-        // Below in both, then one step along u, one along v, and one back: counter-clockwise about the axis.
-        const int steps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
-        for (std::size_t i = 0; i < 4; ++i) {
-          Index wanted = edge;
-          wanted[static_cast<std::size_t>((axis + 1) % 3)] += steps[i][0];
-          wanted[static_cast<std::size_t>((axis + 2) % 3)] += steps[i][1];
-          ASSERT_GE(cells[i].block, 0);
-          EXPECT_EQ(index_of(blocks[static_cast<std::size_t>(cells[i].block)], cells[i].sample), wanted);
-          // The same place by locate().
-          const LatticePlace same = locate(blocks[b].neighbours, wanted[0] - blocks[b].lower[0],
-                                           wanted[1] - blocks[b].lower[1], wanted[2] - blocks[b].lower[2]);
-          EXPECT_EQ(same.block, cells[i].block);
-          EXPECT_EQ(same.sample, cells[i].sample);
-        }
-      });
-    }
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    std::uint32_t rank = 0;
+    for_each_edge_with_cells(blocks, b, [&](int axis, int sample, const std::array<LatticePlace, 4>& cells) {
+      ++edges;
+      EXPECT_EQ(blocks[b].rank(axis, sample), rank++);
+      const Index edge = index_of(blocks[b], sample);
+      ASSERT_TRUE(crossed(axis, edge));
+      // Below in both, then one step along u, one along v, and one back: counter-clockwise about the axis.
+      const int steps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
+      for (std::size_t i = 0; i < 4; ++i) {
+        Index wanted = edge;
+        wanted[static_cast<std::size_t>((axis + 1) % 3)] += steps[i][0];
+        wanted[static_cast<std::size_t>((axis + 2) % 3)] += steps[i][1];
+        ASSERT_GE(cells[i].block, 0);
+        EXPECT_EQ(index_of(blocks[static_cast<std::size_t>(cells[i].block)], cells[i].sample), wanted);
+        // The same place by locate().
+        const LatticePlace same = locate(blocks[b].neighbours, wanted[0] - blocks[b].lower[0],
+                                         wanted[1] - blocks[b].lower[1], wanted[2] - blocks[b].lower[2]);
+        EXPECT_EQ(same.block, cells[i].block);
+        EXPECT_EQ(same.sample, cells[i].sample);
+      }
+    });
+  }
   EXPECT_EQ(edges, hermite.crossings.size());
 }
 

@@ -1,6 +1,5 @@
 // Crossings of edges whose stencils reach beyond the data or single precision, one at a time: what vector code leaves
 // over.
-// Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -11,7 +10,6 @@
 #include <optional>
 
 #include "algorithms/lattice/leaf_table.h"
-#include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/crossing.h"
 
 namespace hermesh {
@@ -27,21 +25,9 @@ struct SampledVolume {
 /// and nothing else is asked. Where the band is narrower inside it has less there; at other isovalues the band may be
 /// wider on that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
 /// the active samples are data. Nothing is returned if tiles do not tell and the samples must be looked at.
-inline std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set) {
-  const openvdb::FloatGrid& grid = *level_set.grid().grid;
-  const float background = std::fabs(grid.background());
-  const SampledVolume all{leaves, false, background}, active{leaves, true, std::numeric_limits<float>::max()};
-  if (grid.getGridClass() != openvdb::GRID_LEVEL_SET || leaves.rule().isovalue != 0.0f || background == 0.0f) return active;
-  const std::optional<float> nearest = leaves.nearest_tile_inside();
-  if (!nearest) return std::nullopt;
-  return *nearest > -background ? active : all;
-}
-inline SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set) {
-  if (const auto volume = sampled_volume(static_cast<const LeafPlaces&>(table), level_set)) return *volume;
-  const float background = std::fabs(level_set.grid().grid->background());
-  if (table.has_inactive_inside_nearer_than(background)) return {table, true, std::numeric_limits<float>::max()};
-  return {table, false, background};
-}
+std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set);
+/// Which samples are data; where tiles do not tell, the samples of the leaves are looked at.
+SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set);
 
 /// The crossing of one edge: where a sample is no data, differences are taken to one side, or none.
 class IncompleteStencil {
@@ -73,8 +59,7 @@ class IncompleteStencil {
     const std::int32_t there = leaves_.neighbour(leaf_, p[0] >> 3, p[1] >> 3, p[2] >> 3);
     const int sample = sample_index(p[0] & 7, p[1] & 7, p[2] & 7);
     if (there < 0) {
-      const openvdb::Coord place = leaves_.lower(leaf_).offsetBy(p[0], p[1], p[2]);
-      return {leaves_.tree().getValue(place), leaves_.tree().isValueOn(place)};
+      return {leaves_.value_at(leaf_, p[0], p[1], p[2]), leaves_.is_active_at(leaf_, p[0], p[1], p[2])};
     }
     const float value = leaves_.values(there)[sample];
     const bool active = !volume_.masked || test(leaves_.active(static_cast<std::size_t>(there)), sample);

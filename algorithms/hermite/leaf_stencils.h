@@ -1,5 +1,4 @@
 // What the vector code for one leaf's crossings reads: samples of the leaf and its neighbours.
-// Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
 #include <algorithm>

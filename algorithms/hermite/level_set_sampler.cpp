@@ -13,7 +13,6 @@
 
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
-#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 #include "algorithms/hermite/leaf_stencils.h"
@@ -108,7 +107,7 @@ class Sampler {
     bool tiles_meet = false;
     tbb::task_group beside;
     beside.run([&] { tiles_meet = leaves_.tiles_of_both_signs_meet(context_); });
-    beside.run([&] { result.placement = placement_of(*level_set_.grid().grid); });
+    beside.run([&] { result.placement = placement_of(level_set_); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
       context_.check();
       sample_leaves(range.begin(), range.end());
@@ -117,7 +116,7 @@ class Sampler {
     beside.wait();
     if (not_finite_) throw_not_finite();
     if (incomplete_ || tiles_meet) return false;
-    result.outermost_inside = leaves_.rule()(leaves_.tree().background());
+    result.outermost_inside = leaves_.rule()(leaves_.background());
     copy(result);
     return true;
   }
@@ -164,8 +163,7 @@ class Sampler {
     for (std::size_t i = 0; i < batch.size; ++i) {
       const std::size_t leaf = batch.leaf[i];
       // Only leaves with crossings get a place, and stencils are gathered for no others.
-      const openvdb::Coord lower = leaves_.lower(leaf);
-      signs_[leaf].lower = {lower.x(), lower.y(), lower.z()};
+      signs_[leaf].lower = leaves_.lower(leaf);
       batch.stencils[i].emplace(volume_, leaf).fill(batch.inputs[i]);
       count += found_[leaf].count;
     }

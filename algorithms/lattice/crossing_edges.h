@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include "algorithms/lattice/block_mask.h"
@@ -20,6 +21,12 @@ struct CrossingEdges {
     const int word = sample >> 6;
     return before[axis][word] +
            static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+  }
+  /// Calls f(axis, sample) for each crossing edge, in the order of rank().
+  template <class F>
+  void for_each(F&& f) const {
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_bit(crossing[static_cast<std::size_t>(axis)], [&](int sample) { f(axis, sample); });
   }
   int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
   /// Fills in `before` from `crossing`.

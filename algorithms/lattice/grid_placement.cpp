@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/polygon_mesh.h"
 
 namespace hermesh {
@@ -93,7 +94,9 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   return result;
 }
 
-openvdb::math::Transform::Ptr transform_at(const Eigen::Vector3d& origin, double voxel_size) {
+IndexToWorld placement_of(const LevelSet& level_set) { return placement_of(*level_set.grid().grid); }
+
+std::shared_ptr<openvdb::math::Transform> transform_at(const Eigen::Vector3d& origin, double voxel_size) {
   const auto transform = openvdb::math::Transform::createLinearTransform(voxel_size);
   transform->postTranslate(openvdb::Vec3d(origin.x(), origin.y(), origin.z()));
   return transform;

@@ -1,7 +1,10 @@
-// Where the samples of an OpenVDB grid are. Heavy (OpenVDB): include it from .cpp files.
+// Where the samples of an OpenVDB grid are.
 #pragma once
 
-#include "algorithms/core/openvdb_trees.h"
+#include <memory>
+
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/openvdb_forward.h"
 #include "algorithms/lattice/placement.h"
 
 namespace hermesh {
@@ -14,8 +17,9 @@ openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
 /// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
 /// @throws Error for a grid with perspective.
 IndexToWorld placement_of(const openvdb::FloatGrid& grid);
+IndexToWorld placement_of(const LevelSet& level_set);
 
 /// The map of a grid of cubic voxels of `voxel_size` whose sample (0, 0, 0) is at `origin`, both in world units.
-openvdb::math::Transform::Ptr transform_at(const Eigen::Vector3d& origin, double voxel_size);
+std::shared_ptr<openvdb::math::Transform> transform_at(const Eigen::Vector3d& origin, double voxel_size);
 
 }  // namespace hermesh

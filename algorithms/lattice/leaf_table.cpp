@@ -80,6 +80,8 @@ void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::Coor
 
 constexpr std::int32_t uniform(bool inside) { return inside ? kUniformInside : kUniformOutside; }
 
+Coord coord_of(const std::array<std::int32_t, 3>& at) { return {at[0], at[1], at[2]}; }
+
 }  // namespace
 
 InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
@@ -147,6 +149,16 @@ LeafPlaces::LeafPlaces(const LevelSet& level_set, double isovalue, RunContext& c
   number_leaves(context, true);
 }
 
+float LeafPlaces::background() const { return tree_->background(); }
+float LeafPlaces::value_at(std::size_t leaf, int x, int y, int z) const {
+  return tree_->getValue(coord_of(lower(leaf)).offsetBy(x, y, z));
+}
+bool LeafPlaces::is_active_at(std::size_t leaf, int x, int y, int z) const {
+  return tree_->isValueOn(coord_of(lower(leaf)).offsetBy(x, y, z));
+}
+
+void LeafPlaces::find_values(std::size_t leaf) { values_[leaf + kUniforms] = leaves_[leaf]->buffer().data(); }
+
 void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
   std::vector<const TreeNode*> sources;
   tree_->getNodes(sources);
@@ -177,12 +189,13 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
   each_node([&](std::size_t i) {
     Node& node = nodes_[i];
     node.source = sources[i];
-    node.lower = node.source->origin();
+    const Coord lower = node.source->origin();
+    node.lower = {lower.x(), lower.y(), lower.z()};
     Accessor access(*tree_);
     for (int slot = 0; slot < 27; ++slot) {
       constexpr int kWidth = TreeNode::DIM;
       const Coord there =
-          node.lower.offsetBy(kWidth * (slot / 9 - 1), kWidth * (slot / 3 % 3 - 1), kWidth * (slot % 3 - 1));
+          lower.offsetBy(kWidth * (slot / 9 - 1), kWidth * (slot / 3 % 3 - 1), kWidth * (slot % 3 - 1));
       const auto found = index.find(there);
       node.neighbours[slot] = found != index.end() ? found->second : uniform(rule_(access.getValue(there)));
     }
@@ -350,7 +363,7 @@ BlockMask LeafPlaces::active(std::size_t leaf) const {
 std::vector<LeafPlaces::Slab> LeafPlaces::slabs() const {
   std::vector<Slab> result;
   const std::span<const std::uint32_t> nodes = nodes_in_order_;
-  const auto x_of = [&](std::size_t i) { return nodes_[nodes[i]].lower.x(); };
+  const auto x_of = [&](std::size_t i) { return nodes_[nodes[i]].lower[0]; };
   // Sorted by their coordinates, nodes of one x stand together; each such group makes 16 layers of leaves.
   for (std::size_t first = 0, end; first < nodes.size(); first = end) {
     for (end = first + 1; end < nodes.size() && x_of(end) == x_of(first); ++end) continue;
@@ -486,7 +499,7 @@ std::vector<Coord> LeafTable::missing_leaves(RunContext& context) const {
     for (int axis = 0; axis < 3; ++axis) {
       if (!differs_from_tile_below(i, inside_[i], axis)) continue;
       // The leaf below owns the edges that lead into this one.
-      Coord there = lower(i);
+      Coord there = coord_of(lower(i));
       there[axis] -= 8;
       missing.push_back(there);
     }
@@ -508,10 +521,16 @@ void LeafTable::throw_no_leaf(std::size_t leaf, int x, int y, int z) const {
   const auto at = [](int i, int j, int k) {
     return "(" + std::to_string(i) + ", " + std::to_string(j) + ", " + std::to_string(k) + ")";
   };
-  const Coord first = lower(leaf);
+  const auto [first_x, first_y, first_z] = lower(leaf);
   throw Error("an extractor looked up the sample " + at(x, y, z) + " of the leaf at " +
-              at(first.x(), first.y(), first.z()) +
+              at(first_x, first_y, first_z) +
               ", where the volume has no leaf; LeafPlaces::neighbour() tells what is outside or inside throughout");
+}
+
+LevelSet with_leaves(const LevelSet& level_set, std::span<const std::array<std::int32_t, 3>> lowers) {
+  const openvdb::FloatGrid::Ptr copy = level_set.grid().grid->deepCopy();
+  for (const auto& lower : lowers) copy->tree().touchLeaf(coord_of(lower));
+  return make_level_set(copy);
 }
 
 }  // namespace hermesh

@@ -46,7 +46,7 @@ TEST_F(LeafTableTest, NeighboursAndSignsAreTheTrees) {
   ASSERT_EQ(leaves.size(), sphere->tree().leafCount());
   std::size_t across_nodes = 0;
   for (std::size_t i = 0; i < leaves.size(); ++i) {
-    const Coord lower = leaves.lower(i);
+    const Coord lower(leaves.lower(i).data());
     for (int sample = 0; sample < 512; sample += 37) {
       const Coord at = lower.offsetBy(sample >> 6, (sample >> 3) & 7, sample & 7);
       ASSERT_EQ(test(leaves.inside(i), sample), sphere->tree().getValue(at) < 0.0f);
@@ -89,7 +89,7 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
     const std::size_t before = order.size();
     leaves.for_each_leaf(slab, [&](std::uint32_t leaf) { order.push_back(leaf); });
     for (std::size_t i = before; i < order.size(); ++i)
-      ASSERT_EQ(leaves.lower(order[i]).x(), leaves.lower(order[before]).x());
+      ASSERT_EQ(leaves.lower(order[i])[0], leaves.lower(order[before])[0]);
     std::vector<std::uint32_t> in_order(order.begin() + static_cast<std::ptrdiff_t>(before), order.end()), in_ranges;
     leaves.for_each_range(slab, [&](std::uint32_t first, std::uint32_t end) {
       for (std::uint32_t leaf = first; leaf < end; ++leaf) in_ranges.push_back(leaf);
@@ -162,7 +162,7 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
         leaf->setValueOn(i, std::nextafter(isovalue, float(int(random() % 3) - 1)) + float(int(random() % 3) - 1));
       const LeafTable leaves = table(grid, isovalue);
       std::size_t number = 0;  // tiles beside it may have become leaves
-      while (leaves.lower(number) != Coord(0)) ++number;
+      while (leaves.lower(number) != std::array<std::int32_t, 3>{}) ++number;
       for (int i = 0; i < 512; ++i) {
         const float value = leaf->getValue(static_cast<openvdb::Index>(i));
         ASSERT_EQ(test(leaves.inside(number), i), level_set ? value < isovalue : value > isovalue)

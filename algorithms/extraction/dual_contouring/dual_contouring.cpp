@@ -113,24 +113,21 @@ class Contourer {
     const HermiteView::Block& block = grid_.blocks()[b];
     const IndexToWorld& placement = grid_.placement();
     Quad* next = mesh.quads.data() + outputs_[b].first_quad;
-    for (int axis = 0; axis < 3; ++axis) {
-      const CellsAroundEdges around(grid_.blocks(), static_cast<std::size_t>(b), axis);
-      for_each_bit(block.crossing[axis], [&](int sample) {
-        const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
-        const std::array<LatticePlace, 4> cells = around(sample);
-        Quad quad;
-        // Around a crossing edge all cells are active, and the view has a block for each active cell.
-        for (int i = 0; i < 4; ++i) quad[i] = outputs_[cells[i].block].point_in(cells[i].sample);
-        Eigen::Vector3d hit;
-        for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
-        hit[axis] += grid_.crossing(b, sample, axis).offset;
-        // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there. Where the
-        // sample before the crossing is inside, the outside lies along the axis; a map that mirrors turns that about.
-        if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
-        if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
-        *next++ = quad;
-      });
-    }
+    const auto connect_edge = [&](int axis, int sample, const std::array<LatticePlace, 4>& cells) {
+      const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+      Quad quad;
+      // Around a crossing edge all cells are active, and the view has a block for each active cell.
+      for (int i = 0; i < 4; ++i) quad[i] = outputs_[cells[i].block].point_in(cells[i].sample);
+      Eigen::Vector3d hit;
+      for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
+      hit[axis] += grid_.crossing(b, sample, axis).offset;
+      // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there. Where the
+      // sample before the crossing is inside, the outside lies along the axis; a map that mirrors turns that about.
+      if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
+      if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
+      *next++ = quad;
+    };
+    for_each_edge_with_cells(grid_.blocks(), static_cast<std::size_t>(b), connect_edge);
   }
 
   /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.

@@ -13,7 +13,6 @@
 #include "algorithms/core/large_array.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
-#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
@@ -24,8 +23,7 @@ namespace {
 
 using leaf_kernels::LeafCells;
 using leaf_kernels::UpperSigns;
-using openvdb::Coord;
-
+using Position = std::array<std::int32_t, 3>;  // index coordinates
 
 /// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more than filling it.
 template <class T>
@@ -72,10 +70,10 @@ class LevelSetContourer {
 
   /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree lacks
   /// although they hold active cells.
-  std::vector<Coord> count() {
+  std::vector<Position> count() {
     const Stage stage(context_, "count");
     std::vector<std::uint64_t> points(table_.size()), quads(table_.size());
-    std::vector<Coord> missing;
+    std::vector<Position> missing;
     std::mutex lock;
     parallel_blocks(table_.size(), context_, [&](std::size_t leaf) {
       upper_[leaf] = table_.neighbours(leaf, 1);
@@ -88,7 +86,8 @@ class LevelSetContourer {
         if (!(needs >> slot & 1) || table_.neighbour(leaf, -dx, -dy, -dz) >= 0) continue;
         // The order of this list depends on the threads, but not the tree that has its leaves.
         const std::scoped_lock hold(lock);
-        missing.push_back(table_.lower(leaf).offsetBy(-8 * dx, -8 * dy, -8 * dz));
+        const auto [x, y, z] = table_.lower(leaf);
+        missing.push_back({x - 8 * dx, y - 8 * dy, z - 8 * dz});
       }
     });
     points_ = exclusive_scan(points, "points");
@@ -151,9 +150,8 @@ class LevelSetContourer {
 
   /// Where the leaf's first sample is in the mesh's coordinates.
   Eigen::Vector3d corner_of(std::size_t leaf) const {
-    const Coord lower = table_.lower(leaf);
-    return placement_.local(Eigen::Vector3d(lower.x() - placement_.base[0], lower.y() - placement_.base[1],
-                                            lower.z() - placement_.base[2]));
+    const auto [x, y, z] = table_.lower(leaf);
+    return placement_.local(Eigen::Vector3d(x - placement_.base[0], y - placement_.base[1], z - placement_.base[2]));
   }
 
   /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more than the
@@ -186,7 +184,7 @@ class LevelSetContourer {
       const int dx = slot & 1, dy = slot >> 1 & 1, dz = static_cast<int>(slot >> 2);
       const std::int32_t there = upper_[leaf][slot];
       // A tile is spread out as the samples of a leaf, so that the kernels need not tell the two apart.
-      if (there < 0) tiles[slot].fill(table_.tree().getValue(table_.lower(leaf).offsetBy(8 * dx, 8 * dy, 8 * dz)));
+      if (there < 0) tiles[slot].fill(table_.value_at(leaf, 8 * dx, 8 * dy, 8 * dz));
       input.values[neighbour_slot(dx, dy, dz)] =
           there >= 0 ? table_.values(there) : tiles[slot].data();
     }
@@ -254,13 +252,6 @@ class LevelSetContourer {
   std::uint64_t points_ = 0, quads_ = 0;
 };
 
-/// A copy of the grid with leaves there; their samples have the values that they had as tiles.
-LevelSet with_leaves(const LevelSet& level_set, const std::vector<Coord>& lowers) {
-  const openvdb::FloatGrid::Ptr copy = level_set.grid().grid->deepCopy();
-  for (const Coord& lower : lowers) copy->tree().touchLeaf(lower);
-  return make_level_set(copy);
-}
-
 }  // namespace
 
 bool can_contour_level_set(const DualContouringOptions& options) {
@@ -270,7 +261,7 @@ bool can_contour_level_set(const DualContouringOptions& options) {
 
 PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const DualContouringOptions& options,
                               RunContext& context) {
-  const IndexToWorld placement = placement_of(*level_set.grid().grid);
+  const IndexToWorld placement = placement_of(level_set);
   LevelSet volume = level_set;
   while (true) {
     const LeafTable table = [&] {
@@ -279,7 +270,7 @@ PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const 
     }();
     const SampledVolume sampled = sampled_volume(table, volume);
     LevelSetContourer contourer(table, sampled, placement, options, context);
-    const std::vector<Coord> missing = contourer.count();
+    const std::vector<Position> missing = contourer.count();
     if (missing.empty()) return contourer.extract();
     // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf brings no
     // crossing edge of its own, so one round is enough; the loop does not rely on it.

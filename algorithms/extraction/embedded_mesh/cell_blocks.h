@@ -38,9 +38,8 @@ class CellGrid {
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
   /// All crossings of a block, by axis and then by sample. `out` has room for as many, 1536 at most.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const {
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(blocks()[static_cast<std::size_t>(block)].crossing[static_cast<std::size_t>(axis)],
-                   [&](int sample) { *out++ = crossing(block, sample, axis); });
+    blocks()[static_cast<std::size_t>(block)].for_each(
+        [&](int axis, int sample) { *out++ = crossing(block, sample, axis); });
   }
   /// The crossing edges that are cuts, by block and axis; empty where the lattice has none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
@@ -222,8 +221,7 @@ class CellBlocks {
 
   template <class F>
   void for_each_crossing_edge(std::int32_t block, F&& f) const {
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(source_[block].crossing[axis], [&](int sample) { f(Edge{block, sample, axis}); });
+    source_[block].for_each([&](int axis, int sample) { f(Edge{block, sample, axis}); });
   }
 
  private:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
@@ -27,7 +26,7 @@ struct LeafOutput : CrossingEdges {
 class Leaves {
  public:
   Leaves(const LevelSet& level_set, double isovalue, RunContext& context)
-      : table_(level_set, isovalue, context), placement_(placement_of(*level_set.grid().grid)), isovalue_(isovalue) {}
+      : table_(level_set, isovalue, context), placement_(placement_of(level_set)), isovalue_(isovalue) {}
 
   std::size_t size() const { return table_.size(); }
   const IndexToWorld& placement() const { return placement_; }
@@ -51,7 +50,7 @@ class Leaves {
   double signed_value(std::size_t leaf, int x, int y, int z) const {
     const std::int32_t there = table_.neighbour(leaf, x >> 3, y >> 3, z >> 3);
     // An edge that ends in a tile is rare, so that a search through the tree is no matter.
-    const float value = there < 0 ? table_.tree().getValue(table_.lower(leaf).offsetBy(x, y, z))
+    const float value = there < 0 ? table_.value_at(leaf, x, y, z)
                                   : table_.values(there)[sample_index(x & 7, y & 7, z & 7)];
     return double(table_.rule().scale) * (double(value) - isovalue_);
   }
@@ -106,23 +105,22 @@ class Leaves {
 void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* hermite, const LeafOutput& output,
                   PolygonMesh& mesh) {
   const IndexToWorld& placement = leaves.placement();
-  const openvdb::Coord lower = leaves.table().lower(leaf);
-  const SignLeaf* signs = hermite ? hermite->find({lower.x(), lower.y(), lower.z()}) : nullptr;
+  const std::array<std::int32_t, 3> lower = leaves.table().lower(leaf);
+  const SignLeaf* signs = hermite ? hermite->find(lower) : nullptr;
   const EdgeCrossing* crossing = signs ? hermite->crossings.data() + signs->first : nullptr;
-  for (int axis = 0; axis < 3; ++axis)
-    for_each_bit(output.crossing[axis], [&](int sample) {
-      const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
-      const double from = leaves.signed_value(leaf, local[0], local[1], local[2]);
-      const double to =
-          leaves.signed_value(leaf, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
-      Eigen::Vector3d position;
-      for (int a = 0; a < 3; ++a) position[a] = lower[a] - placement.base[a] + local[a];
-      // Differences of signed values at both ends cannot be 0, for the signs differ. Held off
-      // the ends, no two points meet.
-      const double offset = crossing ? double((crossing++)->offset) : from / (from - to);
-      position[axis] += std::clamp(offset, kCrossingMargin, 1.0 - kCrossingMargin);
-      mesh.points[output.point_on(axis, sample)] = placement.local(position).cast<float>();
-    });
+  output.for_each([&](int axis, int sample) {
+    const int local[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+    const double from = leaves.signed_value(leaf, local[0], local[1], local[2]);
+    const double to =
+        leaves.signed_value(leaf, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
+    Eigen::Vector3d position;
+    for (int a = 0; a < 3; ++a) position[a] = lower[a] - placement.base[a] + local[a];
+    // Differences of signed values at both ends cannot be 0, for the signs differ. Held off
+    // the ends, no two points meet.
+    const double offset = crossing ? double((crossing++)->offset) : from / (from - to);
+    position[axis] += std::clamp(offset, kCrossingMargin, 1.0 - kCrossingMargin);
+    mesh.points[output.point_on(axis, sample)] = placement.local(position).cast<float>();
+  });
 }
 
 void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<LeafOutput>& outputs,

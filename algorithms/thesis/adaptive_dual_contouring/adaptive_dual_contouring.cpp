@@ -148,23 +148,19 @@ class Contourer {
   void for_each_polygon(std::size_t b, F&& f) const {
     const HermiteView::Block& block = edges_.blocks()[b];
     const bool mirrors = placement_.mirrors();
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!any(block.crossing[axis])) continue;
-      const CellsAroundEdges around(edges_.blocks(), b, axis);
-      for_each_bit(block.crossing[axis], [&](int sample) {
-        auto [polygon, step, complete] = points_of(mask_, around(sample));
-        if (!complete) return;
-        int corners = 0;
-        // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
-        // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
-        for (int i = 0; i < 4; ++i)
-          if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
-        if (corners < 3) return;
-        // The sign at the edge's first sample orients the polygon; a placement that mirrors turns all of them about.
-        if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
-        f(polygon, corners, step);
-      });
-    }
+    for_each_edge_with_cells(edges_.blocks(), b, [&](int, int sample, const std::array<LatticePlace, 4>& cells) {
+      auto [polygon, step, complete] = points_of(mask_, cells);
+      if (!complete) return;
+      int corners = 0;
+      // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
+      // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
+      for (int i = 0; i < 4; ++i)
+        if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
+      if (corners < 3) return;
+      // The sign at the edge's first sample orients the polygon; a placement that mirrors turns all of them about.
+      if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
+      f(polygon, corners, step);
+    });
   }
 
   template <class F>
