@@ -30,6 +30,8 @@ constexpr double kUniform = 0.6, kUsed = 0.97, kUnseen = 1.1;
 constexpr double kFirstVoxel = 1.5, kSmallestVoxel = 0.125;
 /// Voxels along the longest side at least, so that there is something to collapse.
 constexpr double kFewestVoxels = 16.0;
+/// Voxels of the next try where points did not tell what is too far, in those of this one.
+constexpr double kFinerBetween = 0.6;
 /// A tolerance that was lowered below this many voxels is of no more use.
 constexpr double kLeastTolerance = 0.02;
 /// Memory that a point of the uniform mesh takes until it is written, bytes.
@@ -40,6 +42,8 @@ constexpr float kLowering = 0.4f;
 /// Voxels that a wall has to be thick so that a mesh may show it, and the voxel that is tried for a
 /// thickness.
 constexpr double kThinVoxels = 2.0, kVoxelOfThickness = 0.9;
+/// Cosine of the angle between neighbours' normals below which they are two sides of a fin.
+constexpr double kFolded = -0.5;
 /// Places at most that are asked how thick the surface is there.
 constexpr std::size_t kMostAsked = 2000;
 /// Radius of the pieces of polygons that are asked whether they bound something, in errors.
@@ -146,16 +150,22 @@ class BoundedRemesher {
     const Attempt& now = *made;
     result_.hole_area = now.surface.cap_area;
     result_.left_out_area = std::max(0.0, area_ - now.surface.area);
-    const SurfaceDistance surface(now.surface.points, now.surface.triangles);
+    const SurfaceDistance surface(now.surface.points, now.surface.triangles),
+        uniform(now.file_points, now.fine.triangles());
     std::vector<double> apart;  // by point of the uniform mesh, about how far the surfaces are apart there
-    const std::vector<Far> far = look(now, surface, apart);
-    if (!far.empty()) {
+    if (const std::vector<Far> far = look(now, surface, uniform, apart); !far.empty()) {
       double worst = 0.0;
       for (const Far& f : far) worst = std::max(worst, f.distance);
       if (explained(now, far)) return false;
       return smaller(voxel_size, now.surface, std::clamp(kUniform * options_.error / worst, 0.35, 0.7), far);
     }
-    return collapse(now, surface, apart);
+    // Points tell nearly, and at once. Where the uniform mesh itself is too far between them, no tolerance helps, and
+    // collapses and their proof, which take most of the time, would be for nothing.
+    if (const std::vector<Far> far = far_between_points(now, surface, uniform); !far.empty()) {
+      if (explained(now, far)) return false;
+      return smaller(voxel_size, now.surface, kFinerBetween, far);
+    }
+    return collapse(now, surface, uniform, apart);
   }
 
   /// Voxels and their uniform mesh; none if that is empty.
@@ -192,7 +202,8 @@ class BoundedRemesher {
 
   /// How far the surfaces are apart at the points of both, and where that is more than the collapses can do
   /// with.
-  std::vector<Far> look(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
+  std::vector<Far> look(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
+                        std::vector<double>& apart) {
     const Stage stage(context_, "compare");
     const double most = 4.0 * options_.error;
     const std::size_t n = now.file_points.size();
@@ -208,7 +219,6 @@ class BoundedRemesher {
       if (apart[i] > limit) far.push_back({at[i], apart[i], false, now.fine.around(std::uint32_t(i))[0]});
 
     // The other way, each place of the surface counts at the corners of the uniform triangle that is nearest.
-    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
     std::vector<std::uint8_t> used(now.surface.points.size(), 0);
     std::vector<std::uint32_t> one(used.size(), 0);
     for (std::uint32_t t = 0; t < now.surface.triangles.size(); ++t)
@@ -216,7 +226,7 @@ class BoundedRemesher {
     std::vector<NearestTriangle> nearest(used.size(), NearestTriangle{0.0, TriangleTree::kNone});
     parallel_blocks(used.size(), context_, [&](std::size_t i) {
       if (used[i])
-        nearest[i] = uniform.nearest(now.surface.points[i].cast<double>() - now.offset, most * most);
+        nearest[i] = uniform.tree().nearest(now.surface.points[i].cast<double>() - now.offset, most * most);
     });
     std::vector<double> own = apart;
     for (std::size_t i = 0; i < used.size(); ++i) {
@@ -240,8 +250,22 @@ class BoundedRemesher {
     return far;
   }
 
+  /// Where triangles of the uniform mesh are farther from the surface than the error, or those of the surface from it.
+  std::vector<Far> far_between_points(const Attempt& now, const SurfaceDistance& surface,
+                                      const SurfaceDistance& uniform) const {
+    const Stage stage(context_, "compare between points");
+    std::vector<Far> far;
+    for (const FarTriangle& f : surface.hold(now.file_points, now.offset, now.fine.triangles(), options_.error, context_).far)
+      far.push_back({f.place + now.offset, f.distance, false, f.triangle});
+    for (const FarTriangle& f :
+         uniform.hold(now.surface.points, -now.offset, now.surface.triangles, options_.error, context_, free_pieces()).far)
+      far.push_back({f.place, f.distance, true, f.triangle});
+    return far;
+  }
+
   /// Collapses with what is left of the error, and the proof.
-  bool collapse(const Attempt& now, const SurfaceDistance& surface, const std::vector<double>& apart) {
+  bool collapse(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
+                const std::vector<double>& apart) {
     // A place of the mesh is then within the error by the triangle inequality, as far as `apart` is right.
     std::vector<float> tolerance(apart.size());
     for (std::size_t i = 0; i < apart.size(); ++i)
@@ -258,10 +282,10 @@ class BoundedRemesher {
         mesh.triangles = coarse.triangles;
         return true;
       }
-      if (uniform_is_far(now, surface, far) || !lower_around(now, far, tolerance)) break;
+      if (!lower_around(now, uniform.tree(), far, tolerance)) break;
     }
     if (explained(now, far)) return false;
-    return smaller(now.voxel_size, now.surface, 0.6, far);
+    return smaller(now.voxel_size, now.surface, kFinerBetween, far);
   }
 
   /// What of the polygons need not be near: pieces that bound nothing.
@@ -329,33 +353,9 @@ class BoundedRemesher {
     }
   }
 
-  /// Whether the uniform mesh itself is too far at one of these places, so that no tolerance helps.
-  bool uniform_is_far(const Attempt& now, const SurfaceDistance& surface, const std::vector<Far>& far) const {
-    // Of the uniform mesh those triangles are asked that the failing ones stand for, or are near to.
-    std::vector<Triangle> of_surface, of_uniform;
-    std::vector<std::uint8_t> taken(now.fine.triangles().size(), 0);
-    const SurfaceDistance to_uniform(now.file_points, now.fine.triangles());
-    for (const Far& f : far) {
-      if (f.of_surface) {
-        of_surface.push_back(now.surface.triangles[f.triangle]);
-        continue;
-      }
-      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(now.voxel_size);
-      to_uniform.tree().for_each_near(f.place - now.offset - reach, f.place - now.offset + reach,
-                                      [&](std::uint32_t t) {
-                                        if (!std::exchange(taken[t], 1))
-                                          of_uniform.push_back(now.fine.triangles()[t]);
-                                      });
-    }
-    return !surface.hold(now.file_points, now.offset, of_uniform, options_.error, context_).far.empty() ||
-           !to_uniform
-                .hold(now.surface.points, -now.offset, of_surface, options_.error, context_, free_pieces())
-                .far.empty();
-  }
-
   /// Lowers the tolerance around the places. False if it is next to nothing at one of them already.
-  bool lower_around(const Attempt& now, const std::vector<Far>& far, std::vector<float>& tolerance) {
-    const TriangleTree uniform(now.file_points, now.fine.triangles(), 1.0);
+  bool lower_around(const Attempt& now, const TriangleTree& uniform, const std::vector<Far>& far,
+                    std::vector<float>& tolerance) {
     std::vector<std::uint8_t> lowered(tolerance.size(), 0);
     bool useful = true;
     for (const Far& f : far) {
@@ -488,9 +488,10 @@ class BoundedRemesher {
     const TriangleTree& tree = surface.tree();
     tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {
       const Eigen::Vector3d a = tree.corner(other, 0), b = tree.corner(other, 1), c = tree.corner(other, 2);
-      // Neighbours are no opposite wall.
+      // Neighbours are no opposite wall, but for the other side of a fin, which is folded over along an edge.
+      const bool folded = (b - a).cross(c - a).normalized().dot(normal) < kFolded;
       for (const Eigen::Vector3d& p : corner)
-        if (p == a || p == b || p == c) return;
+        if ((p == a || p == b || p == c) && !folded) return;
       // The line along the normal in barycentric coordinates of the triangle (Möller & Trumbore 1997).
       const Eigen::Vector3d across = normal.cross(c - a);
       const double slope = (b - a).dot(across);

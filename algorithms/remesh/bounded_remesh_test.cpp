@@ -137,6 +137,39 @@ TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
   EXPECT_LE(made.voxel_size, 0.02);
 }
 
+TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
+  // A box with a fin over a diagonal of its lid, 2e-4 thick at the middle of its foot, nothing at its ends and its tip. (In a
+  // cube the diagonal would run through samples.)
+  const double width = 0.83;
+  PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, width, 1));
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    return std::all_of(t.begin(), t.end(), [&](std::uint32_t p) { return mesh.world(p).z() == 1.0; });
+  });
+  const auto add = [&](const Vector3d& p) {
+    mesh.points.push_back((p - mesh.origin).cast<float>());
+    return std::uint32_t(mesh.points.size() - 1);
+  };
+  const auto corner = [&](double x, double y) {
+    std::uint32_t p = 0;
+    while ((mesh.world(p) - Vector3d(x, y, 1)).norm() > 1e-6) ++p;
+    return p;
+  };
+  const std::uint32_t a = corner(0, 0), b = corner(1, 0), c = corner(1, width), d = corner(0, width);
+  const Vector3d middle(0.5, 0.5 * width, 1), across = 1e-4 * Vector3d(width, -1, 0).normalized();
+  const std::uint32_t foot = add(middle + across), other_foot = add(middle - across),
+                      tip = add(middle + Vector3d(0, 0, 0.5));
+  for (const Triangle& t : {Triangle{a, b, foot}, {b, c, foot}, {c, d, other_foot}, {d, a, other_foot},
+                            {a, foot, tip}, {foot, c, tip}, {c, other_foot, tip}, {other_foot, a, tip}})
+    mesh.triangles.push_back(t);
+  const BoundedMesh refused = remesh(mesh, {.error = 0.05});
+  ASSERT_FALSE(refused.unmet.empty());
+  EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
+  EXPECT_GT(refused.unmet.front().place.z(), 1.0);
+  // At the middles of the sides a third of the foot's.
+  EXPECT_NEAR(refused.thickness, 2e-4 / 3.0, 1e-5);
+  EXPECT_EQ(refused.rounds, 0);
+}
+
 TEST(BoundedRemesh, ABudgetIsKept) {
   const PolygonMesh polygons = sphere(Vector3d(0, 0, 0), 1.0, 24);
   RunContext context;
