@@ -66,6 +66,21 @@ TEST(Voxelize, ManySmallTrianglesAreExact) {
   }
 }
 
+TEST(Voxelize, SamplesBeyondTheBandHaveItsWidth) {
+  // Not nearly: OpenVDB's tools, and stencils, tell what is no data by comparing it with the background.
+  std::mt19937 random(20110411);
+  std::uniform_real_distribution<double> size(1e-3, 1.0);
+  for (int i = 0; i < 40; ++i) {
+    const double h = size(random), exterior = i % 2 ? 3.0 : 2.0;
+    const Voxelization v = run(sphere({0, 0, 0}, 9.3 * h, 8),
+                               {.voxel_size = h, .exterior_band = exterior, .interior_band = 3.0});
+    const float outside = v.distance->background(), inside = -float(3.0 * h);
+    ASSERT_EQ(outside, float(exterior * h));
+    for (auto value = v.distance->tree().cbeginValueOff(); value; ++value)
+      ASSERT_TRUE(*value == outside || *value == inside) << h << ": " << *value;
+  }
+}
+
 TEST(Voxelize, BandsOfDifferentWidths) {
   const Voxelization v =
       run(sphere({0, 0, 0}, 20.0, 48), {.voxel_size = 1.0, .exterior_band = 1.5, .interior_band = 6.0});

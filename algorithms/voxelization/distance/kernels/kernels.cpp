@@ -457,9 +457,11 @@ void apply_signs(const std::uint64_t* inside, float exterior, float interior, fl
       float* at = values + 64 * x + part;
       const Floats16 limit = choose(negative, sixteen(interior), sixteen(exterior));
       const Floats16 distance = sixteen(at);
-      below |= std::uint64_t(less(distance, limit)) << part;
+      const unsigned in_band = less(distance, limit) & (active[x] >> part) & 0xffffu;
+      below |= std::uint64_t(in_band) << part;
+      // What no triangle reached has the width itself, as tiles have it: the search left there what may be less by rounding.
+      const Floats16 value = choose(in_band, distance, limit);
       // Inside is negative even where the distance is 0, so that the sample keeps its side.
-      const Floats16 value = smaller(distance, limit);
       store(at, choose(negative, sixteen(0.0f) - larger(value, sixteen(least)), value));
     }
     active[x] &= below;
