@@ -255,11 +255,11 @@ class BoundedRemesher {
                                       const SurfaceDistance& uniform) const {
     const Stage stage(context_, "compare between points");
     std::vector<Far> far;
-    for (const FarTriangle& f : surface.hold(now.file_points, now.offset, now.fine.triangles(), options_.error, context_).far)
+    const double error = options_.error;
+    for (const FarTriangle& f : surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_).far)
       far.push_back({f.place + now.offset, f.distance, false, f.triangle});
-    for (const FarTriangle& f :
-         uniform.hold(now.surface.points, -now.offset, now.surface.triangles, options_.error, context_, free_pieces()).far)
-      far.push_back({f.place, f.distance, true, f.triangle});
+    const auto from = uniform.hold(now.surface.points, -now.offset, now.surface.triangles, error, context_, free_pieces());
+    for (const FarTriangle& f : from.far) far.push_back({f.place, f.distance, true, f.triangle});
     return far;
   }
 

@@ -10,10 +10,11 @@
 // what counts as free so is told.
 //
 // **The way.** Voxels are made smaller until the uniform mesh is within most of the error both ways, as far
-// as points of both tell, and within the error between these, triangle by triangle. What is left of the error
-// at each place, and a little less, is the tolerance of the collapses there (certified_collapse/). The outcome is held against the surface, both ways, triangle by
-// triangle (search/surface_distance.h): that, and nothing before it, is the proof. Around places where it
-// fails the tolerance is halved, or else the voxels are made smaller.
+// as points of both tell, and within the error between these, triangle by triangle
+// (search/surface_distance.h). What is left of the error at each place, and a little less, is the tolerance
+// of the collapses there (certified_collapse/). The outcome is held against the surface in the same way:
+// that, and nothing before it, is the proof. Around places where it fails the tolerance is lowered, or else
+// the voxels are made smaller.
 #pragma once
 
 #include <Eigen/Core>

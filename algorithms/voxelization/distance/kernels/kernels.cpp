@@ -459,12 +459,12 @@ void apply_signs(const std::uint64_t* inside, float exterior, float interior, fl
       const Floats16 distance = sixteen(at);
       const unsigned in_band = less(distance, limit) & (active[x] >> part) & 0xffffu;
       below |= std::uint64_t(in_band) << part;
-      // What no triangle reached has the width itself, as tiles have it: the search left there what may be less by rounding.
+      // What no triangle reached has the width itself, as tiles have it: the search may have left less, by rounding.
       const Floats16 value = choose(in_band, distance, limit);
       // Inside is negative even where the distance is 0, so that the sample keeps its side.
       store(at, choose(negative, sixteen(0.0f) - larger(value, sixteen(least)), value));
     }
-    active[x] &= below;
+    active[x] = below;
   }
 }
 
