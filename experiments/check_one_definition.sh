@@ -12,7 +12,8 @@ jobs=${JOBS:-$(nproc)}
 build() {  # folder, then options of CMake
   local folder=$1
   shift
-  cmake -S . -B "$folder" -G Ninja -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF "$@" > "$folder.log"
+  cmake -S . -B "$folder" -G Ninja -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF \
+    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 "$@" > "$folder.log"
   cmake --build "$folder" --target hermesh -j "$jobs" >> "$folder.log" 2>&1 || { tail -40 "$folder.log"; exit 1; }
 }
 

@@ -21,7 +21,7 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 using BlockOrigin = std::array<int, 3>;
 
 /// Depth, in voxels, that a voxel inside gets if it lies on the surface, so that its value has a sign.
-constexpr double kLeastDepth = 0x1p-24;
+constexpr double kLeastInnerDepth = 0x1p-24;
 constexpr int kBlock = 8, kBlockSamples = kBlock * kBlock * kBlock;
 
 TrianglePart edge(int i) { return static_cast<TrianglePart>(static_cast<int>(TrianglePart::kEdge0) + i); }
@@ -104,7 +104,7 @@ struct Machinery {
       const Vector3d p(origin[0] + (i >> 6), origin[1] + (i >> 3 & 7), origin[2] + (i & 7));
       const auto [away, inside] = side(p);
       const double limit = inside ? interior : exterior, distance = away.norm();
-      const double value = std::clamp(distance, inside ? kLeastDepth : 0.0, limit) * voxel_size;
+      const double value = std::clamp(distance, inside ? kLeastInnerDepth : 0.0, limit) * voxel_size;
       const auto offset = static_cast<openvdb::Index>(i);
       result->setValueOnly(offset, static_cast<float>(inside ? -value : value));
       result->setActiveState(offset, distance < limit);

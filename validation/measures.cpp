@@ -13,7 +13,7 @@
 namespace hermesh::validation {
 namespace {
 
-struct Sums {
+struct MeasureSums {
   double volume = 0.0, area = 0.0;
   double smallest_angle = 180.0, worst_aspect = 0.0;
   std::int64_t degenerate = 0;
@@ -44,7 +44,7 @@ struct Sums {
     worst_aspect = std::max(worst_aspect, side[2] * perimeter / (2.0 * std::numbers::sqrt3 * twice_area));
   }
 
-  void append(const Sums& later) {
+  void append(const MeasureSums& later) {
     volume += later.volume;
     area += later.area;
     smallest_angle = std::min(smallest_angle, later.smallest_angle);
@@ -62,7 +62,7 @@ void measure_triangles(const MeshFile& mesh, const TriangleSoup& soup, MeshRepor
   const Eigen::Vector3d centre = box.centre();
   // A range never parts the two halves of a quad: ranges are of polygons.
   const std::size_t undivided = soup.undivided;
-  const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, Sums sums) {
+  const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, MeasureSums sums) {
     context.check();
     for (std::size_t p = range.begin(); p < range.end(); ++p) {
       const std::size_t first = p < undivided ? p : undivided + 2 * (p - undivided);
@@ -71,12 +71,12 @@ void measure_triangles(const MeshFile& mesh, const TriangleSoup& soup, MeshRepor
     }
     return sums;
   };
-  const auto join = [](Sums left, const Sums& right) {
+  const auto join = [](MeasureSums left, const MeasureSums& right) {
     left.append(right);
     return left;
   };
   const tbb::blocked_range<std::size_t> all(0, undivided + mesh.quads.size(), 4096);
-  const Sums sums = tbb::parallel_deterministic_reduce(all, Sums{}, add_range, join);
+  const MeasureSums sums = tbb::parallel_deterministic_reduce(all, MeasureSums{}, add_range, join);
   report.volume = sums.volume;
   report.area = sums.area;
   report.smallest_angle = undivided + mesh.quads.size() > 0 ? sums.smallest_angle : 0.0;

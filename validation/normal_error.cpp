@@ -13,7 +13,7 @@
 namespace hermesh::validation {
 namespace {
 
-struct Sums {
+struct NormalSums {
   double first = 0.0, second = 0.0, max = 0.0;
   std::int64_t samples = 0;
 
@@ -23,7 +23,7 @@ struct Sums {
     max = std::max(max, angle);
     ++samples;
   }
-  void append(const Sums& later) {
+  void append(const NormalSums& later) {
     first += later.first;
     second += later.second;
     max = std::max(max, later.max);
@@ -38,7 +38,7 @@ Eigen::Vector3d normal_of(const Corners& c) { return (c[1] - c[0]).cross(c[2] - 
 NormalAngles sampled_normal_angles(const TriangleSoup& from, const TriangleTree& to, std::int64_t samples,
                                    RunContext& context) {
   const SurfaceSamples surface(from, samples);
-  const auto add_range = [&](const tbb::blocked_range<std::int64_t>& range, Sums sums) {
+  const auto add_range = [&](const tbb::blocked_range<std::int64_t>& range, NormalSums sums) {
     context.check();
     std::uint32_t guess = 0;
     for (std::int64_t i = range.begin(); i < range.end(); ++i) {
@@ -51,12 +51,12 @@ NormalAngles sampled_normal_angles(const TriangleSoup& from, const TriangleTree&
     }
     return sums;
   };
-  const auto join = [](Sums left, const Sums& right) {
+  const auto join = [](NormalSums left, const NormalSums& right) {
     left.append(right);
     return left;
   };
-  const Sums sums = tbb::parallel_deterministic_reduce(
-      tbb::blocked_range<std::int64_t>(0, surface.size(), 512), Sums{}, add_range, join);
+  const NormalSums sums = tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<std::int64_t>(0, surface.size(), 512), NormalSums{}, add_range, join);
   NormalAngles result;
   result.samples = sums.samples;
   if (sums.samples == 0) return result;

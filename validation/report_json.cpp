@@ -7,14 +7,14 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json vector(const Eigen::Vector3d& v) { return Json::array({number(v.x()), number(v.y()), number(v.z())}); }
+Json vector(const Eigen::Vector3d& v) { return Json::array({finite_or_null(v.x()), finite_or_null(v.y()), finite_or_null(v.z())}); }
 
 Json distances(const Distances& d) {
-  return {{"max", number(d.max)},
-          {"mean", number(d.mean)},
-          {"rms", number(d.rms)},
+  return {{"max", finite_or_null(d.max)},
+          {"mean", finite_or_null(d.mean)},
+          {"rms", finite_or_null(d.rms)},
           {"worst", vector(d.worst)},
           {"samples", d.samples}};
 }
@@ -53,8 +53,8 @@ Json library(const LibraryCounts& l) {
   json["boundary_edges"] = l.boundary_edges;
   json["components"] = l.components;
   json["euler_characteristic"] = l.euler_characteristic;
-  json["volume"] = number(l.volume);
-  json["area"] = number(l.area);
+  json["volume"] = finite_or_null(l.volume);
+  json["area"] = finite_or_null(l.area);
   return json;
 }
 
@@ -62,15 +62,15 @@ Json features(const FeatureDistances& f) {
   return {{"edges", f.edges},
           {"corners", f.corners},
           {"edges_excluded", f.edges_excluded},
-          {"edge_length", number(f.edge_length)},
+          {"edge_length", finite_or_null(f.edge_length)},
           {"edge_to_mesh", distances(f.edge_to_mesh)},
           {"corner_to_mesh", distances(f.corner_to_mesh)}};
 }
 
-Json bound(const HausdorffBound& b) { return {{"lower", number(b.lower)}, {"upper", number(b.upper)}}; }
+Json bound(const HausdorffBound& b) { return {{"lower", finite_or_null(b.lower)}, {"upper", finite_or_null(b.upper)}}; }
 
 Json estimate(const Estimate& e) {
-  return {{"value", number(e.value)}, {"lower", number(e.lower)}, {"upper", number(e.upper)}};
+  return {{"value", finite_or_null(e.value)}, {"lower", finite_or_null(e.lower)}, {"upper", finite_or_null(e.upper)}};
 }
 
 Json counts(const MeshReport& r) {
@@ -92,10 +92,10 @@ Json counts(const MeshReport& r) {
   else if (r.genus)
     json["genus"] = *r.genus;
   json["self_intersecting_pairs"] = r.self_intersections ? Json(r.self_intersections->pairs) : Json(nullptr);
-  json["volume"] = number(r.volume);
-  json["area"] = number(r.area);
-  json["smallest_angle"] = number(r.smallest_angle);
-  json["worst_aspect"] = number(r.worst_aspect);
+  json["volume"] = finite_or_null(r.volume);
+  json["area"] = finite_or_null(r.area);
+  json["smallest_angle"] = finite_or_null(r.smallest_angle);
+  json["worst_aspect"] = finite_or_null(r.worst_aspect);
   return json;
 }
 
@@ -109,20 +109,20 @@ nlohmann::json to_json(const SolidComparison& s) {
   return {{"verdict", verdict_word(s)},
           {"symmetric_difference", estimate(s.difference)},
           {"difference_percent", s.reference_volume.value > 0.0
-                                     ? number(100.0 * s.difference.value / s.reference_volume.value)
+                                     ? finite_or_null(100.0 * s.difference.value / s.reference_volume.value)
                                      : Json(nullptr)},
           {"unexplained", estimate(s.unexplained)},
           {"unknown_volume", estimate(s.unknown_volume)},
           {"mesh_volume", estimate(s.mesh_volume)},
           {"reference_volume", estimate(s.reference_volume)},
-          {"mesh_area", number(s.mesh_area)},
-          {"reference_area", number(s.reference_area)},
-          {"possible_area", number(s.possible_area)},
+          {"mesh_area", finite_or_null(s.mesh_area)},
+          {"reference_area", finite_or_null(s.reference_area)},
+          {"possible_area", finite_or_null(s.possible_area)},
           {"mesh_components", s.mesh_components},
           {"reference_components", s.reference_components},
           {"false_area", estimate(s.false_area)},
           {"lost_area", estimate(s.lost_area)},
-          {"explained", number(s.explained)},
+          {"explained", finite_or_null(s.explained)},
           {"samples", s.samples},
           {"places", places}};
 }
@@ -136,9 +136,9 @@ nlohmann::json to_json(const MeshReport& r) {
   if (r.to_reference) json["to_reference"] = distances(*r.to_reference);
   if (r.from_reference) json["from_reference"] = distances(*r.from_reference);
   if (r.normals_to_reference)
-    json["normals_to_reference"] = {{"mean", number(r.normals_to_reference->mean)},
-                                    {"rms", number(r.normals_to_reference->rms)},
-                                    {"max", number(r.normals_to_reference->max)},
+    json["normals_to_reference"] = {{"mean", finite_or_null(r.normals_to_reference->mean)},
+                                    {"rms", finite_or_null(r.normals_to_reference->rms)},
+                                    {"max", finite_or_null(r.normals_to_reference->max)},
                                     {"samples", r.normals_to_reference->samples}};
   if (r.certified_to_reference) json["certified_to_reference"] = bound(*r.certified_to_reference);
   if (r.certified_from_reference) json["certified_from_reference"] = bound(*r.certified_from_reference);

@@ -107,9 +107,9 @@ struct Found {
   }
 };
 
-class Search {
+class CrossingSearch {
  public:
-  Search(const TriangleSoup& soup, const TriangleTree& tree)
+  CrossingSearch(const TriangleSoup& soup, const TriangleTree& tree)
       : soup_(soup), tree_(tree), boxes_(tree.size()), degenerate_(tree.size()) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 4096), [this](const auto& range) {
       for (std::size_t slot = range.begin(); slot < range.end(); ++slot) {
@@ -156,7 +156,7 @@ PairKind classify_pair(const TriangleSoup& soup, std::size_t a, std::size_t b) {
 
 SelfIntersections find_self_intersections(const TriangleSoup& soup, const TriangleTree& tree,
                                           RunContext& context) {
-  const Search search(soup, tree);
+  const CrossingSearch search(soup, tree);
   const auto search_range = [&](const tbb::blocked_range<std::size_t>& range, Found found) {
     for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
       context.check();

@@ -110,7 +110,7 @@ struct Surface {
   }
 };
 
-std::int64_t count_components(const MeshFile& mesh) {
+std::int64_t components_of_triangles(const MeshFile& mesh) {
   DisjointSets sets(mesh.points.size());
   const TriangleSoup soup(mesh);
   for (const Triangle& t : soup.triangles) sets.join(sets.join(t[0], t[1]), t[2]);
@@ -326,7 +326,7 @@ SolidComparison SolidReference::compare(const MeshFile& mesh, const SolidOptions
   const Stage stage(context, "solids");
   SolidComparison result;
   result.samples = options.samples;
-  result.mesh_components = count_components(mesh);
+  result.mesh_components = components_of_triangles(mesh);
   result.mesh_area = area_of(mesh);
   MeshFile welded = welded_triangles(mesh);
   if (!parts_ || welded.triangles.empty()) return result;

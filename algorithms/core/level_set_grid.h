@@ -2,6 +2,8 @@
 // need it.
 #pragma once
 
+#include <Eigen/Core>
+
 #include "algorithms/core/openvdb_trees.h"
 
 #include "algorithms/core/level_set.h"
@@ -17,6 +19,9 @@ struct LevelSetGrid {
 inline LevelSet make_level_set(openvdb::FloatGrid::ConstPtr grid) {
   return LevelSet(std::make_shared<const LevelSetGrid>(LevelSetGrid{std::move(grid)}));
 }
+
+/// The vector as Eigen has it.
+inline Eigen::Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
 /// Registers OpenVDB's types and ours, once; call it before a grid is made, read or written.
 void initialize_openvdb();

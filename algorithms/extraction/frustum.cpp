@@ -18,7 +18,7 @@ namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
-using Leaf = openvdb::FloatTree::LeafNodeType;
+using SampleLeaf = openvdb::FloatTree::LeafNodeType;
 
 /// The frustum as a convex solid.
 class Solid {
@@ -118,7 +118,7 @@ class Solid {
 };
 
 /// The leaf with its first sample there, or null if no sample is within the band.
-std::unique_ptr<Leaf> make_leaf(const Solid& solid, const openvdb::Coord& lower, double voxel, double band) {
+std::unique_ptr<SampleLeaf> make_leaf(const Solid& solid, const openvdb::Coord& lower, double voxel, double band) {
   const auto at = [&](double x, double y, double z) -> Vector3d {
     return Vector3d(lower.x() + x, lower.y() + y, lower.z() + z) * voxel;
   };
@@ -126,7 +126,7 @@ std::unique_ptr<Leaf> make_leaf(const Solid& solid, const openvdb::Coord& lower,
   // one walks: where it is beyond band and radius at the middle, no sample is in the band.
   const double radius = std::sqrt(3.0) * 3.5 * voxel, middle = solid.lower_bound(at(3.5, 3.5, 3.5));
   if (std::fabs(middle) > band + radius) return nullptr;
-  auto leaf = std::make_unique<Leaf>(lower, static_cast<float>(band), false);
+  auto leaf = std::make_unique<SampleLeaf>(lower, static_cast<float>(band), false);
   for (int sample = 0; sample < 512; ++sample) {
     const Vector3d point = at(sample >> 6, (sample >> 3) & 7, sample & 7);
     // The bound alone settles most samples outside of the band; the distance to faces and edges is for the others.
@@ -164,7 +164,7 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
     count[a] = static_cast<int>(std::floor((box.max()[a] + band) / voxel / 8.0)) - first[a] + 1;
   }
   // Threads make leaves, each in its own place; the tree, which takes one at a time, gets them afterwards in order.
-  std::vector<std::unique_ptr<Leaf>> leaves(std::size_t(count[0]) * count[1] * count[2]);
+  std::vector<std::unique_ptr<SampleLeaf>> leaves(std::size_t(count[0]) * count[1] * count[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const int n = static_cast<int>(i), z = n % count[2], y = n / count[2] % count[1], x = n / (count[2] * count[1]);
     leaves[i] =

@@ -16,15 +16,15 @@ namespace {
 using openvdb::Coord;
 
 /// The eight samples around a place, with trilinear weights.
-struct Corner {
+struct WeightedCorner {
   Coord at;
   double weight;
 };
-std::array<Corner, 8> corners_around(const openvdb::Vec3d& index) {
+std::array<WeightedCorner, 8> corners_around(const openvdb::Vec3d& index) {
   // Weights are products of the shares along the axes, and sum to 1.
   const Coord low = Coord::floor(index);
   const openvdb::Vec3d share = index - low.asVec3d();
-  std::array<Corner, 8> corners;
+  std::array<WeightedCorner, 8> corners;
   for (int i = 0; i < 8; ++i) {
     const int offset[3] = {i & 1, (i >> 1) & 1, i >> 2};
     double weight = 1.0;
@@ -73,7 +73,7 @@ void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attri
     const std::size_t end = std::min(mesh.points.size(), 1024 * (block + 1));
     for (std::size_t point = 1024 * block; point < end; ++point) {
       double sums[3] = {}, weights = 0.0;
-      for (const Corner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
+      for (const WeightedCorner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
         typename Grid::ValueType value;
         // Inactive samples are no data. What the others weigh is made up to 1 by the division below.
         if (corner.weight <= 0.0 || !access.probeValue(corner.at, value)) continue;
@@ -99,7 +99,7 @@ void take_nearest(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attr
     for (std::size_t point = 1024 * block; point < end; ++point) {
       double largest = -1.0;
       values[point] = -1;
-      for (const Corner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
+      for (const WeightedCorner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
         typename Grid::ValueType value;
         // Among equal weights the first corner wins, in an order that is the same for every point.
         if (corner.weight <= largest || !access.probeValue(corner.at, value)) continue;

@@ -17,8 +17,8 @@ namespace {
 using openvdb::Coord;
 
 // Signs or states of a whole tile.
-constexpr BlockMask kNone{};
-constexpr BlockMask kAll{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+constexpr BlockMask kNoSamples{};
+constexpr BlockMask kAllSamples{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
 /// An edge of the grid from a sample inside to the sample beyond the data.
 struct EndEdge {
@@ -85,13 +85,13 @@ class EndFinder {
   BlockMask inside_of(std::size_t leaf, int dx, int dy, int dz) const {
     const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
     if (there >= 0) return table_.inside(static_cast<std::size_t>(there));
-    return there == kUniformInside ? kAll : kNone;
+    return there == kUniformInside ? kAllSamples : kNoSamples;
   }
   // The table knows the signs of tiles, but not whether they are active: that takes a look at the tree.
   BlockMask active_of(std::size_t leaf, int dx, int dy, int dz) const {
     const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
     if (there >= 0) return table_.active(static_cast<std::size_t>(there));
-    return table_.is_active_at(leaf, 8 * dx, 8 * dy, 8 * dz) ? kAll : kNone;
+    return table_.is_active_at(leaf, 8 * dx, 8 * dy, 8 * dz) ? kAllSamples : kNoSamples;
   }
 
   void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {

@@ -9,7 +9,7 @@
 namespace hermesh {
 namespace {
 
-const std::vector<std::int32_t>* whole_numbers(const PolygonMesh& mesh, const char* name) {
+const std::vector<std::int32_t>* whole_numbers_if_any(const PolygonMesh& mesh, const char* name) {
   for (const MeshAttribute& a : mesh.attributes)
     if (a.name == name && a.domain == AttributeDomain::polygon)
       return std::get_if<std::vector<std::int32_t>>(&a.values);
@@ -21,7 +21,7 @@ const std::vector<std::int32_t>* whole_numbers(const PolygonMesh& mesh, const ch
 void measure_piece(PieceOutput& piece) {
   piece.mass = mass_properties(piece.mesh);
   // Pieces of methods without tags do not say what lies beyond their triangles.
-  const auto* neighbour = whole_numbers(piece.mesh, "neighbour");
+  const auto* neighbour = whole_numbers_if_any(piece.mesh, "neighbour");
   if (!neighbour) return;
   for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {
     if ((*neighbour)[t] < 0) continue;

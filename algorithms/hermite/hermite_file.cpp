@@ -32,7 +32,6 @@ constexpr const char *kVersionKey = "hermesh_hermite_version", *kCodeKey = "herm
                      *kOriginKey = "hermesh_placement_origin", *kBaseKey = "hermesh_placement_base";
 
 openvdb::Vec3d to_vdb(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Eigen::Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
 void describe(openvdb::GridBase& grid, const char* name, const IndexToWorld& placement, const std::string& code) {
   grid.setName(name);

@@ -10,7 +10,7 @@ namespace hermesh {
 namespace {
 
 // Crossings in a task of a conversion, some microseconds of work.
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kCrossingsPerTask = 4096;
 
 /// The data with f(crossing) in place of each crossing, in parallel. The leaves, and with them all ranks, stay.
 template <class To, class From, class F>
@@ -22,9 +22,9 @@ SparseHermite<To> converted(const SparseHermite<From>& from, RunContext& context
   result.leaves = from.leaves;
   result.crossings.resize(from.crossings.size());
   const std::size_t size = from.crossings.size();
-  parallel_blocks((size + kChunk - 1) / kChunk, context, [&](std::size_t chunk) {
-    const std::size_t end = std::min(size, (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) result.crossings[i] = f(from.crossings[i]);
+  parallel_blocks((size + kCrossingsPerTask - 1) / kCrossingsPerTask, context, [&](std::size_t chunk) {
+    const std::size_t end = std::min(size, (chunk + 1) * kCrossingsPerTask);
+    for (std::size_t i = chunk * kCrossingsPerTask; i < end; ++i) result.crossings[i] = f(from.crossings[i]);
   });
   return result;
 }

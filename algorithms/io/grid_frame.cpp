@@ -17,8 +17,6 @@ using Eigen::Vector3d;
 /// A node at the top of a tree has this many voxels along each side, and can be moved by whole sides.
 constexpr int kTop = 4096;
 
-Vector3d to_eigen(const openvdb::Vec3d& v) { return {v[0], v[1], v[2]}; }
-
 /// Moves a node and all below it. Values and masks stay: within its node a voxel keeps its place.
 template <class Node>
 void move_node(Node& node, const openvdb::Coord& by) {

@@ -1,4 +1,3 @@
-#define ZLIB_CONST  // const input pointers
 #include <unistd.h>
 #include <zlib.h>
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kBits = 10;                ///< bits of a cell's coordinate, and of a digit of the radix sort
 constexpr std::size_t kBatch = 256;      ///< triangles whose codes are computed together
-constexpr std::size_t kChunk = 1 << 15;  ///< keys that one task sorts
+constexpr std::size_t kKeysPerTask = 1 << 15;  ///< keys that one task sorts
 constexpr std::size_t kCrowded = 32;     ///< triangles in a cell beyond which it gets a curve of its own
 
 /// Code along the curve in the upper half, triangle number in the lower.
@@ -70,11 +70,11 @@ void radix_sort(std::span<SortKey> keys) {
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
   std::vector<SortKey> other(keys.size());
   std::span<SortKey> from = keys, to = other;
-  std::vector<std::array<std::uint32_t, kDigits>> counts((keys.size() + kChunk - 1) / kChunk);
+  std::vector<std::array<std::uint32_t, kDigits>> counts((keys.size() + kKeysPerTask - 1) / kKeysPerTask);
   for (int shift = 32; shift < 32 + 3 * kBits; shift += kBits) {
     const auto digit = [shift](SortKey key) { return (key >> shift) & (kDigits - 1); };
-    for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-      auto& count = counts[begin / kChunk];
+    for_chunks(keys.size(), kKeysPerTask, [&](std::size_t begin, std::size_t end) {
+      auto& count = counts[begin / kKeysPerTask];
       count.fill(0);
       for (std::size_t i = begin; i < end; ++i) ++count[digit(from[i])];
     });
@@ -82,14 +82,14 @@ void radix_sort(std::span<SortKey> keys) {
     std::uint32_t total = 0;
     for (std::size_t d = 0; d < kDigits; ++d)
       for (auto& count : counts) total += std::exchange(count[d], total);
-    for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
-      auto& next = counts[begin / kChunk];
+    for_chunks(keys.size(), kKeysPerTask, [&](std::size_t begin, std::size_t end) {
+      auto& next = counts[begin / kKeysPerTask];
       for (std::size_t i = begin; i < end; ++i) to[next[digit(from[i])]++] = from[i];
     });
     std::swap(from, to);
   }
   // After three passes, an odd number, the sorted keys lie in `other`.
-  for_chunks(keys.size(), kChunk, [&](std::size_t begin, std::size_t end) {
+  for_chunks(keys.size(), kKeysPerTask, [&](std::size_t begin, std::size_t end) {
     std::copy(from.begin() + begin, from.begin() + end, keys.begin() + begin);
   });
 }
@@ -113,7 +113,7 @@ class CurveSorter {
     });
     // Both sorts give the same order, by code and then by number; for few keys the counts of a radix sort would be
     // most of its work.
-    if (keys.size() < kChunk)
+    if (keys.size() < kKeysPerTask)
       std::sort(keys.begin(), keys.end());
     else
       radix_sort(keys);
@@ -130,7 +130,7 @@ class CurveSorter {
 
   BoundsOf<float> bounds_of_centres(std::span<const SortKey> keys) const {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, keys.size(), kChunk), BoundsOf<float>(),
+        tbb::blocked_range<std::size_t>(0, keys.size(), kKeysPerTask), BoundsOf<float>(),
         [&](const tbb::blocked_range<std::size_t>& range, BoundsOf<float> box) {
           for (std::size_t i = range.begin(); i < range.end(); ++i) box.add(centre(keys[i]));
           return box;

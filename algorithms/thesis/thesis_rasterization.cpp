@@ -12,7 +12,7 @@ namespace {
 
 /// Largest number of samples that are rasterised between two looks for cancellation, a line segment's more or
 /// less.
-constexpr std::size_t kBatch = 4096;
+constexpr std::size_t kVoxelsAtOnce = 4096;
 
 /// The voxel that a point is rounded to, halves upwards (std::round would round them away from 0).
 Voxel nearest_voxel(const Eigen::Vector3d& p) {
@@ -50,7 +50,7 @@ void for_each_batch(const GridTriangle& t, std::vector<Voxel>& voxels, F&& visit
         put(nearest_voxel((double(n - i) * t[0] + double(i - j) * t[1] + double(j) * t[2]) / double(n)));
       // A large triangle is handed over in parts, so that its voxels are never all in memory; a voxel in two parts is
       // added twice, to no effect.
-      if (voxels.size() < kBatch) continue;
+      if (voxels.size() < kVoxelsAtOnce) continue;
       make_unique(voxels);
       visit(voxels);
       voxels.clear();

@@ -62,7 +62,7 @@ thesis::Triangles local_copy(const VoxelizationInput& input, std::uint64_t shuff
 }
 
 /// Widths of the band on either side, in voxels.
-struct Widths {
+struct ThesisWidths {
   double exterior, interior;
 };
 
@@ -74,7 +74,7 @@ struct Leaves {
 
 /// Makes leaves of the band's distances with their signs and, where `numbers` says so, of their triangles. Inactive
 /// values are for signedFloodFill to set.
-Leaves make_leaves(const thesis::BandBlock& block, const Widths& widths, double voxel_size, const Numbers* numbers) {
+Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, double voxel_size, const Numbers* numbers) {
   const openvdb::Coord lower(block.lower[0], block.lower[1], block.lower[2]);
   Leaves leaves{std::make_unique<Leaf>(lower, float(widths.exterior * voxel_size)),
                 numbers ? std::make_unique<IdLeaf>(lower, -1) : nullptr};
@@ -97,7 +97,7 @@ void place(openvdb::GridBase& grid, const char* name, const VoxelizationInput& i
 }
 
 /// The grids in world units. It frees the band block by block, so that it and they are never whole at a time.
-Voxelization make_grids(thesis::Band& band, const Widths& widths, const VoxelizationInput& input, bool is_signed,
+Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const VoxelizationInput& input, bool is_signed,
                         const Numbers* numbers) {
   const Stage stage(input.context, "level set");
   const auto outside = float(widths.exterior * input.voxel_size),
@@ -179,7 +179,7 @@ Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVox
   const thesis::Triangles triangles = local_copy(input, options.shuffle_seed, numbers.shuffled);
   // The stages 2 to 5 of §5.1 in their order; stage 6, fog, is for whoever has the level set.
   thesis::Band band = thesis::rasterize(triangles, input.context);
-  Widths widths{input.exterior_band, input.interior_band};
+  ThesisWidths widths{input.exterior_band, input.interior_band};
   if (options.signs) {
     thesis::determine_signs(band, triangles, options.sign_angle, input.context);
     if (options.clean_up) thesis::remove_unwanted_voxels(band, input.context);

@@ -15,9 +15,9 @@
 namespace hermesh {
 namespace {
 
-/// Where a band is wider than `kWide` voxels, the triangles look for the voxels within `kNear` alone, which is as far
+/// Where a band is wider than `kWideBand` voxels, the triangles look for the voxels within `kNearBand` alone, which is as far
 /// as they get by looking at the blocks next to theirs, and each voxel beyond looks for its triangle (wide_band.h).
-constexpr double kWide = 16.0, kNear = 6.0;
+constexpr double kWideBand = 16.0, kNearBand = 6.0;
 
 /// Widths of the band in world units.
 struct Widths {
@@ -284,8 +284,8 @@ Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, R
   outside_only.interior_band = options.exterior_band;
   const BandWidths wide{options.exterior_band, options.interior_band}, exterior{wide.exterior, wide.exterior};
   if (options.signs == SignRule::none) return voxelize_within(mesh, outside_only, exterior, context);
-  const bool is_wide = std::max(wide.exterior, wide.interior) > kWide;
-  const BandWidths near = is_wide ? BandWidths{std::min(wide.exterior, kNear), std::min(wide.interior, kNear)} : wide;
+  const bool is_wide = std::max(wide.exterior, wide.interior) > kWideBand;
+  const BandWidths near = is_wide ? BandWidths{std::min(wide.exterior, kNearBand), std::min(wide.interior, kNearBand)} : wide;
   Voxelization result = voxelize_within(mesh, options, near, context);
   // No inside was found. What is there already is right where the search went as far as the exterior band, no more
   // and no less.

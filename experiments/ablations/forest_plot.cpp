@@ -74,13 +74,13 @@ std::array<double, 2> axis_of(const Forest& forest) {
   return {low - margin, high + margin};
 }
 
-std::string label_of(const PredictedEffect& predicted) { return predicted.level + ": " + predicted.column; }
+std::string label_of_effect(const PredictedEffect& predicted) { return predicted.level + ": " + predicted.column; }
 
 /// The share of the width that the longest name takes, of characters 0.009 wide.
 double left_margin(const Forest& forest) {
   std::size_t longest = 0;
   for (const JudgedEffect* effect : forest.effects)
-    longest = std::max(longest, label_of(effect->predicted).size());
+    longest = std::max(longest, label_of_effect(effect->predicted).size());
   return std::min(0.03 + 0.009 * double(longest), 0.6);
 }
 
@@ -123,7 +123,7 @@ void write_forest(const fs::path& script, const Forest& forest) {
   if (forest.logarithmic) out << "set logscale x\n" << marks_of(low, high);
   out << "set ytics (";
   for (std::size_t i = 0; i < n; ++i)
-    out << (i ? ", " : "") << gnuplot_text(label_of(forest.effects[i]->predicted)) << ' ' << n - i;
+    out << (i ? ", " : "") << gnuplot_text(label_of_effect(forest.effects[i]->predicted)) << ' ' << n - i;
   out << ") noenhanced\n";
   for (std::size_t i = 0; i < n; ++i) {
     const PredictedEffect& predicted = forest.effects[i]->predicted;

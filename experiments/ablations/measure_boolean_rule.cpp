@@ -18,9 +18,9 @@ namespace {
 
 /// Models of the tiers, of which parts of CAD have faces along the lattice and scans have not.
 constexpr const char* kFewModels = "torus fandisk";
-constexpr const char* kModels =
+constexpr const char* kRuleModels =
     "turned-cube fandisk rocker-arm joint casting nefertiti bunny-closed armadillo";
-constexpr const char* kPrinted = "eq. 7.1";
+constexpr const char* kPrintedRule = "eq. 7.1";
 constexpr const char* kSigns = "signs";
 
 std::vector<std::string> words_in(const std::string& text) {
@@ -70,11 +70,11 @@ MeasuredRow row_of(const std::string& model, const std::string& resolution, cons
   return row;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_boolean_rule(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   for (const std::string& model : words_in(input.parameters.text("models"))) {
     const auto wanted = [&](const std::string& resolution) {
-      return input.wants("difference", label_of(model, resolution, kPrinted)) ||
+      return input.wants("difference", label_of(model, resolution, kPrintedRule)) ||
              input.wants("difference", label_of(model, resolution, kSigns));
     };
     const std::vector<std::string> resolutions = words_in(input.parameters.text("resolutions"));
@@ -88,7 +88,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
       const FloatHermite a = sampled(mesh, voxel_size, input, child),
                          b = sampled(copy, voxel_size, input, child);
       const auto packed = [&](const FloatHermite& data) { return to_dense<ThesisVoxel>(data, child); };
-      rows.push_back(row_of(model, resolution, kPrinted,
+      rows.push_back(row_of(model, resolution, kPrintedRule,
                             combine(Boolean::subtract, packed(a), packed(b), child), input.context));
       rows.push_back(
           row_of(model, resolution, kSigns, packed(combine(Boolean::subtract, a, b, child)), input.context));
@@ -104,7 +104,7 @@ Measurement boolean_rule_measurement() {
       .name = "boolean-rule",
       .summary = "a model less a copy of itself, by eq. 7.1 and by the rule of signs",
       .parameters =
-          {{"models", kFewModels, "cases", {kFewModels, kModels}},
+          {{"models", kFewModels, "cases", {kFewModels, kRuleModels}},
            {"resolutions", "48", "voxels along the longest side", {"48", "96", "192", "48 96 192"}}},
       .tables = {{"difference",
                   "a model less a copy of itself that is moved aside",
@@ -117,7 +117,7 @@ Measurement boolean_rule_measurement() {
                    {"flipped", "flipped", "inconsistently oriented edges"},
                    {"lost_crossings", "lost", "edges whose ends differ in sign and that have no data"},
                    {"needless_crossings", "needless", "edges with data whose ends do not differ in sign"}}}},
-      .measure = measure};
+      .measure = measure_boolean_rule};
 }
 
 }  // namespace hermesh

@@ -31,9 +31,9 @@ std::vector<std::string> parts_of(const std::string& text, char separator) {
   return parts;
 }
 
-class Measurer {
+class BoundedMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input) : input_(input) {}
+  explicit BoundedMeasurer(const MeasurementInput& input) : input_(input) {}
 
   void run() {
     const std::vector<std::string> percents = parts_of(input_.parameters.text("percents"), '-');
@@ -156,7 +156,7 @@ Measurement bounded_measurement() {
                  {"holes", "holes", "area of the caps of holes, world units²"}},
             .additive = true}},
       .measure = [](const MeasurementInput& input) {
-        Measurer(input).run();
+        BoundedMeasurer(input).run();
         return std::vector<MeasuredRow>();
       }};
 }

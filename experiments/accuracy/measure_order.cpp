@@ -121,9 +121,9 @@ std::vector<double> sizes_of(const std::string& text) {
   return sizes;
 }
 
-class Measurer {
+class OrderMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input)
+  explicit OrderMeasurer(const MeasurementInput& input)
       : input_(input),
         sizes_(sizes_of(input.parameters.text("sizes"))),
         draws_(int(input.parameters.number("draws"))),
@@ -538,7 +538,7 @@ Measurement order_measurement() {
                {"normals", "200000", "random normals for each resolution of a code", {}, 1000, 1e8},
                {"draws", "1000", "resampled slopes for an interval", {}, 20, 1e6}},
           .tables = tables,
-          .measure = [](const MeasurementInput& input) { return Measurer(input).run(); }};
+          .measure = [](const MeasurementInput& input) { return OrderMeasurer(input).run(); }};
 }
 
 }  // namespace hermesh

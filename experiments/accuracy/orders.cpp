@@ -3,17 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
+
+#include "experiments/harness/measure.h"
 
 namespace hermesh {
-namespace {
-
-double mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
-}
-
-}  // namespace
-
 Expectation expectation(const ExactShape& shape, bool keeps_creases) {
   if (!shape.is_sharp()) return Expectation::kSmooth;
   if (!keeps_creases) return Expectation::kSharp;

@@ -6,16 +6,14 @@
 #include <random>
 #include <set>
 
+#include "experiments/harness/measure.h"
+
 namespace hermesh {
 namespace {
 
 struct Point {
   double x, y;
 };
-
-double mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
-}
 
 double slope_of(const std::vector<Point>& points) {
   double x = 0, y = 0, xx = 0, xy = 0;

@@ -78,7 +78,7 @@ PolygonMesh sheet_of(const Crown& crown, double detail) {
 }
 
 /// A box whose upper side has waves; the points of its lower side stand below those of the upper one.
-PolygonMesh pool(const GradientNoise& noise, double detail) {
+PolygonMesh pool_of_waves(const GradientNoise& noise, double detail) {
   const auto nx = static_cast<std::uint32_t>(140 * detail), nz = static_cast<std::uint32_t>(520 * detail);
   PolygonMesh mesh;
   for (const bool upper : {false, true})
@@ -175,7 +175,7 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   const GradientNoise waves(random.bits());
   const double only = std::floor(parameters.at("part"));
   const auto wanted = [&](double part) { return only == 0 || only == part; };
-  PolygonMesh mesh = wanted(1) ? pool(waves, detail) : PolygonMesh();
+  PolygonMesh mesh = wanted(1) ? pool_of_waves(waves, detail) : PolygonMesh();
   std::vector<Crown> crowns;
   constexpr int kMostTries = 1000;  // where no place is left there are fewer crowns
   for (int tries = 0; crowns.size() < parameters.at("crowns") && tries < kMostTries; ++tries) {

@@ -9,11 +9,11 @@ namespace hermesh {
 
 namespace {
 
-constexpr double most = 1e8;  ///< triangles, about ten times the largest case
+constexpr double kMostTriangles = 1e8;  ///< triangles, about ten times the largest case
 
-const RecipeParameter cuts = {"cuts", "the sphere has 8 times its square triangles", 64, 1, 3000};
-const RecipeParameter around = {"around", "points of a ring", 128, 3, 10000};
-const RecipeParameter radius = {"radius", "world units", 1, 1e-6, 1e6};
+const RecipeParameter kCuts = {"cuts", "the sphere has 8 times its square triangles", 64, 1, 3000};
+const RecipeParameter kAround = {"around", "points of a ring", 128, 3, 10000};
+const RecipeParameter kRadius = {"radius", "world units", 1, 1e-6, 1e6};
 
 }  // namespace
 
@@ -22,8 +22,8 @@ std::span<const Recipe> all_recipes() {
       {"noise-sphere",
        "sphere, displaced along its rays by octaves of gradient noise, each half as high and twice as fine "
        "as the one before",
-       {{"triangles", "met within 1 % from 20000 on", 1e6, 8, most},
-        radius,
+       {{"triangles", "met within 1 % from 20000 on", 1e6, 8, kMostTriangles},
+        kRadius,
         {"octaves", "of noise", 7, 0, 20},
         {"amplitude", "of the first octave, share of the radius", 0.25, 0, 1},
         {"frequency", "of the first octave, lattice cells a radius", 2, 0.01, 1000},
@@ -40,7 +40,7 @@ std::span<const Recipe> all_recipes() {
        "torus about the z axis",
        {{"major_radius", "world units", 1, 1e-6, 1e6},
         {"minor_radius", "world units", 0.4, 1e-6, 1e6},
-        around,
+        kAround,
         {"across", "points of a cross-section", 64, 3, 10000}},
        recipes::torus},
       {"nested-spheres",
@@ -48,18 +48,18 @@ std::span<const Recipe> all_recipes() {
        {{"outer", "radius", 1, 1e-6, 1e6},
         {"cavity", "radius", 0.7, 1e-6, 1e6},
         {"core", "radius", 0.4, 1e-6, 1e6},
-        cuts},
+        kCuts},
        recipes::nested_spheres},
       {"overlapping-spheres",
        "two spheres of the same radius that intersect each other",
-       {radius, {"distance", "of the centres, along x", 1, 0, 1e6}, cuts},
+       {kRadius, {"distance", "of the centres, along x", 1, 0, 1e6}, kCuts},
        recipes::overlapping_spheres},
       {"sphere-cluster",
        "spheres of the same radius about random centres, so that they overlap",
-       {radius,
+       {kRadius,
         {"spheres", "number of them", 8, 1, 1000},
         {"spread", "side of the cube that the centres lie in", 2, 0, 1e6},
-        cuts,
+        kCuts,
         {"copies", "of every triangle", 1, 1, 10},
         {"turned", "1 turns every triangle round with a chance of one half", 0, 0, 1},
         {"seed", "of the centres and turns", 1, 0, 1e9}},
@@ -67,10 +67,10 @@ std::span<const Recipe> all_recipes() {
       {"holed-sphere",
        "sphere of longitudes and latitudes with a round hole, open or covered, at a pole that points along "
        "no axis",
-       {radius,
+       {kRadius,
         {"hole", "diameter of the hole", 0.1, 0, 1e6},
         {"open", "1 leaves the hole open", 0, 0, 1},
-        around},
+        kAround},
        recipes::holed_sphere},
       {"sheets",
        "square plates, one above the other",
@@ -95,15 +95,15 @@ std::span<const Recipe> all_recipes() {
        recipes::splash},
       {"uv-sphere",
        "sphere of longitudes and latitudes, slender triangles at its poles",
-       {radius, around, {"upward", "strips from pole to pole", 64, 2, 10000}},
+       {kRadius, kAround, {"upward", "strips from pole to pole", 64, 2, 10000}},
        recipes::uv_sphere},
       {"cylinder",
        "cylinder along the z axis, its caps fans",
-       {radius, {"height", "world units", 2, 1e-6, 1e6}, around},
+       {kRadius, {"height", "world units", 2, 1e-6, 1e6}, kAround},
        recipes::cylinder},
       {"cad-part",
        "prism with sharp edges, a notch, a chamfer, and two edges that are blends",
-       {{"triangles", "at least", 20000, 100, most}},
+       {{"triangles", "at least", 20000, 100, kMostTriangles}},
        recipes::cad_part}};
   return table;
 }

@@ -20,7 +20,7 @@
 namespace hermesh::cli {
 namespace {
 
-struct Arguments {
+struct CombineArguments {
   std::string operation;
   std::string first, second, out;
   VoxelizeArguments voxelizing;
@@ -33,13 +33,13 @@ Boolean boolean_of(const std::string& operation) {
   return operation == "intersection" ? Boolean::intersect : Boolean::subtract;
 }
 
-std::string result_name(const Arguments& arguments) {
+std::string result_name(const CombineArguments& arguments) {
   return "the " + arguments.operation + " of '" + arguments.first + "' and '" + arguments.second + "'";
 }
 
 /// Voxel size in world units. A resolution counts along the longer operand, so that the
 /// order of the two does not matter.
-double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Arguments& arguments,
+double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const CombineArguments& arguments,
                   const ChosenVoxelizer& chosen) {
   const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
   const VoxelizeRecipe recipe =
@@ -49,7 +49,7 @@ double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Arg
 }
 
 SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const SharedLattice& lattice,
-                     const Arguments& arguments, const ChosenVoxelizer& chosen, Session& session) {
+                     const CombineArguments& arguments, const ChosenVoxelizer& chosen, Session& session) {
   const auto voxelized = [&](const PolygonMesh& framed) {
     return voxelize(framed, file, arguments.voxelizing, chosen, session);
   };
@@ -61,7 +61,7 @@ SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const Sha
 }
 
 /// Refuses a result without a sample. @throws Error that tells a result that is empty from one that is too thin.
-void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const Arguments& arguments,
+void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const CombineArguments& arguments,
                      double voxel_size) {
   if (!result.hermite.leaves.empty()) return;
   if (lost.edges > 0)
@@ -71,7 +71,7 @@ void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const
               " is empty, nothing was written: no sample and no edge of the lattice lies in it");
 }
 
-PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, const Arguments& arguments,
+PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, const CombineArguments& arguments,
                     Session& session) {
   const Stopwatch watch;
   PolygonMesh mesh = extract(solid.level_set, nullptr,
@@ -101,8 +101,8 @@ bool keeps_promises(const std::string& file, const Promises& promises, Session& 
   return check.broken.empty();
 }
 
-int run_combine(const Arguments& given, Session& session) {
-  Arguments arguments = given;
+int run_combine(const CombineArguments& given, Session& session) {
+  CombineArguments arguments = given;
   const ChosenVoxelizer voxelizer = choose_voxelizer(arguments.voxelizing);
   if (voxelizer.options.is("signs", "unsigned"))
     throw UsageError("--signs unsigned leaves the solids without an inside that could be combined");
@@ -135,7 +135,7 @@ int run_combine(const Arguments& given, Session& session) {
 }  // namespace
 
 void add_combine(CLI::App& app, Session& session) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CombineArguments>();
   CLI::App* command = add_command(app, session, "combine", "Union, intersection or difference of two solids");
   command
       ->add_option("OPERATION", arguments->operation,

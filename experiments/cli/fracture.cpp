@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kSizeGroup = "Voxel size, exactly one of";
 
-struct Arguments {
+struct FractureArguments {
   Paths paths;
   VoxelizeArguments voxelizing;
   std::string grid;  ///< empty: `sdf`, or the only scalar grid there is
@@ -36,7 +36,7 @@ struct Arguments {
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
 
 /// Reads the object to break; its polygons, if it has any, are kept in `source`.
-FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh>& source, Session& session) {
+FractureObject read_object(const FractureArguments& arguments, std::optional<PolygonMesh>& source, Session& session) {
   FractureObject object;
   const bool sized = arguments.voxelizing.voxel_size || arguments.voxelizing.resolution;
   if (is_volume(arguments.paths.in)) {
@@ -60,7 +60,7 @@ FractureObject read_object(const Arguments& arguments, std::optional<PolygonMesh
   return object;
 }
 
-nlohmann::ordered_json head_of(const Arguments& arguments, const FractureObject& object) {
+nlohmann::ordered_json head_of(const FractureArguments& arguments, const FractureObject& object) {
   const Eigen::Vector3d& origin = object.hermite.placement.origin;
   return {{"object", std::filesystem::path(arguments.paths.in).filename().string()},
           {"method", arguments.method.name},
@@ -120,7 +120,7 @@ bool report_ledger(const validation::FractureLedger& ledger, Session& session) {
 }
 
 /// Refuses options that were given and that nothing would look at. @throws UsageError
-void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, const CLI::App& command) {
+void refuse_idle_options(const FractureArguments& arguments, const CutterSpec& spec, const CLI::App& command) {
   using Kind = CutterSpec::Kind;
   if (is_volume(arguments.paths.in))
     refuse_idle(command, {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band", "--scale", "--units"},
@@ -142,8 +142,8 @@ void refuse_idle_options(const Arguments& arguments, const CutterSpec& spec, con
   if (arguments.impact.empty()) refuse_idle(command, {"--impact-radius"}, "there is no --impact");
 }
 
-int run_fracture_command(const Arguments& given, const CLI::App& command, Session& session) {
-  Arguments arguments = given;
+int run_fracture_command(const FractureArguments& given, const CLI::App& command, Session& session) {
+  FractureArguments arguments = given;
   const CutterSpec spec = as_usage([&] { return parse_cutters(arguments.cutters); });
   as_usage([&] { check_method(arguments.method); });
   refuse_idle_options(arguments, spec, command);
@@ -179,7 +179,7 @@ int run_fracture_command(const Arguments& given, const CLI::App& command, Sessio
   return balances ? kDone : kNotMet;
 }
 
-void add_cutter_options(CLI::App& command, Arguments& arguments) {
+void add_cutter_options(CLI::App& command, FractureArguments& arguments) {
   command
       .add_option(
           "--cutters", arguments.cutters,
@@ -208,7 +208,7 @@ void add_cutter_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 void add_fracture(CLI::App& app, Session& session) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<FractureArguments>();
   CLI::App* command =
       add_command(app, session, "fracture", "Break a solid into pieces that fit without a gap");
   add_paths(*command, session, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb", FileKind::mesh_or_volume,

@@ -16,7 +16,7 @@
 namespace hermesh::cli {
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   Paths paths;
   std::optional<std::string> dims, type, spacing;
   std::uint64_t offset = 0;
@@ -41,7 +41,7 @@ std::array<T, 3> three_numbers(const std::string& option, const std::string& giv
   return numbers;
 }
 
-RawLayout raw_layout(const Arguments& arguments, Session& session) {
+RawLayout raw_layout(const ImportArguments& arguments, Session& session) {
   if (!arguments.type) throw UsageError("--dims makes the input raw samples: say of which --type, such as int16le");
   RawLayout layout;
   layout.dims = three_numbers<std::int64_t>("--dims", *arguments.dims);
@@ -55,7 +55,7 @@ RawLayout raw_layout(const Arguments& arguments, Session& session) {
   return layout;
 }
 
-void check_nifti(const Arguments& arguments) {
+void check_nifti(const ImportArguments& arguments) {
   if (arguments.type || arguments.spacing || arguments.offset != 0)
     throw UsageError("--type, --spacing and --offset are about raw samples: give their --dims, too");
   if (!is_nifti_path(arguments.paths.in))
@@ -64,7 +64,7 @@ void check_nifti(const Arguments& arguments) {
                      "--type and --spacing");
 }
 
-int run_import(const Arguments& arguments, Session& session) {
+int run_import(const ImportArguments& arguments, Session& session) {
   ImportOptions options{.replacement = {}, .frame = arguments.frame};
   if (arguments.replacement) {
     options.replacement = static_cast<float>(*arguments.replacement);
@@ -98,7 +98,7 @@ int run_import(const Arguments& arguments, Session& session) {
 }  // namespace
 
 void add_import(CLI::App& app, Session& session) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ImportArguments>();
   CLI::App* command = add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
   add_paths(*command, session, arguments->paths,
             "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input", FileKind::imported,

@@ -18,7 +18,7 @@ namespace {
 using validation::JudgeOptions;
 using validation::MeshReport;
 
-struct Arguments {
+struct ValidateArguments {
   std::string mesh, reference, features;
   std::string require;
   bool certify = false;
@@ -71,7 +71,7 @@ std::optional<MeshFile> read_if_named(const std::string& file, RunContext& conte
   return read_mesh_file(file, context);
 }
 
-int run_validate(const Arguments& arguments, const CLI::App& command, Session& session) {
+int run_validate(const ValidateArguments& arguments, const CLI::App& command, Session& session) {
   const std::vector<Requirement> requirements = parse_requirements(arguments.require);
   if (arguments.certify && arguments.reference.empty())
     throw UsageError("--certify bounds the distance to a reference: name it with --reference");
@@ -115,7 +115,7 @@ int run_validate(const Arguments& arguments, const CLI::App& command, Session& s
 void add_validate(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "validate", "Judge a mesh: topology, self-intersections, distances");
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ValidateArguments>();
   command->add_option("MESH", arguments->mesh, kMeshIn)->required();
   add_files(*command, session, {.inputs = {&arguments->mesh}, .takes_many = true});
   command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");

@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Arguments {
+struct VoxelizeCommand {
   Paths paths;
   VoxelizeArguments voxelizing;
   std::string grids = "sdf";
@@ -31,7 +31,7 @@ struct Arguments {
 bool knows_triangles(const std::string& voxelizer) { return voxelizer == "hermesh" || voxelizer == "thesis"; }
 
 /// Refuses `--like` for what cannot take it. @throws Error
-void check_like(const Arguments& arguments, const VolumeRequest& request) {
+void check_like(const VoxelizeCommand& arguments, const VolumeRequest& request) {
   if (!arguments.voxelizing.like) return;
   if (arguments.voxelizing.voxelizer != "hermesh")
     throw Error("only the voxelizer hermesh takes --like, not " + arguments.voxelizing.voxelizer);
@@ -39,7 +39,7 @@ void check_like(const Arguments& arguments, const VolumeRequest& request) {
     throw Error("--like makes the grids sdf, udf, fog, triangle-id and closest-point alone");
 }
 
-VolumeRequest requested(const Arguments& arguments) {
+VolumeRequest requested(const VoxelizeCommand& arguments) {
   return as_usage([&] {
     VolumeRequest request = parse_volume_request(arguments.grids);
     request.fog_exterior = arguments.fog_exterior;
@@ -53,7 +53,7 @@ VolumeRequest requested(const Arguments& arguments) {
   });
 }
 
-std::string names_of(const std::vector<openvdb::GridBase::Ptr>& grids) {
+std::string names_of_grids(const std::vector<openvdb::GridBase::Ptr>& grids) {
   std::string names;
   for (const auto& grid : grids) names += (names.empty() ? "" : ", ") + grid->getName();
   return names;
@@ -98,7 +98,7 @@ VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& 
 }
 
 /// Makes the grids of the request by a voxelizer that knows which triangle is nearest, and writes them.
-void write_outputs(const Arguments& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
+void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
                    Session& session) {
   const Paths& paths = arguments.paths;
   PolygonMesh mesh = read_for(request, paths.in, session);
@@ -126,13 +126,13 @@ void write_outputs(const Arguments& arguments, VolumeRequest request, const Chos
     if (grid->getName() == "sdf")
       note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), chosen, session);
   write_volume_outputs(paths.out, outputs, session.context);
-  print_summary(session, "wrote " + paths.out + ": " + names_of(outputs.grids));
+  print_summary(session, "wrote " + paths.out + ": " + names_of_grids(outputs.grids));
   if (outputs.hermite)
     print_summary(session, "wrote " + hermite_path(paths.out).string() + ": hermite, " +
                                std::to_string(outputs.hermite->crossings.size()) + " crossing edges");
 }
 
-int run_voxelize(const Arguments& arguments, Session& session) {
+int run_voxelize(const VoxelizeCommand& arguments, Session& session) {
   const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
   const VolumeRequest request = requested(arguments);
   check_volume_output(arguments.paths.out);
@@ -153,7 +153,7 @@ int run_voxelize(const Arguments& arguments, Session& session) {
 }  // namespace
 
 void add_voxelize(CLI::App& app, Session& session) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<VoxelizeCommand>();
   CLI::App* command =
       add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
   add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, "Volumes: .vdb, or - for the standard output",

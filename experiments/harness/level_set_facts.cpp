@@ -67,6 +67,12 @@ std::uint64_t fingerprint(const LevelSet& level_set) {
   return hash.value();
 }
 
+std::string dimensions_of(const LevelSet& level_set) {
+  std::string text;
+  for (const int width : level_set.dimensions()) text += (text.empty() ? "" : " × ") + std::to_string(width);
+  return text;
+}
+
 std::int64_t count_surface_components(const LevelSet& level_set, RunContext& context) {
   const PolygonMesh mesh = marching_cubes(level_set, 0.0, nullptr, context);
   if (mesh.empty()) return 0;

@@ -11,6 +11,9 @@
 
 namespace hermesh {
 
+/// Sum over count; of at least one value.
+double mean(const std::vector<double>& values);
+
 /// Middle value; of an even number the mean of the two in the middle. 0 of none.
 double median(std::vector<double> values);
 

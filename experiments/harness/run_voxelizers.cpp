@@ -110,16 +110,16 @@ class Truths {
   std::optional<SignTruth> signs_;
 };
 
-struct Cell {
+struct VoxelizerCell {
   VoxelizeRecipe recipe;
   Json row;
   std::uint64_t fingerprint = 0;
   std::optional<Timing> timing;  ///< absent when the voxelizer failed
 };
 
-class Group {
+class VoxelizerGroup {
  public:
-  Group(const VoxelizerGroupInput& group, RunContext& context) : in_(group), context_(context) {}
+  VoxelizerGroup(const VoxelizerGroupInput& group, RunContext& context) : in_(group), context_(context) {}
 
   std::vector<Json> run() {
     for (const VariantEntry& variant : in_.voxelizers) {
@@ -129,7 +129,7 @@ class Group {
     std::optional<Truths> truths;
     // A mesh without any area has no truth; how the voxelizers take it is still worth a row.
     const auto no_truth = attempt([&] { truths.emplace(in_, context_); });
-    for (Cell& cell : cells_) {
+    for (VoxelizerCell& cell : cells_) {
       if (no_truth) cell.row["not_judged"] = *no_truth;
       in_.watch.step(cell.row);
       const auto failed = attempt([&] { first_run(cell, truths ? &*truths : nullptr); });
@@ -140,14 +140,14 @@ class Group {
     truths.reset();
     time_all();
     std::vector<Json> rows;
-    for (Cell& cell : cells_) rows.push_back(std::move(cell.row));
+    for (VoxelizerCell& cell : cells_) rows.push_back(std::move(cell.row));
     add_voxelizer_ratios(rows);
     return rows;
   }
 
  private:
-  Cell make_cell(const VariantEntry& variant) const {
-    Cell cell;
+  VoxelizerCell make_cell(const VariantEntry& variant) const {
+    VoxelizerCell cell;
     cell.recipe = {.chosen = choose(in_.tables.voxelizers, variant.name, variant.options),
                    .voxel_size = in_.voxel_size,
                    .exterior_band = in_.experiment.exterior_band,
@@ -166,7 +166,7 @@ class Group {
     StageSeconds stages;
     std::vector<std::string> notes;
   };
-  Once once(const Cell& cell, bool with_progress) const {
+  Once once(const VoxelizerCell& cell, bool with_progress) const {
     context_.check();
     RunContext child = child_context(context_, with_progress);
     Once result;
@@ -178,7 +178,7 @@ class Group {
     return result;
   }
 
-  void first_run(Cell& cell, const Truths* truths) {
+  void first_run(VoxelizerCell& cell, const Truths* truths) {
     // OpenVDB's registers are the process's, not those of whoever happens to be measured first.
     initialize_openvdb();
     const PeakMemory memory;
@@ -200,7 +200,7 @@ class Group {
     }
   }
 
-  void describe(Cell& cell, const LevelSet& level_set) const {
+  void describe(VoxelizerCell& cell, const LevelSet& level_set) const {
     const auto [x, y, z] = level_set.dimensions();
     cell.fingerprint = fingerprint(level_set);
     char text[20];
@@ -218,7 +218,7 @@ class Group {
       cell.row["peak_over_allowed"] = number_at(cell.row, "/peak_bytes") / allowed;
   }
 
-  double repeat(Cell& cell) const {
+  double repeat(VoxelizerCell& cell) const {
     in_.watch.step(cell.row);
     const Once again = once(cell, false);
     cell.timing->stages.push_back(again.stages);
@@ -230,7 +230,7 @@ class Group {
   void time_all() {
     const Stage stage(context_, "timing");
     std::vector<Racer> racers;
-    for (Cell& cell : cells_)
+    for (VoxelizerCell& cell : cells_)
       if (cell.timing) racers.push_back({*cell.timing, cell.row, [this, &cell] { return repeat(cell); }});
     race_cells(racers);
     for (const Racer& racer : racers) {
@@ -247,13 +247,13 @@ class Group {
 
   const VoxelizerGroupInput& in_;
   RunContext& context_;
-  std::vector<Cell> cells_;
+  std::vector<VoxelizerCell> cells_;
 };
 
 }  // namespace
 
 std::vector<Json> run_voxelizers(const VoxelizerGroupInput& group, RunContext& context) {
-  return Group(group, context).run();
+  return VoxelizerGroup(group, context).run();
 }
 
 }  // namespace hermesh

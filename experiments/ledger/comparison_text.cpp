@@ -6,17 +6,17 @@
 namespace hermesh {
 namespace {
 
-using State = CellVerdict::State;
+using TextState = CellVerdict::State;
 
-const char* word(State state) {
+const char* word(TextState state) {
   switch (state) {
-    case State::kMissing:
+    case TextState::kMissing:
       return "missing";
-    case State::kNew:
+    case TextState::kNew:
       return "new";
-    case State::kRenamed:
+    case TextState::kRenamed:
       return "renamed";
-    case State::kBoth:
+    case TextState::kBoth:
       break;
   }
   return "both";
@@ -29,7 +29,7 @@ std::size_t values(const Comparison& comparison) {
 }
 
 std::size_t compared(const Comparison& comparison) {
-  return comparison.count(State::kBoth) + comparison.count(State::kRenamed);
+  return comparison.count(TextState::kBoth) + comparison.count(TextState::kRenamed);
 }
 
 std::size_t improved(const Comparison& comparison) {
@@ -42,13 +42,13 @@ std::size_t improved(const Comparison& comparison) {
 std::string reason(const Comparison& comparison, const CellVerdict& cell) {
   if (!comparison.is_regression(cell)) return {};
   std::string text;
-  if (cell.state == State::kMissing) text = "the candidate has no row of it";
-  if (cell.state == State::kRenamed) text = "it is called " + cell.label;
+  if (cell.state == TextState::kMissing) text = "the candidate has no row of it";
+  if (cell.state == TextState::kRenamed) text = "it is called " + cell.label;
   for (const std::string& sentence : cell.regressions) text += (text.empty() ? "" : "; ") + sentence;
   return text;
 }
 
-std::string joined(const std::vector<std::string>& sentences) {
+std::string in_one_line(const std::vector<std::string>& sentences) {
   std::string text;
   for (const std::string& sentence : sentences) text += (text.empty() ? "" : "; ") + sentence;
   return text;
@@ -63,9 +63,9 @@ std::string markdown(const Comparison& comparison) {
                      counted(values(comparison), "value", "values") + ": " +
                      counted(comparison.regressions(), "regression", "regressions") + ", " +
                      std::to_string(improved(comparison)) + " better, " +
-                     std::to_string(comparison.count(State::kMissing)) + " missing, " +
-                     std::to_string(comparison.count(State::kRenamed)) + " renamed, " +
-                     std::to_string(comparison.count(State::kNew)) + " new.\n";
+                     std::to_string(comparison.count(TextState::kMissing)) + " missing, " +
+                     std::to_string(comparison.count(TextState::kRenamed)) + " renamed, " +
+                     std::to_string(comparison.count(TextState::kNew)) + " new.\n";
   if (values(comparison) == 0)
     text += "\nNothing was compared, which proves nothing: do the rows belong together? Cells are matched by the experiment, which "
             "is its file's name, by tier, case, resolution and variant.\n";
@@ -78,12 +78,12 @@ std::string markdown(const Comparison& comparison) {
   for (const CellVerdict& cell : comparison.cells) {
     if (comparison.is_regression(cell))
       regressions.push_back(cell.cell + ": " + reason(comparison, cell));
-    else if (cell.state == State::kMissing)
+    else if (cell.state == TextState::kMissing)
       missing.push_back(cell.cell);
-    else if (cell.state == State::kRenamed)
+    else if (cell.state == TextState::kRenamed)
       renamed.push_back(cell.cell + ": now " + cell.label);
-    if (!cell.better.empty()) better.push_back(cell.cell + ": " + joined(cell.better));
-    if (cell.state == State::kNew) added.push_back(cell.cell);
+    if (!cell.better.empty()) better.push_back(cell.cell + ": " + in_one_line(cell.better));
+    if (cell.state == TextState::kNew) added.push_back(cell.cell);
   }
   section("Regressions", regressions);
   section("Better", better);
@@ -103,7 +103,7 @@ Json json(const Comparison& comparison) {
                      {"compared", cell.compared},
                      {"regressions", cell.regressions},
                      {"better", cell.better}});
-    if (cell.state == State::kRenamed) cells.back()["label"] = cell.label;
+    if (cell.state == TextState::kRenamed) cells.back()["label"] = cell.label;
   }
   return {{"fine", comparison.fine()},
           {"tolerance", comparison.settings.tolerance},
@@ -111,9 +111,9 @@ Json json(const Comparison& comparison) {
           {"values_compared", values(comparison)},
           {"regressions", comparison.regressions()},
           {"better", improved(comparison)},
-          {"missing", comparison.count(State::kMissing)},
-          {"renamed", comparison.count(State::kRenamed)},
-          {"new", comparison.count(State::kNew)},
+          {"missing", comparison.count(TextState::kMissing)},
+          {"renamed", comparison.count(TextState::kRenamed)},
+          {"new", comparison.count(TextState::kNew)},
           {"notes", comparison.notes},
           {"cells", cells}};
 }
@@ -154,15 +154,15 @@ std::string junit(const Comparison& comparison) {
             xml(colon == std::string::npos ? cell.cell : cell.cell.substr(colon + 2)) + "\">";
     if (const std::string why = reason(comparison, cell); !why.empty())
       text += "<failure message=\"" + xml(why) + "\"/>";
-    else if (cell.state == State::kMissing)
+    else if (cell.state == TextState::kMissing)
       text += "<skipped message=\"the candidate has no row of it\"/>";
-    std::string said = joined(cell.better);
+    std::string said = in_one_line(cell.better);
     if (!said.empty()) said = "better: " + said;
-    if (cell.state == State::kNew) said = "new: the baseline has no row of it";
+    if (cell.state == TextState::kNew) said = "new: the baseline has no row of it";
     if (!said.empty()) text += "<system-out>" + xml(said) + "</system-out>";
     text += "</testcase>\n";
   }
-  if (!comparison.notes.empty()) text += "<system-out>" + xml(joined(comparison.notes)) + "</system-out>\n";
+  if (!comparison.notes.empty()) text += "<system-out>" + xml(in_one_line(comparison.notes)) + "</system-out>\n";
   return text + "</testsuite>\n</testsuites>\n";
 }
 

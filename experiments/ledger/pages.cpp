@@ -37,7 +37,7 @@ std::string read_text(const fs::path& path) {
   return text.str();
 }
 
-void write_text(const fs::path& path, const std::string& text) {
+void write_page(const fs::path& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   if (!(file << text << std::flush)) throw Error("cannot write " + path.string());
 }
@@ -341,7 +341,7 @@ std::vector<std::string> Pages::fill() const {
   std::vector<std::string> changed;
   const auto put = [&](const std::string& file, const std::string& text) {
     if (fs::exists(root_ / file) && read_text(root_ / file) == text) return;
-    write_text(root_ / file, text);
+    write_page(root_ / file, text);
     changed.push_back(file);
   };
   for (const auto& [file, text] : tables()) put(file, text);

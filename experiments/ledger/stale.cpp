@@ -66,7 +66,7 @@ double seconds_of(const Json& row) {
          number_at(row, "/judge_seconds");
 }
 
-std::string cell_name(const Json& row) {
+std::string name_of_cell(const Json& row) {
   std::string name = text_at(row, "/case/name");
   for (const char* part : {"/resolution", "/values/resolution", "/nominal_voxel_size", "/sweep/value", "/voxelization/label", "/variant/label"})
     if (const std::string text = text_at(row, part); !text.empty()) name += "/" + text;
@@ -112,7 +112,7 @@ void compare(const std::vector<Json>& old, const std::vector<Json>& made, Folder
     std::string difference = "is no longer made";
     bool first = true;
     for (const Json& other : made) {
-      if (cell_name(other) != cell_name(row)) continue;
+      if (name_of_cell(other) != name_of_cell(row)) continue;
       const std::string found = difference_of(row, other);
       if (first || found.empty()) difference = found;
       first = false;
@@ -120,7 +120,7 @@ void compare(const std::vector<Json>& old, const std::vector<Json>& made, Folder
     }
     if (difference.empty()) continue;
     ++check.differing;
-    if (check.difference.empty()) check.difference = cell_name(row) + ": " + difference;
+    if (check.difference.empty()) check.difference = name_of_cell(row) + ": " + difference;
   }
 }
 
@@ -213,11 +213,11 @@ void check_cells(const std::vector<Json>& rows, std::size_t groups, const Tables
     ++done;
     Json named = group.rows.front();
     named.erase("variant");
-    check.sample += (check.sample.empty() ? "" : ", ") + cell_name(named);
+    check.sample += (check.sample.empty() ? "" : ", ") + name_of_cell(named);
     std::vector<Json> made;
     // A variant or option that is gone makes the whole group fail, and each of its rows differ.
     const auto failed = attempt([&] { made = made_again(group, *input, tables, scratch, context); });
-    if (failed && check.difference.empty()) check.difference = cell_name(named) + ": " + *failed;
+    if (failed && check.difference.empty()) check.difference = name_of_cell(named) + ": " + *failed;
     compare(group.rows, made, check);
   }
   if (done > 0) check.skipped.clear();
@@ -271,16 +271,16 @@ void check_measured(const std::vector<Json>& rows, const Tables& tables, const s
                              Json::object(), context);
     });
     if (!made.empty() && !same_inputs(row, made.front())) {
-      check.skipped = cell_name(row) + ": its input is not at hand as the rows have it";
+      check.skipped = name_of_cell(row) + ": its input is not at hand as the rows have it";
       continue;
     }
     if (!failed && made.empty()) {
       // A row that follows from others, or whose label has changed, is not made when it is asked for alone.
-      check.skipped = cell_name(row) + ": not made when asked for alone";
+      check.skipped = name_of_cell(row) + ": not made when asked for alone";
       continue;
     }
-    check.sample += (check.sample.empty() ? "" : ", ") + cell_name(row);
-    if (failed && check.difference.empty()) check.difference = cell_name(row) + ": " + *failed;
+    check.sample += (check.sample.empty() ? "" : ", ") + name_of_cell(row);
+    if (failed && check.difference.empty()) check.difference = name_of_cell(row) + ": " + *failed;
     compare({row}, made, check);
   }
   if (check.tried > 0) check.skipped.clear();

@@ -442,7 +442,7 @@ void time_blocks(const MeasurementInput& input, std::vector<MeasuredRow>& rows) 
   }
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_arithmetic(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   count_models(input, rows);
   count_operations(input, rows);
@@ -522,7 +522,7 @@ Measurement arithmetic_measurement() {
                        {"level_1_kib", "L1 [KiB]",
                         "first-level data cache as the system states it; 0 where it does not"},
                        {"level_2_kib", "L2 [KiB]", "second-level cache"}}}},
-          .measure = measure};
+          .measure = measure_arithmetic};
 }
 
 }  // namespace hermesh

@@ -25,7 +25,7 @@ using Given = GivenOptions;
 
 /// How often the work of a cell is done: once for the digest, and then in each of these ways for the same
 /// digest.
-struct Way {
+struct DigestWay {
   std::string name;
   int threads = 2;
   std::optional<SimdLevel> level = {};  ///< none: the highest
@@ -49,7 +49,7 @@ class ChosenLevel {
 
 /// Numbers of threads and levels of vector code change together, which tells as surely that all of them give
 /// the same in fewer runs.
-std::vector<Way> ways(const Options& parameters) {
+std::vector<DigestWay> digest_ways(const Options& parameters) {
   std::vector<std::optional<SimdLevel>> levels = {{}};
   if (parameters.is("simd", "all")) {
     const std::vector<SimdLevel> available = available_simd_levels();
@@ -59,7 +59,7 @@ std::vector<Way> ways(const Options& parameters) {
   }
   std::vector<int> threads = {2};
   if (parameters.is("threads", "1 2 7")) threads = {2, 1, 7};
-  std::vector<Way> result;
+  std::vector<DigestWay> result;
   for (std::size_t i = 0; i < std::max(levels.size(), threads.size()); ++i) {
     const int count = threads[std::min(i, threads.size() - 1)];
     const std::optional<SimdLevel> level = levels[std::min(i, levels.size() - 1)];
@@ -108,7 +108,7 @@ std::string text(const Given& given) {
 
 class Digests {
  public:
-  explicit Digests(const MeasurementInput& input) : input_(input), ways_(ways(input.parameters)) {}
+  explicit Digests(const MeasurementInput& input) : input_(input), ways_(digest_ways(input.parameters)) {}
 
   std::vector<MeasuredRow> run() {
     const std::string choice = input_.parameters.text("cases");
@@ -280,7 +280,7 @@ class Digests {
     if (!input_.wants("digests", label)) return;
     std::string first;
     std::vector<std::string> broken;
-    for (const Way& way : ways_) {
+    for (const DigestWay& way : ways_) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(way.threads));
       const ChosenLevel level(way.level);
       RunContext child = child_context(input_.context, false);
@@ -296,7 +296,7 @@ class Digests {
   }
 
   const MeasurementInput& input_;
-  const std::vector<Way> ways_;
+  const std::vector<DigestWay> ways_;
   std::string name_;
   double resolution_ = 0.0;
   std::optional<PolygonMesh> mesh_;

@@ -24,15 +24,15 @@ constexpr std::array<double, 3> kInteriors = {3.0, 10.0, 0.0};
 constexpr std::array<const char*, 2> kFillers = {"thesis", "hermesh"};
 
 /// A voxelizer as a panel of figure 9.1.
-struct Way {
+struct CleanUpWay {
   std::string label, name;
   GivenOptions options = {};
 };
 
 /// The thesis's voxelizer without its clean-up where the table has a switch for it, with it, ours, and the
 /// oracle.
-std::vector<Way> ways(std::span<const Voxelizer> voxelizers) {
-  std::vector<Way> result;
+std::vector<CleanUpWay> clean_up_ways(std::span<const Voxelizer> voxelizers) {
+  std::vector<CleanUpWay> result;
   for (const OptionSpec& option : find_variant(voxelizers, "thesis").options)
     if (option.name == "clean_up" || option.name == "clean-up")
       for (const std::string& choice : option.choices)
@@ -86,9 +86,9 @@ Differences compare(const LevelSet& level_set, const LevelSet& truth) {
   return result;
 }
 
-class Measurer {
+class Figure91Measurer {
  public:
-  explicit Measurer(const MeasurementInput& input)
+  explicit Figure91Measurer(const MeasurementInput& input)
       : input_(input),
         resolution_(input.parameters.number("resolution")),
         pixels_(int(input.parameters.number("pixels"))) {}
@@ -102,7 +102,7 @@ class Measurer {
  private:
   static std::string label_of(const std::string& model, const std::string& way) { return model + ", " + way; }
 
-  VoxelizeRecipe recipe(const Way& way, double interior) const {
+  VoxelizeRecipe recipe(const CleanUpWay& way, double interior) const {
     return {.chosen = choose(input_.tables.voxelizers, way.name, way.options),
             .resolution = resolution_,
             .exterior_band = kUsualBand,
@@ -117,15 +117,15 @@ class Measurer {
   }
 
   void clean_up(const std::string& name) {
-    const std::vector<Way> all = ways(input_.tables.voxelizers);
+    const std::vector<CleanUpWay> all = clean_up_ways(input_.tables.voxelizers);
     if (std::ranges::none_of(
-            all, [&](const Way& way) { return input_.wants("clean-up", label_of(name, way.label)); }))
+            all, [&](const CleanUpWay& way) { return input_.wants("clean-up", label_of(name, way.label)); }))
       return;
     const LoadedCase model = input_.tables.load(name, input_.context);
     const LevelSet truth = voxelize(model.mesh, recipe(all.back(), kUsualBand), input_.context);
     const SliceFrame frame = widest_slice(truth, model.mesh);
     PanelSheet sheet;
-    for (const Way& way : all) {
+    for (const CleanUpWay& way : all) {
       if (!input_.wants("clean-up", label_of(name, way.label))) continue;
       input_.context.check();
       RunContext child = child_context(input_.context, false);
@@ -243,7 +243,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_figure_9_1(const MeasurementInput& input) { return Figure91Measurer(input).run(); }
 
 }  // namespace
 
@@ -286,7 +286,7 @@ Measurement figure_9_1_measurement() {
              {"largest", "max [vx]", "largest error"},
              {"missing", "missing", "voxels among those drawn that should be active and are not"},
              {"seconds", "time [s]", "of one run"}}}},
-      .measure = measure};
+      .measure = measure_figure_9_1};
 }
 
 }  // namespace hermesh

@@ -94,7 +94,7 @@ MeasuredRow describe(const std::string& label, const Border& border, const Cloud
   return row;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_figure_9_3(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   if (std::ranges::none_of(kBorders,
                            [&](const Border& border) { return input.wants("fog", border.label()); }))
@@ -176,7 +176,7 @@ Measurement figure_9_3_measurement() {
                    {"steepest", "steepest", "largest difference of neighbouring densities"},
                    {"wrong", "wrong", "voxels whose density is not that of the ramp at their distance"},
                    {"seconds", "time [s]", "to make level set and fog, one run"}}}},
-      .measure = measure};
+      .measure = measure_figure_9_3};
 }
 
 }  // namespace hermesh

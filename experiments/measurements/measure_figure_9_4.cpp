@@ -5,6 +5,7 @@
 
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/level_set_facts.h"
 #include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
@@ -23,15 +24,9 @@ LoadedCase load_statue(const MeasurementInput& input) {
       input.context);
 }
 
-std::string dimensions_of(const LevelSet& level_set) {
-  std::string text;
-  for (const int width : level_set.dimensions()) text += (text.empty() ? "" : " × ") + std::to_string(width);
-  return text;
-}
-
-class Measurer {
+class Figure94Measurer {
  public:
-  explicit Measurer(const MeasurementInput& input) : input_(input) {}
+  explicit Figure94Measurer(const MeasurementInput& input) : input_(input) {}
 
   std::vector<MeasuredRow> run() {
     std::vector<double> resolutions = {input_.parameters.number("coarse"), input_.parameters.number("fine")};
@@ -45,7 +40,7 @@ class Measurer {
     reference_ = to_mesh_file(statue_.mesh);
     for (const double resolution : resolutions)
       for (const char* name : kVoxelizers)
-        if (input_.wants("statue", label(name, resolution))) measure(name, resolution);
+        if (input_.wants("statue", label(name, resolution))) measure_figure_9_4(name, resolution);
     draw();
     return std::move(rows_);
   }
@@ -55,7 +50,7 @@ class Measurer {
     return voxelizer + ", " + readable(resolution);
   }
 
-  void measure(const std::string& name, double resolution) {
+  void measure_figure_9_4(const std::string& name, double resolution) {
     input_.context.check();
     RunContext child = child_context(input_.context, false);
     // One voxel of band on either side, as table 9.1's dimensions have it.
@@ -119,7 +114,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_figure_9_4(const MeasurementInput& input) { return Figure94Measurer(input).run(); }
 
 }  // namespace
 
@@ -147,7 +142,7 @@ Measurement figure_9_4_measurement() {
                        {"lost_rms_share", "of the size", "the same over the model's longest side"},
                        {"open", "open", "boundary edges of the zero set"},
                        {"components", "components", "of the zero set"}}}},
-          .measure = measure};
+          .measure = measure_figure_9_4};
 }
 
 }  // namespace hermesh

@@ -16,7 +16,7 @@
 namespace hermesh {
 namespace {
 
-constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
+constexpr auto kShownThreads = tbb::global_control::max_allowed_parallelism;
 
 /// Who is timed; of the thesis's two methods the adaptive one is the new, and OpenVDB's mesher stands for the
 /// old.
@@ -36,20 +36,13 @@ std::vector<Method> methods(const Options& parameters) {
           {"openvdb", "openvdb", {}}};
 }
 
-std::vector<double> numbers(const std::string& list) {
-  std::vector<double> result;
-  std::istringstream words(list);
-  for (double number; words >> number;) result.push_back(number);
-  return result;
-}
-
 /// The Happy Buddha as the thesis had it if its file is at hand, else decimated.
 LoadedCase load_buddha(const MeasurementInput& input) {
   return input.tables.load(
       is_at_hand("happy-buddha-full", input.context) ? "happy-buddha-full" : "happy-buddha", input.context);
 }
 
-std::string label_of(const Method& method, std::size_t threads) {
+std::string label_of_method(const Method& method, std::size_t threads) {
   return method.label + (threads == 1 ? ", 1 thread" : ", all threads");
 }
 
@@ -70,7 +63,7 @@ std::vector<MeasuredRow> race_at(double resolution, const LoadedCase& model, con
       Made& kept = made[contenders.size()];
       const auto run = [&, recipe, count] {
         input.context.check();
-        const tbb::global_control limit(kThreads, count);
+        const tbb::global_control limit(kShownThreads, count);
         RunContext child = child_context(input.context, false);
         PolygonMesh mesh;
         const double seconds = timed([&] { mesh = extract(level_set, nullptr, recipe, child).mesh; });
@@ -89,7 +82,7 @@ std::vector<MeasuredRow> race_at(double resolution, const LoadedCase& model, con
   for (std::size_t i = 0; i < contenders.size(); ++i) {
     const Method& method = all[i / counts.size()];
     const std::size_t count = counts[i % counts.size()], first = i - i % counts.size();
-    MeasuredRow row{"extraction", label_of(method, count)};
+    MeasuredRow row{"extraction", label_of_method(method, count)};
     row.values = {{"resolution", resolution},
                   {"threads", count},
                   {"active", level_set.active_voxels()},
@@ -107,13 +100,13 @@ std::vector<MeasuredRow> race_at(double resolution, const LoadedCase& model, con
   return rows;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_figure_9_6(const MeasurementInput& input) {
   std::vector<Method> all = methods(input.parameters);
   std::vector<std::size_t> counts = {1};
-  if (const std::size_t most = tbb::global_control::active_value(kThreads); most > 1) counts.push_back(most);
+  if (const std::size_t most = tbb::global_control::active_value(kShownThreads); most > 1) counts.push_back(most);
   std::erase_if(all, [&](const Method& method) {
     return !input.wants("points", method.label) && std::ranges::none_of(counts, [&](std::size_t count) {
-      return input.wants("extraction", label_of(method, count));
+      return input.wants("extraction", label_of_method(method, count));
     });
   });
   const LoadedCase model = load_buddha(input);
@@ -122,7 +115,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
        std::filesystem::path(model.name).filename().string() + ", " + model.origin,
        {{"triangles", model.mesh.triangle_count()}}}};
   if (all.empty()) return rows;
-  for (const double resolution : numbers(input.parameters.text("resolutions"))) {
+  for (const double resolution : numbers_in(input.parameters.text("resolutions"))) {
     input.context.progress("resolution " + readable(resolution), 0.0);
     std::ranges::move(race_at(resolution, model, input, all, counts), std::back_inserter(rows));
   }
@@ -165,7 +158,7 @@ Measurement figure_9_6_measurement() {
                       .columns = {{"resolution", "voxels", "along the longest side"},
                                   {"points", "points", "of the mesh"}},
                       .printed = false}},
-          .measure = measure};
+          .measure = measure_figure_9_6};
 }
 
 }  // namespace hermesh

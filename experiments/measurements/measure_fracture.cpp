@@ -17,13 +17,6 @@
 namespace hermesh {
 namespace {
 
-std::vector<double> numbers(const std::string& text) {
-  std::istringstream words(text);
-  std::vector<double> result;
-  for (double number; words >> number;) result.push_back(number);
-  return result;
-}
-
 struct Range {
   double least = std::numeric_limits<double>::infinity(), greatest = 0.0;
   /// What was not done took no time, and does not count.
@@ -45,7 +38,7 @@ struct Named {
   const char *label, *method;
   ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::repaired;
 };
-constexpr std::array<Named, 4> kMethods = {
+constexpr std::array<Named, 4> kCutterMethods = {
     {{"labelled", "labelled"},
      {"thesis printed", "thesis", ThesisFractureOptions::Rule::printed},
      {"thesis repaired", "thesis", ThesisFractureOptions::Rule::repaired},
@@ -77,7 +70,7 @@ class FractureBooks {
   /// finest.
   std::vector<double> tolerances_of(const std::string& method) const {
     if (method == "openvdb") return {0.0};
-    return numbers(input_.parameters.text(method == "thesis" ? "thesis_tolerances" : "tolerances"));
+    return numbers_in(input_.parameters.text(method == "thesis" ? "thesis_tolerances" : "tolerances"));
   }
 
   struct Cell {
@@ -89,8 +82,8 @@ class FractureBooks {
   /// The cells that the filter leaves.
   std::vector<Cell> cells_of(const FractureSubject& subject) const {
     std::vector<Cell> cells;
-    for (const double count : numbers(input_.parameters.text("pieces")))
-      for (const Named& method : kMethods)
+    for (const double count : numbers_in(input_.parameters.text("pieces")))
+      for (const Named& method : kCutterMethods)
         for (const double tolerance : tolerances_of(method.method)) {
           std::string label = subject.label + ", " + std::to_string(std::size_t(count)) + ", " + method.label;
           if (tolerance > 0) label += " " + readable(tolerance);

@@ -14,21 +14,7 @@
 namespace hermesh {
 namespace {
 
-std::vector<double> numbers(const std::string& text) {
-  std::istringstream words(text);
-  std::vector<double> result;
-  for (double number; words >> number;) result.push_back(number);
-  return result;
-}
-
-std::vector<std::string> words_of(const std::string& text) {
-  std::istringstream words(text);
-  std::vector<std::string> result;
-  for (std::string word; words >> word;) result.push_back(word);
-  return result;
-}
-
-std::vector<std::string> models() {
+std::vector<std::string> fractured_models() {
   const std::vector<std::string> excluded = {
       "thai-statue",     // its file is not in every data folder, and the stand-in has nine million triangles
       "all-degenerate",  // seven triangles without area enclose nothing: there is nothing to break
@@ -39,15 +25,15 @@ std::vector<std::string> models() {
   return names;
 }
 
-std::vector<std::string> chosen_cases(const std::string& choice) {
+std::vector<std::string> fractured_cases(const std::string& choice) {
   if (choice == "none") return {};
   if (choice == "few") return {"torus", "cad-part"};
-  if (choice == "all") return models();
+  if (choice == "all") return fractured_models();
   return {choice};
 }
 
 /// What some fractures of one object have in common.
-struct Sum {
+struct VolumeSum {
   std::int64_t fractures = 0, pieces = 0, triangles = 0, seams = 0, broken_pieces = 0, crossing = 0,
                unmatched = 0, unbalanced = 0, thinned = 0, changed = 0, forced = 0;
   double volume = 0.0, uncut = 0.0, seconds = 0.0;
@@ -68,7 +54,7 @@ struct Sum {
     uncut = std::max(uncut, std::abs(ledger.pieces_volume / uncut_volume - 1.0));
     seconds += summary.seconds;
   }
-  void add(const Sum& other) {
+  void add(const VolumeSum& other) {
     fractures += other.fractures, pieces += other.pieces, triangles += other.triangles, seams += other.seams;
     broken_pieces += other.broken_pieces, crossing += other.crossing, unmatched += other.unmatched;
     unbalanced += other.unbalanced, thinned += other.thinned, changed += other.changed, forced += other.forced;
@@ -89,8 +75,8 @@ class FractureGuarantee {
 
   /// Coarse ones first: what is cut short has seen all models.
   std::vector<MeasuredRow> run() {
-    for (const double resolution : numbers(input_.parameters.text("resolutions")))
-      for (const std::string& name : chosen_cases(input_.parameters.text("cases")))
+    for (const double resolution : numbers_in(input_.parameters.text("resolutions")))
+      for (const std::string& name : fractured_cases(input_.parameters.text("cases")))
         measure_model(name, resolution);
     for (int i = 0; i < int(input_.parameters.number("trials")); ++i) measure_trial(i);
     return {{"summary", "models", models_.values()}, {"summary", "trials", trials_.values()}};
@@ -102,8 +88,8 @@ class FractureGuarantee {
   };
   std::vector<Broken> fractures_of(const std::string& name) const {
     std::vector<Broken> result;
-    for (const std::string& cutters : words_of(input_.parameters.text("cutters")))
-      for (const std::string& pieces : words_of(input_.parameters.text("pieces"))) {
+    for (const std::string& cutters : words_in(input_.parameters.text("cutters")))
+      for (const std::string& pieces : words_in(input_.parameters.text("pieces"))) {
         const std::string word = cutters + ":" + pieces;
         if (input_.wants("models", name + ", " + word)) result.push_back({name + ", " + word, word});
       }
@@ -134,7 +120,7 @@ class FractureGuarantee {
     if (failure) return input_.emit({{"models", name, {{"resolution", int(resolution)}}, {*failure}}});
     for (const auto& [label, cutters] : all) {
       MeasuredRow row{"models", label, Json::object()};
-      Sum sum;
+      VolumeSum sum;
       for (int i = 0; i < int(input_.parameters.number("seeds")); ++i)
         judge(subject, cutters, input_.seed + std::uint64_t(i), sum, row);
       row.values = sum.values();
@@ -150,7 +136,7 @@ class FractureGuarantee {
     if (!input_.wants("trials", label)) return;
     input_.context.progress(label, 0.0);
     MeasuredRow row{"trials", label, Json::object()};
-    Sum sum;
+    VolumeSum sum;
     Subject subject;
     if (const auto failure = attempt([&] { subject = subject_of(trial.mesh, trial.longest); }))
       row.broken.push_back(*failure);
@@ -164,7 +150,7 @@ class FractureGuarantee {
   }
 
   /// One fracture, by the program's default options. What is wrong with it joins the row's.
-  void judge(const Subject& subject, const std::string& cutters, std::uint64_t seed, Sum& sum,
+  void judge(const Subject& subject, const std::string& cutters, std::uint64_t seed, VolumeSum& sum,
              MeasuredRow& row) {
     if (subject.object.hermite.leaves.empty()) return;
     const auto failure = attempt([&] {
@@ -185,10 +171,10 @@ class FractureGuarantee {
   }
 
   const MeasurementInput& input_;
-  Sum models_, trials_;
+  VolumeSum models_, trials_;
 };
 
-std::vector<MeasuredColumn> columns() {
+std::vector<MeasuredColumn> fracture_guarantee_columns() {
   return {
       {"resolution", "voxels", "along the longest side"},
       {"cutters", "cutters", "and how many"},
@@ -231,9 +217,9 @@ Measurement fracture_guarantee_measurement() {
                          {"pieces", "5 20", "numbers of cells", {"5", "20", "100", "5 20", "5 20 100"}},
                          {"seeds", "1", "fractures of each kind", {}, 1, 1000},
                          {"trials", "16", "random solids", {}, 0, 100000}},
-          .tables = {{"models", "models", "object, cutters", columns(), true, true},
-                     {"trials", "random solids", "solid", columns(), false, true},
-                     {"summary", "all fractures of the run", "what", columns()}},
+          .tables = {{"models", "models", "object, cutters", fracture_guarantee_columns(), true, true},
+                     {"trials", "random solids", "solid", fracture_guarantee_columns(), false, true},
+                     {"summary", "all fractures of the run", "what", fracture_guarantee_columns()}},
           .measure = [](const MeasurementInput& input) { return FractureGuarantee(input).run(); }};
 }
 

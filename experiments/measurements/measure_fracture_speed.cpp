@@ -10,7 +10,7 @@
 namespace hermesh {
 namespace {
 
-constexpr const char* kMethods[] = {"labelled", "thesis", "openvdb"};
+constexpr const char* kFractureWays[] = {"labelled", "thesis", "openvdb"};
 
 MeasuredRow race_of(const FractureSubject& subject, std::size_t pieces, const MeasurementInput& input) {
   RunContext child = child_context(input.context, false);
@@ -23,7 +23,7 @@ MeasuredRow race_of(const FractureSubject& subject, std::size_t pieces, const Me
       make_cutters(parse_cutters("voronoi:" + std::to_string(pieces)), object.hermite, choices, child);
   MeasuredRow row{"speed", subject.label + ", " + std::to_string(pieces), Json::object()};
   std::vector<Contender> contenders;
-  for (const char* method : kMethods)
+  for (const char* method : kFractureWays)
     contenders.push_back({.run =
                               [&, method] {
                                 const FractureSummary summary = run_fracture(
@@ -37,7 +37,7 @@ MeasuredRow race_of(const FractureSubject& subject, std::size_t pieces, const Me
                           .seconds = {}});
   race(contenders);
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const std::string method = kMethods[i];
+    const std::string method = kFractureWays[i];
     row.values[method] = median(contenders[i].seconds);
     row.values[method + "_least"] = std::ranges::min(contenders[i].seconds);
   }
@@ -47,7 +47,7 @@ MeasuredRow race_of(const FractureSubject& subject, std::size_t pieces, const Me
   return row;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_fracture_speed(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   const auto pieces = static_cast<std::size_t>(input.parameters.number("pieces"));
   for (const FractureSubject& subject : fracture_subjects()) {
@@ -60,7 +60,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   return rows;
 }
 
-std::vector<MeasuredColumn> columns() {
+std::vector<MeasuredColumn> fracture_speed_columns() {
   return {{"labelled", "labelled [s]",
            "median; the object's Hermite data and writing left out, as everywhere here"},
           {"labelled_least", "least", "of the rounds"},
@@ -84,8 +84,8 @@ Measurement fracture_speed_measurement() {
                          {"scale", "1", "of the resolutions", {}, 0.05, 4.0},
                          {"rounds", "3", "repetitions", {}, 1, 100},
                          {"budget", "600", "seconds that a method may use up", {}, 1, 1e6}},
-          .tables = {{"speed", "how long does a fracture take?", "object, cells", columns()}},
-          .measure = measure};
+          .tables = {{"speed", "how long does a fracture take?", "object, cells", fracture_speed_columns()}},
+          .measure = measure_fracture_speed};
 }
 
 }  // namespace hermesh

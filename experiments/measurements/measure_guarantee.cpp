@@ -34,7 +34,7 @@ namespace {
 constexpr const char *kGuaranteed = "manifold-dual-contouring", *kOctree = "certified-octree";
 
 /// The gap between the two ends of a certified distance, in voxels.
-constexpr double kGap = 0.001;
+constexpr double kLargestGap = 0.001;
 
 /// Enough for a hundredth of a solid; there are thousands of meshes.
 constexpr std::int64_t kSolidSamples = 20'000;
@@ -85,17 +85,10 @@ std::vector<std::string> chosen_cases(const std::string& choice) {
   return {choice};
 }
 
-std::vector<double> numbers(const std::string& text) {
-  std::istringstream words(text);
-  std::vector<double> result;
-  for (double number; words >> number;) result.push_back(number);
-  return result;
-}
-
 /// Digits of a SHA-256 that are kept: of all meshes of all runs no two agree in them by chance.
-constexpr std::size_t kDigits = 16;
+constexpr std::size_t kDigestDigits = 16;
 
-void set_counts(Json& values, const validation::MeshReport& report) {
+void set_defects(Json& values, const validation::MeshReport& report) {
   values["boundary"] = report.boundary_edges;
   values["non_manifold_edges"] = report.non_manifold_edges;
   values["non_manifold_vertices"] = report.non_manifold_vertices;
@@ -122,11 +115,11 @@ struct Subject {
 };
 
 /// What becomes of one extractor at one tolerance over all subjects of a kind.
-struct Sum {
+struct GuaranteeSum {
   std::int64_t meshes = 0, triangles = 0, self_intersections = 0, violations = 0, beyond = 0;
   double seconds = 0.0, largest_share = 0.0;
 
-  void add(const Sum& other) {
+  void add(const GuaranteeSum& other) {
     meshes += other.meshes;
     triangles += other.triangles;
     self_intersections += other.self_intersections;
@@ -138,7 +131,7 @@ struct Sum {
 };
 
 /// Sums by kind of subject, extractor and tolerance (−1 for extractors that have none).
-using Sums = std::map<std::tuple<std::string, std::string, double>, Sum>;
+using GuaranteeSums = std::map<std::tuple<std::string, std::string, double>, GuaranteeSum>;
 
 /// What becomes of one subject at all tolerances, and of the others.
 struct Overview {
@@ -178,7 +171,7 @@ struct Overview {
     if (excess) result.values["excess"] = *excess;
     result.values["held_percent"] = held;
     result.values["seconds"] = seconds;
-    result.values["digest"] = sha256_of_text(digests).substr(0, kDigits);
+    result.values["digest"] = sha256_of_text(digests).substr(0, kDigestDigits);
     result.broken = broken;
     return result;
   }
@@ -192,11 +185,11 @@ class SubjectMeasurement {
  public:
   explicit SubjectMeasurement(const MeasurementInput& input)
       : input_(input),
-        tolerances_(numbers(input.parameters.text("tolerances"))),
+        tolerances_(numbers_in(input.parameters.text("tolerances"))),
         judged_(input.parameters.is("judge", "yes")) {}
 
   std::vector<MeasuredRow> rows;
-  Sums sums;
+  GuaranteeSums sums;
 
   void measure_model(const std::string& name, double resolution) {
     RunContext child = child_context(input_.context, false);
@@ -303,7 +296,7 @@ class SubjectMeasurement {
     Outcome outcome = run(job_of(subject, contender, tolerance), child);
     values["seconds"] = outcome.extract_seconds;
     values["triangles"] = outcome.made.mesh.triangle_count();
-    values["digest"] = sha256_of_mesh(outcome.made.mesh).substr(0, kDigits);
+    values["digest"] = sha256_of_mesh(outcome.made.mesh).substr(0, kDigestDigits);
     if (tolerance)
       for (const auto& [name, value] : child.figures)
         if (std::ranges::count(kFigures, name) > 0) values[name] = value;
@@ -328,7 +321,7 @@ class SubjectMeasurement {
       job.judge->reference = &reference_;
       job.judge->reference_quads = validation::QuadRule::as_given;
       job.judge->certify = true;
-      job.judge->certify_gap = kGap * subject.voxel_size;
+      job.judge->certify_gap = kLargestGap * subject.voxel_size;
     }
     return job;
   }
@@ -336,7 +329,7 @@ class SubjectMeasurement {
   void describe(Json& values, Outcome& outcome, const Subject& subject, std::optional<double> tolerance,
                 RunContext& context) {
     const validation::MeshReport& report = outcome.judgement.report;
-    set_counts(values, report);
+    set_defects(values, report);
     if (source_) compare_with_source(values, outcome.written, subject, tolerance.value_or(0.0), context);
     if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
@@ -362,7 +355,7 @@ class SubjectMeasurement {
 
   void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
                   bool violates) {
-    Sum& sum = sums[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
+    GuaranteeSum& sum = sums[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
     ++sum.meshes;
     sum.violations += violates;
     sum.triangles += row.values.value("triangles", std::int64_t(0));
@@ -428,7 +421,7 @@ class Guarantee {
       std::rethrow_exception(failure);
     }
     std::vector<MeasuredRow> rows;
-    Sums sums;
+    GuaranteeSums sums;
     for (const SubjectMeasurement& result : results_)
       for (const auto& [key, sum] : result.sums) sums[key].add(sum);
     summarise(sums, input_.parameters.is("judge", "yes"), rows);
@@ -444,7 +437,7 @@ class Guarantee {
   void list_models() {
     for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) {
       if (!input_.wants("models", name)) continue;
-      std::vector<double> resolutions = numbers(input_.parameters.text("resolutions"));
+      std::vector<double> resolutions = numbers_in(input_.parameters.text("resolutions"));
       if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
       for (const double resolution : resolutions)
         work_.push_back({name + " at " + readable(resolution),
@@ -454,7 +447,7 @@ class Guarantee {
 
   /// Every pair of fields has the next one of the sizes.
   void list_noise() {
-    const std::vector<double> sizes = numbers(input_.parameters.text("noise_sizes"));
+    const std::vector<double> sizes = numbers_in(input_.parameters.text("noise_sizes"));
     for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) {
       const std::string label = (i % 2 == 0 ? "uniform " : "whole ") + three_digits(i);
       const int n = int(sizes[std::size_t(i / 2) % sizes.size()]);
@@ -480,7 +473,7 @@ class Guarantee {
 
   void emit(std::size_t i) { input_.emit(std::exchange(results_[i].rows, {})); }
 
-  void summarise(const Sums& sums, bool judged, std::vector<MeasuredRow>& rows) {
+  void summarise(const GuaranteeSums& sums, bool judged, std::vector<MeasuredRow>& rows) {
     std::int64_t violations = 0, meshes = 0;
     for (const auto& [key, sum] : sums) {
       const auto& [kind, extractor, tolerance] = key;

@@ -225,7 +225,7 @@ std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
   return rows;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_hermite_csg(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows = measure_laws(input);
   for (MeasuredRow& row : measure_scans(input)) rows.push_back(std::move(row));
   return rows;
@@ -266,7 +266,7 @@ Measurement hermite_csg_measurement() {
                        {"ledger", "ledger [vx³]",
                         "by how much the volumes of both parts differ from that of the whole: A ∪ B with A ∩ B from A "
                         "with B, A \\ B with A ∩ B from A, B \\ A with A ∩ B from B"}}}},
-          .measure = measure};
+          .measure = measure_hermite_csg};
 }
 
 }  // namespace hermesh

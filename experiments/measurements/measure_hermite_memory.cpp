@@ -80,7 +80,7 @@ struct Size {
   std::size_t leaves;
 };
 
-MeasuredRow row_of(const Size& size, std::size_t band, std::size_t crossings) {
+MeasuredRow row_of_size(const Size& size, std::size_t band, std::size_t crossings) {
   MeasuredRow row{"representations", size.label};
   const auto bytes = double(size.bytes);
   if (!size.printed.is_null()) row.values["printed"] = size.printed;
@@ -138,11 +138,11 @@ std::vector<MeasuredRow> representation_rows(Model& model, const MeasurementInpu
   add_dense_size<FixedVoxel>(kRepresentations[4], 10, hermite, input, sizes);
   sizes.insert(sizes.end(), {sparse_float, sparse});
   std::vector<MeasuredRow> rows;
-  for (const Size& size : sizes) rows.push_back(row_of(size, level_set.active_voxels(), hermite.crossings.size()));
+  for (const Size& size : sizes) rows.push_back(row_of_size(size, level_set.active_voxels(), hermite.crossings.size()));
   return rows;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_hermite_memory(const MeasurementInput& input) {
   Model model(input);
   std::vector<MeasuredRow> rows = uniform_rows(model, input);
   for (MeasuredRow& row : representation_rows(model, input)) rows.push_back(std::move(row));
@@ -176,7 +176,7 @@ Measurement hermite_memory_measurement() {
                        {"leaf", "B/leaf", "allocated bytes a leaf"},
                        {"band", "B/band voxel", "allocated bytes an active voxel of the level set"},
                        {"crossing", "B/crossing", "allocated bytes an edge crossing"}}}},
-          .measure = measure};
+          .measure = measure_hermite_memory};
 }
 
 }  // namespace hermesh

@@ -129,7 +129,7 @@ class Race {
   std::vector<Contender> contenders_;
 };
 
-void append(std::vector<MeasuredRow>& rows, std::vector<MeasuredRow> more) {
+void append_rows(std::vector<MeasuredRow>& rows, std::vector<MeasuredRow> more) {
   std::ranges::move(more, std::back_inserter(rows));
 }
 
@@ -178,7 +178,7 @@ constexpr const char* kUnion[] = {"triad", "sparse: unpack, unite, pack", "spars
                                   "10-byte voxels: unpack to float voxels, unite, pack",
                                   "10-byte voxels: unite packed, operands kept"};
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_hermite_speed(const MeasurementInput& input) {
   const bool memory = input.wants_any("memory", kMemory), threads = input.wants_any("threads", kThreads);
   const bool races_sampling = input.wants_any("sampling", kSampling) || input.wants("memory", triad_label("sampling"));
   const bool races_unions = input.wants_any("union", kUnion) || input.wants("memory", triad_label("union"));
@@ -219,8 +219,8 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
   sampling.add(
       kSampling[5], [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings,
       dense_bytes, floor);
-  if (races_sampling) append(rows, sampling.run());
-  if (threads) append(rows, by_threads(kThreads[1], sample_packed, read + written, repetitions, triad));
+  if (races_sampling) append_rows(rows, sampling.run());
+  if (threads) append_rows(rows, by_threads(kThreads[1], sample_packed, read + written, repetitions, triad));
 
   Race unions("union", repetitions, triad);
   const int unpacked = unions.add(
@@ -248,7 +248,7 @@ std::vector<MeasuredRow> measure(const MeasurementInput& input) {
       kUnion[4],
       [&] { return timed([&] { combine(Boolean::unite, dense_a, dense_b, context); }); }, 2 * crossings, 3 * dense_bytes,
       dense_unpacked);
-  if (races_unions) append(rows, unions.run());
+  if (races_unions) append_rows(rows, unions.run());
   return rows;
 }
 
@@ -290,7 +290,7 @@ Measurement hermite_speed_measurement() {
                        floor_of_shortest,
                        {"speedup", "speedup", "times as fast as with one thread, by medians"}}},
                      {"union", "union of the model with itself moved by a tenth of its length", "contender", columns}},
-          .measure = measure};
+          .measure = measure_hermite_speed};
 }
 
 }  // namespace hermesh

@@ -33,7 +33,7 @@ std::size_t lost_by(const FloatHermite& hermite, RunContext& context) {
   return lost;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_lost_crossings(const MeasurementInput& input) {
   const int resolution = int(input.parameters.number("resolution"));
   const double half = 0.5 * resolution;
   std::vector<MeasuredRow> rows;
@@ -74,7 +74,7 @@ Measurement lost_crossings_measurement() {
                        {"thesis", "lost, thesis", "of these, those that the thesis's layout says to have no data"},
                        {"thesis_share", "share", "their share"},
                        {"fixed", "lost, fixed", "those that the fixed layout of the same size loses"}}}},
-          .measure = measure};
+          .measure = measure_lost_crossings};
 }
 
 }  // namespace hermesh

@@ -269,7 +269,7 @@ std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
   return rows;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_normal_codes(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   for (std::size_t i = 0; i < kNormalCodes.size(); ++i) {
     const std::string label(name(kNormalCodes[i]));
@@ -329,7 +329,7 @@ Measurement normal_codes_measurement() {
                   .columns = {{"error", "error [°]", "middle of the bin"},
                               {"share", "share", "of the sweep's normals that are in the bin"}},
                   .printed = false}},
-      .measure = measure};
+      .measure = measure_normal_codes};
 }
 
 }  // namespace hermesh

@@ -46,7 +46,7 @@ Finished run(const ExperimentInfo& experiment, const std::string& tier, const fs
   return finished;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_reproductions(const MeasurementInput& input) {
   const std::string tier = input.parameters.text("tier");
   const fs::path scratch = fs::temp_directory_path() / ("hermesh-reproductions-" + std::to_string(getpid()));
   std::vector<MeasuredRow> rows;
@@ -87,7 +87,7 @@ Measurement reproductions_measurement() {
               {"rows", "rows", "that it gave"},
              {"pictures", "pictures", "that it drew"},
              {"exit_code", "exit code", "0, or 3 where a promise was found broken"}}}},
-          measure};
+          measure_reproductions};
 }
 
 }  // namespace hermesh

@@ -177,9 +177,9 @@ class Creases {
   std::unique_ptr<TriangleTree> tree_;
 };
 
-class Measurer {
+class SamplingMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input) : input_(input) {}
+  explicit SamplingMeasurer(const MeasurementInput& input) : input_(input) {}
 
   std::vector<MeasuredRow> run() {
     std::size_t swept = 0;
@@ -290,7 +290,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_sampling(const MeasurementInput& input) { return SamplingMeasurer(input).run(); }
 
 }  // namespace
 
@@ -335,7 +335,7 @@ Measurement sampling_measurement() {
                    {"wrong_outside", "outside wrong", "voxels outside that are called inside"},
                    {"wrong", "wrong", "both"},
                    {"wrong_share", "share", "of those judged"}}}},
-      .measure = measure};
+      .measure = measure_sampling};
 }
 
 }  // namespace hermesh

@@ -29,14 +29,14 @@ constexpr double kShortest = 4.0, kLongest = 16.0;
 /// Root mean squares of the noise, voxels.
 constexpr std::array<double, 3> kNoises = {0.03, 0.1, 0.3};
 
-struct Way {
+struct SmoothingWay {
   std::string label, extractor;
   GivenOptions options;
 };
 /// Adaptive dual contouring of the thesis, ours, and OpenVDB's. Hermite data are floats: the thesis's ten
 /// bytes lose crossings where normals point along +z, as they do here, and the noise is what is asked about.
-std::vector<Way> ways() {
-  std::vector<Way> result;
+std::vector<SmoothingWay> smoothing_ways() {
+  std::vector<SmoothingWay> result;
   for (const double threshold : {0.0, 0.05, 0.1, 0.25, 0.5, 2.0, 8.0})
     result.push_back(
         {"adaptive, E " + readable(threshold),
@@ -216,9 +216,9 @@ Roughness roughness_of(const std::vector<double>& heights, int width) {
   return result;
 }
 
-class Measurer {
+class SurfaceNoiseMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input)
+  explicit SurfaceNoiseMeasurer(const MeasurementInput& input)
       : input_(input),
         width_(int(input.parameters.number("width"))),
         surface_(width_, 0.0, input.parameters.number("swell"), input.seed) {}
@@ -234,9 +234,9 @@ class Measurer {
   static std::string label_of(const std::string& way, double noise) { return readable(noise) + ": " + way; }
 
   void run(double noise) {
-    std::vector<Way> all = ways();
+    std::vector<SmoothingWay> all = smoothing_ways();
     std::erase_if(all,
-                  [&](const Way& way) { return !input_.wants("roughness", label_of(way.label, noise)); });
+                  [&](const SmoothingWay& way) { return !input_.wants("roughness", label_of(way.label, noise)); });
     if (all.empty() && !input_.wants("roughness", label_of(kInput, noise))) return;
     surface_ = Surface(width_, noise, input_.parameters.number("swell"), input_.seed);
     const double depth = 12.0 + 2.0 * input_.parameters.number("swell");
@@ -256,7 +256,7 @@ class Measurer {
     if (all.empty()) return;
     const LevelSet level_set = voxelize(
         block, {.chosen = choose(input_.tables.voxelizers, "hermesh"), .voxel_size = 1.0}, input_.context);
-    for (const Way& way : all) {
+    for (const SmoothingWay& way : all) {
       input_.context.progress(way.label, 0.0);
       RunContext child = child_context(input_.context, false);
       const ExtractRecipe recipe{.chosen = choose(input_.tables.extractors, way.extractor, way.options)};
@@ -352,7 +352,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_surface_noise(const MeasurementInput& input) { return SurfaceNoiseMeasurer(input).run(); }
 
 }  // namespace
 
@@ -386,7 +386,7 @@ Measurement surface_noise_measurement() {
                       .columns = {{"threshold", "E [vx²]", "threshold"},
                                   {"noise_kept", "noise kept", "as above"}},
                       .printed = false}},
-          .measure = measure};
+          .measure = measure_surface_noise};
 }
 
 }  // namespace hermesh

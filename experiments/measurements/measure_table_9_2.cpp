@@ -235,7 +235,7 @@ std::vector<MeasuredColumn> beside_columns() {
   return columns;
 }
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_table_9_2(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows, topology;
   if (input.parameters.is("beside", "dragons"))
     for (const char* name : {"dragon", "dragon-res2"}) add_beside_row(name, input, rows);
@@ -352,7 +352,7 @@ Measurement table_9_2_measurement() {
              {"vertices", "nm v", "pinched points: non-manifold vertices"},
              {"genus", "genus", "where the mesh is a closed manifold"}}},
            {"beside", "other models: the share of triangles is the model's", "model", beside_columns()}},
-      .measure = measure};
+      .measure = measure_table_9_2};
 }
 
 }  // namespace hermesh

@@ -17,6 +17,7 @@
 #include "algorithms/extraction/frustum.h"
 #include "experiments/cases/recipes.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/level_set_facts.h"
 #include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
@@ -29,20 +30,20 @@ namespace {
 using Outside = AdaptivityField::Outside;
 
 /// What the thesis printed; nothing without a mask in table 9.4.
-struct Printed {
+struct PrintedMesh {
   std::optional<double> points, seconds;
 };
 struct Treatment {
   const char* label;
   Outside outside;
-  Printed table_9_3, table_9_4;
+  PrintedMesh table_9_3, table_9_4;
 };
 const Treatment kTreatments[] = {
     {"none", Outside::everywhere, {2'366'433, 10.86}, {}},
     {"max simplification outside", Outside::simplify, {1'227'972, 7.05}, {6'845'410, 37.99}},
     {"no mesh outside", Outside::nothing, {1'052'087, 5.64}, {6'196'708, 29.6}}};
 /// What OpenVDB's mesher stands in for: the thesis's old method without a mask, in the caption of table 9.3.
-constexpr Printed kPrintedOld{6'762'593, 28.72};
+constexpr PrintedMesh kPrintedOldMethod{6'762'593, 28.72};
 /// What the threshold is divided by where the points of two resolutions are compared.
 constexpr std::array<double, 5> kDivisors = {1, 2, 4, 6, 8};
 /// How many times as many points a surface takes on a lattice twice as fine if its mesh does not depend on
@@ -62,12 +63,6 @@ Frustum camera(double length) {
           .aspect = 84.0 / 72.0,
           .near = kShare * kFar * length,
           .far = kFar * length};
-}
-
-std::string dimensions_of(const LevelSet& level_set) {
-  std::string text;
-  for (const int width : level_set.dimensions()) text += (text.empty() ? "" : " × ") + std::to_string(width);
-  return text;
 }
 
 LevelSet united(const LevelSet& a, const LevelSet& b) {
@@ -141,7 +136,7 @@ class Growth {
     load(0.5 * length_);
     for (const Treatment* treatment : wanted) base[treatment] = points(*treatment, 1.0);
     load(length_);
-    for (const Treatment* treatment : wanted) measure(*treatment, base[treatment]);
+    for (const Treatment* treatment : wanted) measure_tables_9_3_and_9_4(*treatment, base[treatment]);
     return std::move(rows_);
   }
 
@@ -164,7 +159,7 @@ class Growth {
     return double(extract(level_set_, nullptr, recipe, child).mesh.points.size());
   }
 
-  void measure(const Treatment& treatment, double base) {
+  void measure_tables_9_3_and_9_4(const Treatment& treatment, double base) {
     std::map<double, double> found;  // growth by divisor
     const double most = points(treatment, std::numeric_limits<double>::infinity()) / base;
     for (const double divisor : kDivisors) {
@@ -223,9 +218,9 @@ class Growth {
   std::vector<MeasuredRow> rows_;
 };
 
-class Measurer {
+class Tables93And94Measurer {
  public:
-  explicit Measurer(const MeasurementInput& input)
+  explicit Tables93And94Measurer(const MeasurementInput& input)
       : input_(input),
         resolution_(input.parameters.number("resolution")),
         pixels_(static_cast<int>(input.parameters.number("pixels"))) {}
@@ -238,10 +233,10 @@ class Measurer {
     if (adaptive || guaranteed || input_.wants("input", kMaskLabel)) make_mask();
     const double threshold = 250.0 / input_.parameters.number("units_per_square_voxel");
     if (adaptive)
-      measure("adaptive-dual-contouring",
+      measure_tables_9_3_and_9_4("adaptive-dual-contouring",
               {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
     if (guaranteed)
-      measure("manifold-dual-contouring",
+      measure_tables_9_3_and_9_4("manifold-dual-contouring",
               {{"tolerance", input_.parameters.text("tolerance")}, {"hermite", "level-set"}});
     if (old) measure_old();
     if (!meshes_.empty()) draw();
@@ -284,11 +279,11 @@ class Measurer {
   int repetitions() const { return static_cast<int>(input_.parameters.number("repetitions")); }
 
   /// What is wanted, and always the first, which the others are set against.
-  void measure(const std::string& name, const GivenOptions& options) {
+  void measure_tables_9_3_and_9_4(const std::string& name, const GivenOptions& options) {
     double all = 0.0;
     for (const Treatment& treatment : kTreatments) {
       if (treatment.outside != Outside::everywhere && !input_.wants(name, treatment.label)) continue;
-      MeasuredRow row = measure(name, options, treatment);
+      MeasuredRow row = measure_tables_9_3_and_9_4(name, options, treatment);
       if (treatment.outside == Outside::everywhere) all = row.values["points"].get<double>();
       row.values["share"] = 100.0 * row.values["points"].get<double>() / all;
       rows_.push_back(std::move(row));
@@ -300,7 +295,7 @@ class Measurer {
     const auto [row, mesh] =
         repeat("old-method", kOldLabel, {.chosen = choose(input_.tables.extractors, "openvdb")});
     rows_.push_back(row);
-    if (resolution_ == kTable93Resolution) set_printed(rows_.back(), kPrintedOld);
+    if (resolution_ == kTable93Resolution) set_printed(rows_.back(), kPrintedOldMethod);
     const auto adaptive = std::ranges::find_if(rows_, [](const MeasuredRow& each) {
       return each.table == "adaptive-dual-contouring" && each.label == kTreatments[0].label;
     });
@@ -310,12 +305,12 @@ class Measurer {
           row.values[what].get<double>() / adaptive->values[what].get<double>();
   }
 
-  static void set_printed(MeasuredRow& row, const Printed& printed) {
+  static void set_printed(MeasuredRow& row, const PrintedMesh& printed) {
     if (printed.points) row.values["printed_points"] = *printed.points;
     if (printed.seconds) row.values["printed_seconds"] = *printed.seconds;
   }
 
-  MeasuredRow measure(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
+  MeasuredRow measure_tables_9_3_and_9_4(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
     const AdaptivityField field{.mask = mask_, .outside = treatment.outside, .scale = {}};
     auto [row, mesh] = repeat(name, treatment.label,
                               {.chosen = choose(input_.tables.extractors, name, given), .field = &field});
@@ -387,9 +382,9 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) {
+std::vector<MeasuredRow> measure_tables_9_3_and_9_4(const MeasurementInput& input) {
   if (input.parameters.is("growth", "only")) return Growth(input).run();
-  std::vector<MeasuredRow> rows = Measurer(input).run();
+  std::vector<MeasuredRow> rows = Tables93And94Measurer(input).run();
   if (input.parameters.is("growth", "yes")) std::ranges::move(Growth(input).run(), std::back_inserter(rows));
   return rows;
 }
@@ -461,7 +456,7 @@ Measurement tables_9_3_and_9_4_measurement() {
                    {"most", "at E = 0", "growth where nothing is merged at the finer resolution"},
                    {"exponent", "exponent",
                     "power of the voxel's size that the threshold in square voxels goes with"}}}},
-      .measure = measure};
+      .measure = measure_tables_9_3_and_9_4};
 }
 
 }  // namespace hermesh

@@ -18,27 +18,27 @@
 namespace hermesh {
 namespace {
 
-constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
-constexpr const char* kVoxelizers[] = {"thesis", "hermesh", "openvdb"};
-constexpr const char* kExtractors[] = {"adaptive-dual-contouring", "dual-contouring",
+constexpr auto kAllowedThreads = tbb::global_control::max_allowed_parallelism;
+constexpr const char* kTimedVoxelizers[] = {"thesis", "hermesh", "openvdb"};
+constexpr const char* kTimedExtractors[] = {"adaptive-dual-contouring", "dual-contouring",
                                        "marching-cubes",           "certified-octree",
                                        "manifold-dual-contouring", "openvdb"};
-constexpr const char* kSampling[] = {"level set → sparse, packed", "polygons → sparse, float"};
+constexpr const char* kTimedSampling[] = {"level set → sparse, packed", "polygons → sparse, float"};
 constexpr const char* kBooleans[] = {"union, sparse, packed", "union, thesis's 10-byte voxels",
                                      "union, fixed 10-byte voxels"};
-constexpr const char* kMethods[] = {"labelled", "thesis", "openvdb"};
+constexpr const char* kThreadMethods[] = {"labelled", "thesis", "openvdb"};
 
 /// 1, 2, 4, … and all that there are.
 std::vector<std::size_t> thread_counts() {
   std::vector<std::size_t> counts;
-  const std::size_t most = tbb::global_control::active_value(kThreads);
+  const std::size_t most = tbb::global_control::active_value(kAllowedThreads);
   for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
   counts.push_back(most);
   return counts;
 }
 
 /// One piece of work with every number of threads, in turns; it returns its seconds.
-std::vector<MeasuredRow> by_threads(const std::string& table, const std::string& label,
+std::vector<MeasuredRow> times_by_threads(const std::string& table, const std::string& label,
                                     const std::function<double()>& work, const MeasurementInput& input) {
   const std::vector<std::size_t> counts = thread_counts();
   std::vector<double> cpu(counts.size(), 0.0);
@@ -46,7 +46,7 @@ std::vector<MeasuredRow> by_threads(const std::string& table, const std::string&
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const auto limited = [&, i] {
       input.context.check();
-      const tbb::global_control limit(kThreads, counts[i]);
+      const tbb::global_control limit(kAllowedThreads, counts[i]);
       const double start = process_cpu_seconds();
       const double seconds = work();
       cpu[i] += process_cpu_seconds() - start;
@@ -75,15 +75,15 @@ std::vector<MeasuredRow> by_threads(const std::string& table, const std::string&
   return rows;
 }
 
-class Measurer {
+class ThreadsMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input) : input_(input) {}
+  explicit ThreadsMeasurer(const MeasurementInput& input) : input_(input) {}
 
   std::vector<MeasuredRow> run() {
-    const bool voxelizers = input_.wants_any("voxelizers", kVoxelizers);
-    const bool extractors = input_.wants_any("extractors", kExtractors);
-    const bool hermite = input_.wants_any("hermite", kSampling) || input_.wants_any("hermite", kBooleans);
-    const bool fractures = input_.wants_any("fracture", kMethods);
+    const bool voxelizers = input_.wants_any("voxelizers", kTimedVoxelizers);
+    const bool extractors = input_.wants_any("extractors", kTimedExtractors);
+    const bool hermite = input_.wants_any("hermite", kTimedSampling) || input_.wants_any("hermite", kBooleans);
+    const bool fractures = input_.wants_any("fracture", kThreadMethods);
     if (!voxelizers && !extractors && !hermite && !fractures) return {};
     model_ = input_.tables.load(input_.parameters.text("case"), input_.context).mesh;
     if (voxelizers) race_voxelizers();
@@ -109,17 +109,17 @@ class Measurer {
       RunContext child = child_context(input_.context, false);
       return timed([&] { work(child); });
     };
-    std::ranges::move(by_threads(table, label, once, input_), std::back_inserter(rows_));
+    std::ranges::move(times_by_threads(table, label, once, input_), std::back_inserter(rows_));
   }
 
   void race_voxelizers() {
-    for (const char* name : kVoxelizers)
+    for (const char* name : kTimedVoxelizers)
       add("voxelizers", name,
           [&, chosen = recipe(name)](RunContext& context) { voxelize(model_, chosen, context); });
   }
 
   void race_extractors() {
-    for (const char* name : kExtractors) {
+    for (const char* name : kTimedExtractors) {
       const auto& options = find_variant(input_.tables.extractors, name).options;
       GivenOptions given;
       if (std::ranges::find(options, "hermite", &OptionSpec::name) != options.end())
@@ -132,9 +132,9 @@ class Measurer {
 
   void race_hermite() {
     constexpr NormalCodeId kCode = NormalCodeId::octahedral;
-    add("hermite", kSampling[0],
+    add("hermite", kTimedSampling[0],
         [&](RunContext& context) { sample_level_set_packed(level_set_, 0.0, kCode, context); });
-    add("hermite", kSampling[1],
+    add("hermite", kTimedSampling[1],
         [&](RunContext& context) { sample_polygons(level_set_, 0.0, model_, context); });
     if (!input_.wants_any("hermite", kBooleans)) return;
     RunContext& context = input_.context;
@@ -164,7 +164,7 @@ class Measurer {
     choices.seed = input_.seed;
     const std::string word = "voronoi:" + readable(input_.parameters.number("pieces"));
     const MadeCutters cutters = make_cutters(parse_cutters(word), object.hermite, choices, context);
-    for (const char* method : kMethods) {
+    for (const char* method : kThreadMethods) {
       if (!input_.wants("fracture", method)) continue;
       context.progress(std::string("fracture, ") + method, 0.0);
       const auto once = [&] {
@@ -173,7 +173,7 @@ class Measurer {
                    object, cutters, {.name = method, .options = {}}, [](PieceOutput&&) {}, child)
             .seconds;
       };
-      std::ranges::move(by_threads("fracture", method, once, input_), std::back_inserter(rows_));
+      std::ranges::move(times_by_threads("fracture", method, once, input_), std::back_inserter(rows_));
     }
   }
 
@@ -183,7 +183,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_threads(const MeasurementInput& input) { return ThreadsMeasurer(input).run(); }
 
 }  // namespace
 
@@ -209,7 +209,7 @@ Measurement threads_measurement() {
                  {"hermite", "Hermite data: made, and united with the same moved by a tenth", "operation",
                   columns},
                  {"fracture", "a fracture by plane cuts, meshes included", "method", columns}},
-      .measure = measure};
+      .measure = measure_threads};
 }
 
 }  // namespace hermesh

@@ -53,23 +53,23 @@ LevelSet thinned(const LevelSet& volume, int every) {
 constexpr std::array<const char*, 4> kExtractors = {"marching-cubes", "dual-contouring",
                                                          "manifold-dual-contouring", "openvdb"};
 
-class Measurer {
+class VolumesMeasurer {
  public:
-  explicit Measurer(const MeasurementInput& input)
+  explicit VolumesMeasurer(const MeasurementInput& input)
       : input_(input),
         repetitions_(int(input.parameters.number("repetitions"))),
         crossings_(input.parameters.is("self_intersections", "yes")),
         pixels_(int(input.parameters.number("pixels"))) {}
 
   std::vector<MeasuredRow> run() {
-    for (const Entry& entry : kEntries) measure(entry);
+    for (const Entry& entry : kEntries) measure_volumes(entry);
     return std::move(rows_);
   }
 
  private:
   static constexpr const char* kVolumeLabel = "the volume";
 
-  void measure(const Entry& entry) {
+  void measure_volumes(const Entry& entry) {
     if (!input_.wants(entry.table, kVolumeLabel) && !input_.wants_any(entry.table, kExtractors)) return;
     const LoadedVolume loaded = load_volume(entry.volume, input_.context);
     const bool stand_in = loaded.origin.starts_with("stand-in");
@@ -152,7 +152,7 @@ class Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure(const MeasurementInput& input) { return Measurer(input).run(); }
+std::vector<MeasuredRow> measure_volumes(const MeasurementInput& input) { return VolumesMeasurer(input).run(); }
 
 }  // namespace
 
@@ -182,7 +182,7 @@ Measurement volumes_measurement() {
                      {"mri", "MRI of a brain", "extractor", columns},
                      {"fog", "fog", "extractor", columns},
                      {"level-set", "level set of a cube", "extractor", columns}},
-          .measure = measure};
+          .measure = measure_volumes};
 }
 
 }  // namespace hermesh

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
+#include <sstream>
 
 #include "experiments/accuracy/measure_order.h"
 #include "experiments/harness/cell.h"
@@ -54,6 +56,16 @@ Json row_json(const Json& head, const std::string& table, const std::string& lab
 }
 
 }  // namespace
+
+std::vector<std::string> words_in(const std::string& list) {
+  std::istringstream words(list);
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+std::vector<double> numbers_in(const std::string& list) {
+  std::istringstream numbers(list);
+  return {std::istream_iterator<double>(numbers), {}};
+}
 
 std::vector<std::string> case_choices() {
   std::vector<std::string> names;

@@ -88,6 +88,10 @@ struct Measurement {
   std::function<std::vector<MeasuredRow>(const MeasurementInput&)> measure;
 };
 
+/// What a parameter lists, separated by blanks.
+std::vector<std::string> words_in(const std::string& list);
+std::vector<double> numbers_in(const std::string& list);
+
 /// For a parameter that names a case: what it may be.
 std::vector<std::string> case_choices();
 

@@ -19,7 +19,7 @@
 namespace hermesh {
 namespace {
 
-std::string quoted(const std::string& text) {
+std::string quoted_for_gnuplot(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
   return result + "'";
@@ -166,7 +166,7 @@ void write_axis(std::ostream& out, const char* name, const PlotAxis& axis, bool 
   out << "set " << name << "range [" << (reversed ? axis.high : axis.low) << ':'
       << (reversed ? axis.low : axis.high) << "]\nset " << name << "tics noenhanced (";
   for (std::size_t i = 0; i < axis.ticks.size(); ++i)
-    out << (i ? ", " : "") << quoted(axis.ticks[i].text) << ' ' << axis.ticks[i].at
+    out << (i ? ", " : "") << quoted_for_gnuplot(axis.ticks[i].text) << ' ' << axis.ticks[i].at
         << (axis.ticks[i].text.empty() ? " 1" : "");
   out << ")\n";
 }
@@ -231,7 +231,7 @@ void write_curves(std::ostream& out, const Drawing& drawing, const std::string& 
     const bool joined = drawn.curve.points.size() > 1 && !drawing.plot.categories;
     std::string style = style_of(drawing, i, factor);
     out << separator << data << " with " << (joined ? "linespoints " : "points ") << style << " title "
-        << quoted(drawn.curve.label) << " noenhanced";
+        << quoted_for_gnuplot(drawn.curve.label) << " noenhanced";
     separator = ", \\\n     ";
   }
   out << "\n";
@@ -259,13 +259,13 @@ set tics nomirror out
     out << "set key bmargin center horizontal maxcols " << key.columns
         << " Left reverse samplen 2 spacing 1.25\nset rmargin 3\nset bmargin "
         << 4.0 + 1.4 * double(key.lines) << "\n";
-  out << "set xlabel " << quoted(lies ? plot.y_label : plot.x_label) << " noenhanced\n";
-  if (!lies) out << "set ylabel " << quoted(plot.y_label) << " noenhanced\n";
+  out << "set xlabel " << quoted_for_gnuplot(lies ? plot.y_label : plot.x_label) << " noenhanced\n";
+  if (!lies) out << "set ylabel " << quoted_for_gnuplot(plot.y_label) << " noenhanced\n";
   write_axis(out, lies ? "y" : "x", axis_of_x(drawing), !plot.categories && plot.log_x, lies);
   write_axis(out, lies ? "x" : "y", axis_of_y(drawing), plot.log_y, false);
   // Labels in place of a title, for they may have another size; the last line stands right above the picture.
   const double lines = double(drawing.subtitle.size());
-  out << "set tmargin " << 2.2 + 1.1 * lines << "\nset label 1 " << quoted(drawing.title)
+  out << "set tmargin " << 2.2 + 1.1 * lines << "\nset label 1 " << quoted_for_gnuplot(drawing.title)
       << " at graph 0.5,1 center offset 0," << 1.0 + 1.1 * lines << " noenhanced\n";
   for (const Terminal& terminal : kTerminals) {
     const double wider = key.right ? kRightKey : 1.0;
@@ -275,7 +275,7 @@ set tics nomirror out
         << terminal.height * higher << terminal.unit << ' ' << terminal.rest << "\nset output '" << stem
         << '.' << terminal.extension << "'\n";
     for (std::size_t i = 0; i < drawing.subtitle.size(); ++i)
-      out << "set label " << i + 2 << ' ' << quoted(drawing.subtitle[i]) << " at graph 0.5,1 center offset 0,"
+      out << "set label " << i + 2 << ' ' << quoted_for_gnuplot(drawing.subtitle[i]) << " at graph 0.5,1 center offset 0,"
           << 1.0 + 1.1 * (lines - 1 - double(i)) << " font '," << terminal.small_font
           << "' textcolor rgb '#555555' noenhanced\n";
     write_curves(out, drawing, stem, terminal.mark);

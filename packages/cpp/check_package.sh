@@ -11,8 +11,8 @@ build=$1
 if [ "${2:-}" = --shared ]; then
   # A folder as deep as the other, from where ccache knows the objects.
   build=${build%/}_shared
-  { cmake -S ../.. -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=ON -DHERMESH_BUILD_PROGRAM=OFF \
-      -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_PYTHON=OFF && cmake --build "$build"; } > "$1/shared.log" 2>&1 ||
+  { (cd ../.. && cmake --preset release -B "$build" -DBUILD_SHARED_LIBS=ON -DHERMESH_BUILD_PROGRAM=OFF \
+      -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_PYTHON=OFF) && cmake --build "$build"; } > "$1/shared.log" 2>&1 ||
     { tail -50 "$1/shared.log"; exit 1; }
 fi
 where=$build/package_check

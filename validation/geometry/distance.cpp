@@ -10,7 +10,7 @@
 namespace hermesh::validation {
 namespace {
 
-struct Sums {
+struct DistanceSums {
   double weight = 0.0, first = 0.0, second = 0.0;  // sums of weight, of distance and of its square
   double max_squared = -1.0;
   Eigen::Vector3d worst = Eigen::Vector3d::Zero();
@@ -21,7 +21,7 @@ struct Sums {
     second += w * squared;
     if (squared > max_squared) max_squared = squared, worst = point;
   }
-  void append(const Sums& later) {
+  void append(const DistanceSums& later) {
     weight += later.weight;
     first += later.first;
     second += later.second;
@@ -32,9 +32,9 @@ struct Sums {
 // point(i) and weight(i) for i < count. Neighbours in the list tend to be neighbours in space, so that the
 // answer of one query is a good first guess for the next.
 template <class Point, class Weight>
-Sums sum_distances(std::size_t count, const Point& point, const Weight& weight, const TriangleTree& to,
+DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& weight, const TriangleTree& to,
                    const RunContext& context) {
-  const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, Sums sums) {
+  const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, DistanceSums sums) {
     context.check();
     std::uint32_t guess = 0;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -45,21 +45,21 @@ Sums sum_distances(std::size_t count, const Point& point, const Weight& weight, 
     }
     return sums;
   };
-  const auto join = [](Sums left, const Sums& right) {
+  const auto join = [](DistanceSums left, const DistanceSums& right) {
     left.append(right);
     return left;
   };
-  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, count, 512), Sums{}, add_range,
+  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, count, 512), DistanceSums{}, add_range,
                                             join);
 }
 
-void fill_means(const Sums& sums, Distances& result) {
+void fill_means(const DistanceSums& sums, Distances& result) {
   if (!(sums.weight > 0.0)) return;
   result.mean = sums.first / sums.weight;
   result.rms = std::sqrt(sums.second / sums.weight);
 }
 
-void fill_maximum(const Sums& sums, Distances& result) {
+void fill_maximum(const DistanceSums& sums, Distances& result) {
   if (sums.max_squared < 0.0) return;
   result.max = std::sqrt(sums.max_squared);
   result.worst = sums.worst;
@@ -83,9 +83,9 @@ Distances sampled_distances(const TriangleSoup& from, const TriangleTree& to, st
   const SurfaceSamples surface(from, samples);
   const auto one = [](std::size_t) { return 1.0; };
   const auto used_point = [&](std::size_t i) { return from.points[used[i]]; };
-  Sums at_points = sum_distances(used.size(), used_point, one, to, context);
+  DistanceSums at_points = sum_distances(used.size(), used_point, one, to, context);
   const auto sample = [&](std::size_t i) { return surface[std::int64_t(i)]; };
-  const Sums over_area = sum_distances(std::size_t(surface.size()), sample, one, to, context);
+  const DistanceSums over_area = sum_distances(std::size_t(surface.size()), sample, one, to, context);
   Distances result;
   result.samples = std::int64_t(used.size()) + surface.size();
   fill_means(surface.size() > 0 ? over_area : at_points, result);
@@ -98,7 +98,7 @@ Distances point_distances(const std::vector<WeightedPoint>& points, const Triang
                           RunContext& context) {
   const auto point = [&](std::size_t i) { return points[i].point; };
   const auto weight = [&](std::size_t i) { return points[i].weight; };
-  const Sums sums = sum_distances(points.size(), point, weight, to, context);
+  const DistanceSums sums = sum_distances(points.size(), point, weight, to, context);
   Distances result;
   result.samples = std::int64_t(points.size());
   fill_means(sums, result);

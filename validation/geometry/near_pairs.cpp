@@ -36,9 +36,9 @@ bool pierces(const Vector3d& p, const Vector3d& q, const Corners& t, const Vecto
   return true;
 }
 
-class Search {
+class NearPairSearch {
  public:
-  Search(const TriangleSoup& soup, const TriangleTree& tree, double reach)
+  NearPairSearch(const TriangleSoup& soup, const TriangleTree& tree, double reach)
       : soup_(soup), tree_(tree), reach_(reach), squared_(reach * reach) {}
 
   void search(std::size_t slot, Pairs& pairs) const {
@@ -96,7 +96,7 @@ class Search {
 
 Pairs near_pairs(const TriangleSoup& soup, const TriangleTree& tree, double reach,
                  const RunContext& context) {
-  const Search search(soup, tree, reach);
+  const NearPairSearch search(soup, tree, reach);
   const auto search_range = [&](const tbb::blocked_range<std::size_t>& range, Pairs pairs) {
     context.check();
     for (std::size_t slot = range.begin(); slot < range.end(); ++slot) search.search(slot, pairs);

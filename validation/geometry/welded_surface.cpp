@@ -12,16 +12,16 @@
 namespace hermesh::validation {
 namespace {
 
-bool comes_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+bool precedes(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   if (a.x() != b.x()) return a.x() < b.x();
   return a.y() != b.y() ? a.y() < b.y() : a.z() < b.z();
 }
 
 // One side of a triangle, by its ends in increasing order.
-struct Side {
+struct TriangleSide {
   std::uint32_t low, high, triangle;
   int corner;
-  bool operator<(const Side& o) const {
+  bool operator<(const TriangleSide& o) const {
     if (low != o.low) return low < o.low;
     return high != o.high ? high < o.high : triangle < o.triangle;
   }
@@ -39,7 +39,7 @@ void WeldedSurface::weld(const TriangleSoup& soup) {
   std::iota(order.begin(), order.end(), 0u);
   tbb::parallel_sort(order.begin(), order.end(), [&soup](std::uint32_t a, std::uint32_t b) {
     const Eigen::Vector3d &p = soup.points[a], &q = soup.points[b];
-    return p == q ? a < b : comes_before(p, q);
+    return p == q ? a < b : precedes(p, q);
   });
   for (std::uint32_t p : order) {
     if (points_.empty() || points_.back() != soup.points[p]) points_.push_back(soup.points[p]);
@@ -53,7 +53,7 @@ void WeldedSurface::weld(const TriangleSoup& soup) {
 }
 
 void WeldedSurface::connect() {
-  std::vector<Side> sides;
+  std::vector<TriangleSide> sides;
   sides.reserve(3 * triangles_.size());
   for (std::uint32_t t = 0; t < triangles_.size(); ++t)
     for (int k = 0; k < 3; ++k) {

@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 /// What shape() of a triangle a collapse may make at least, unless there was a worse one in its place.
 constexpr double kPoorShape = 0.05;
 /// A triangle may not turn by more than some 84 degrees in one collapse.
-constexpr double kLeastCosine = 0.1;
+constexpr double kLeastCosineToOld = 0.1;
 /// How far a triangle of a bold collapse, where nobody looks at what is below, may face away from the fine triangle
 /// that it began as: some 72 degrees. A triangle that faced the wrong way before need not do so for ever then.
 constexpr double kLeastCosineToFine = 0.3;
@@ -118,7 +118,7 @@ bool CubeCollapse::is_well_shaped(const Collapse::NewFace& made, const Corners& 
   const Vector3d normal_before = kind_ == Collapses::bold
                                      ? mesh_.fine->normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
                                      : (before[1] - before[0]).cross(before[2] - before[0]);
-  const double size = made.normal.norm(), least = kind_ == Collapses::bold ? kLeastCosineToFine : kLeastCosine;
+  const double size = made.normal.norm(), least = kind_ == Collapses::bold ? kLeastCosineToFine : kLeastCosineToOld;
   constexpr double kDegenerate = 1e-9;  // of its sides squared
   if (size <= kDegenerate * ((made.at[1] - made.at[0]).squaredNorm() + (made.at[2] - made.at[0]).squaredNorm()))
     return false;

@@ -44,7 +44,7 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
 namespace {
 
 /// The options that the collapses have beyond those of all certified extractors.
-const OptionTable<Nearness>& option_table() {
+const OptionTable<Nearness>& nearness_option_table() {
   static const auto table =
       OptionTable<Nearness>()
           .number("moment", &Nearness::moment, {.maximum = 1e30},
@@ -60,7 +60,7 @@ const OptionTable<Nearness>& option_table() {
 }  // namespace
 
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
-  ManifoldDualContouringOptions options{.nearness = option_table().read(input.options),
+  ManifoldDualContouringOptions options{.nearness = nearness_option_table().read(input.options),
                                         .uniform = read_dual_contouring_options(input)};
   return contour_certified(input, "manifold-dual-contouring",
                            options.uniform.needs_normals(),
@@ -72,7 +72,7 @@ PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
   std::vector<OptionSpec> options = tolerance_options();
-  for (OptionSpec& option : option_table().specs()) options.push_back(std::move(option));
+  for (OptionSpec& option : nearness_option_table().specs()) options.push_back(std::move(option));
   for (OptionSpec& option : dual_contouring_options()) options.push_back(std::move(option));
   return options;
 }

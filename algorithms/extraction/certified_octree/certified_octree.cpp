@@ -55,7 +55,7 @@ PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptio
 namespace {
 
 /// The options that the octree has beyond those of all certified extractors.
-const OptionTable<CertifiedOctreeOptions>& option_table() {
+const OptionTable<CertifiedOctreeOptions>& octree_option_table() {
   using Options = CertifiedOctreeOptions;
   static const auto table =
       OptionTable<Options>()
@@ -71,7 +71,7 @@ const OptionTable<CertifiedOctreeOptions>& option_table() {
 }  // namespace
 
 PolygonMesh certified_octree(const ExtractionInput& input) {
-  CertifiedOctreeOptions options = option_table().read(input.options);
+  CertifiedOctreeOptions options = octree_option_table().read(input.options);
   options.uniform = read_placement_options(input);
   return contour_certified(input, "certified-octree",
                            options.uniform.needs_normals(),
@@ -83,7 +83,7 @@ PolygonMesh certified_octree(const ExtractionInput& input) {
 
 std::vector<OptionSpec> certified_octree_options() {
   std::vector<OptionSpec> options = tolerance_options();
-  for (OptionSpec& option : option_table().specs()) options.push_back(std::move(option));
+  for (OptionSpec& option : octree_option_table().specs()) options.push_back(std::move(option));
   for (OptionSpec& option : dual_contouring_options())
     if (option.name != "reach") options.push_back(std::move(option));
   return options;

@@ -12,7 +12,7 @@
 namespace hermesh {
 namespace {
 
-constexpr BlockMask kAll = [] {
+constexpr BlockMask kAllCells = [] {
   BlockMask mask;
   mask.fill(~std::uint64_t{0});
   return mask;
@@ -52,9 +52,9 @@ RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionS
       context_(context),
       unproven_(cells_.size()),
       any_unproven_(cells_.size()),
-      changed_(filled(cells_.size(), kAll, context)),
-      split_cells_(filled(cells_.size(), kAll, context)),
-      dirty_(filled(cells_.size(), kAll, context)),
+      changed_(filled(cells_.size(), kAllCells, context)),
+      split_cells_(filled(cells_.size(), kAllCells, context)),
+      dirty_(filled(cells_.size(), kAllCells, context)),
       open_(shell ? cells_.size() : 0),
       loose_(slabs ? cells_.size() : 0) {
   // Nothing is looked at then, so no turns are needed.

@@ -20,7 +20,7 @@ using Eigen::Vector3f;
 
 /// What slabs are widened by, in voxels: far above what single precision makes of places within a block and
 /// in the file, and beyond what kUnit does.
-constexpr float kRounding = 1e-3f;
+constexpr float kSlabRounding = 1e-3f;
 /// Places in a block are kept in 16 bits, in this many parts of a voxel, for there are as many as crossings.
 constexpr float kUnit = 4096;
 
@@ -213,7 +213,7 @@ void RegionSlabs::begin(const Region& cube) {
     slab.low = std::min(slab.low, height);
     slab.high = std::max(slab.high, height);
   });
-  slabs_[regions_.number(cube)] = {slab.low - kRounding, slab.high + kRounding};
+  slabs_[regions_.number(cube)] = {slab.low - kSlabRounding, slab.high + kSlabRounding};
 }
 
 /// Widens a cube's slab to contain these places.
@@ -226,8 +226,8 @@ void RegionSlabs::widen(const Region& cube, std::span<const Vector3d> places) {
     high = std::max(high, height);
   }
   Slab& slab = slabs_[regions_.number(cube)];
-  replace_if(slab.low, static_cast<float>(low) - kRounding, std::less<>());
-  replace_if(slab.high, static_cast<float>(high) + kRounding, std::greater<>());
+  replace_if(slab.low, static_cast<float>(low) - kSlabRounding, std::less<>());
+  replace_if(slab.high, static_cast<float>(high) + kSlabRounding, std::greater<>());
 }
 
 /// A loose polygon's corners, and the places of a fan in its envelope: the crossing and a place on each face;
@@ -363,7 +363,7 @@ bool RegionSlabs::holds(const RegionPolygon& loose) const {
     for (std::size_t i = 0; i < n; ++i) add(corners[i].cast<float>());
     // Polygons of S in the box may have corners in the cells around it.
     for_each_near(block, around, add);
-    slab = {slab.low - kRounding, slab.high + kRounding};
+    slab = {slab.low - kSlabRounding, slab.high + kSlabRounding};
     const auto polygon = std::span(corners).first(n);
     if (are_near_parts(block, box, coordinates(loose.crossing.sample), up, slab, polygon, tolerance) ||
         all_within(polygon, Corners(box, up, slab).all(), tolerance))

@@ -10,9 +10,9 @@ namespace {
 using Eigen::Vector3d;
 
 /// The least cosine of the angle between a pillar and the normal of a triangle at its foot.
-constexpr double kLeastCosine = 0.3;
+constexpr double kLeastLean = 0.3;
 
-constexpr double kRounding = ShellPrism::kRounding;
+constexpr double kPrismRounding = ShellPrism::kRounding;
 using Places = std::array<OverTriangle::Place, 3>;
 
 enum class Walls { outer, inner };
@@ -25,7 +25,7 @@ struct Heights {
 
 /// Where a triangle lies in the prism that is as wide, or as narrow, as the leans of a side's two pillars
 /// allow at each height: above the triangle's plane that is one plane, below it another. What reaches less
-/// than kRounding into it is not there.
+/// than kPrismRounding into it is not there.
 Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
   Heights heights;
   for (const double up : {1.0, -1.0}) {
@@ -34,7 +34,7 @@ Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls)
       const auto [least, most] = std::minmax(prism.leans()[side][0], prism.leans()[side][1]);
       const double lean = (walls == Walls::outer) == (up > 0) ? most : least;
       // Skewed by the lean, the wall stands upright and the triangle can be clipped as over a flat one.
-      for (auto& place : places) place[static_cast<int>(side)] += kRounding - lean * place[3];
+      for (auto& place : places) place[static_cast<int>(side)] += kPrismRounding - lean * place[3];
     }
     const ClippedTriangle part(places);
     double nearest = prism.height(), farthest = -1;
@@ -61,7 +61,7 @@ ShellPrism::ShellPrism(const Corners& corners, const std::array<Vector3d, 3>& pi
     : over_(corners), pillars_(pillars), height_(height) {
   if (over_.degenerate()) return;
   for (const Vector3d& pillar : pillars_)
-    if (!(pillar.dot(over_.normal()) >= kLeastCosine)) return;
+    if (!(pillar.dot(over_.normal()) >= kLeastLean)) return;
   for (std::size_t side = 0; side < 3; ++side)
     for (std::size_t end = 0; end < 2; ++end) leans_[side][end] = lean(pillars_[(side + end) % 3], side);
   lid_ = through(corners, height_);
@@ -91,7 +91,7 @@ bool ShellPrism::is_unfolded(const Corners& corners) const {
   return std::ranges::all_of(pillars_, [&](const Vector3d& pillar) {
     return constant.dot(pillar) - height_ * std::abs(linear.dot(pillar)) -
                height_ * height_ * std::abs(square.dot(pillar)) >
-           kRounding * (e.squaredNorm() + f.squaredNorm());
+           kPrismRounding * (e.squaredNorm() + f.squaredNorm());
   });
 }
 
@@ -99,7 +99,7 @@ bool ShellPrism::is_unfolded(const Corners& corners) const {
 bool ShellPrism::keeps_its_corners(const Corners& corners) const {
   for (std::size_t i = 0; i < 3; ++i)
     for (const double up : {height_, -height_})
-      if (!(beyond_wall(over_(corners[i] + up * pillars_[i]), (i + 1) % 3) < -kRounding)) return false;
+      if (!(beyond_wall(over_(corners[i] + up * pillars_[i]), (i + 1) % 3) < -kPrismRounding)) return false;
   return true;
 }
 
@@ -113,8 +113,8 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
   // Boxes rule out most triangles, planes most others; only the rest is clipped.
   const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
   const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
-  if ((lowest.array() > prism.box().max().array() + kRounding).any() ||
-      (highest.array() < prism.box().min().array() - kRounding).any())
+  if ((lowest.array() > prism.box().max().array() + kPrismRounding).any() ||
+      (highest.array() < prism.box().min().array() - kPrismRounding).any())
     return Meeting::none;
   const Places places = places_of(prism, triangle);
   // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are
@@ -128,24 +128,24 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
     beyond[4][corner] = prism.bottom().signedDistance(triangle[corner]);
   }
   for (std::size_t side = 0; side < 3; ++side)
-    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kRounding; })) return Meeting::none;
+    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kPrismRounding; })) return Meeting::none;
   const auto above = std::ranges::minmax(beyond[3]), below = std::ranges::minmax(beyond[4]);
-  if (above.min > kRounding || below.min > kRounding) return Meeting::none;
+  if (above.min > kPrismRounding || below.min > kPrismRounding) return Meeting::none;
   const Vector3d normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   const bool faces =
       std::ranges::all_of(prism.pillars(), [&](const Vector3d& pillar) { return normal.dot(pillar) > 0; });
-  if (faces && tolerance >= prism.height() && above.max < -kRounding && below.max < -kRounding)
+  if (faces && tolerance >= prism.height() && above.max < -kPrismRounding && below.max < -kPrismRounding)
     return Meeting::good;
   for (std::size_t i = 0; i < 5; ++i)
     for (std::size_t j = i + 1; j < 5; ++j) {
       const auto by = [&](std::size_t corner) { return beyond[i][corner] + beyond[j][corner]; };
-      if (std::min({by(0), by(1), by(2)}) > kRounding) return Meeting::none;
+      if (std::min({by(0), by(1), by(2)}) > kPrismRounding) return Meeting::none;
     }
   const Heights heights = heights_in(prism, places, Walls::outer);
   if (heights.empty()) return Meeting::none;
   // Heights are measured along the normal: the lid is least_lid() of the height up at its lowest, and what is
   // no higher than that share of the tolerance is no farther than the tolerance along any line.
-  const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kRounding;
+  const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kPrismRounding;
   return faces && heights.lowest >= -most && heights.highest <= most ? Meeting::good : Meeting::bad;
 }
 

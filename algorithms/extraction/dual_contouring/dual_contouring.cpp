@@ -198,7 +198,7 @@ PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions
 namespace {
 
 /// The options that set DualContouringOptions.
-const OptionTable<DualContouringOptions>& option_table() {
+const OptionTable<DualContouringOptions>& contouring_option_table() {
   using Options = DualContouringOptions;
   using Placement = Options::Placement;
   static const auto table =
@@ -228,11 +228,11 @@ DualContouringOptions read(const OptionTable<DualContouringOptions>& table, cons
 }  // namespace
 
 DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
-  return read(option_table(), input);
+  return read(contouring_option_table(), input);
 }
 
 DualContouringOptions read_placement_options(const ExtractionInput& input) {
-  return read(option_table().without("reach"), input);
+  return read(contouring_option_table().without("reach"), input);
 }
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
@@ -246,7 +246,7 @@ PolygonMesh dual_contouring(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> dual_contouring_options() {
-  std::vector<OptionSpec> options = option_table().specs();
+  std::vector<OptionSpec> options = contouring_option_table().specs();
   const std::vector<OptionSpec> of_hermite = hermite_options();
   options.insert(options.begin() + 1, of_hermite.begin(), of_hermite.end());
   return options;

@@ -9,7 +9,7 @@ namespace {
 using Corner = EnvelopeCorner;
 
 /// What an area whose terms are of the order of one must exceed to be called positive: far above rounding.
-constexpr double kPositive = 1e-5;
+constexpr double kLeastTurn = 1e-5;
 /// How far heights keep from the ends of the edge, in lengths of the edge.
 constexpr double kMargin = 1e-4;
 
@@ -31,7 +31,7 @@ std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
   if (!(share > -kMargin && share < 1 - kMargin)) return std::nullopt;
   if (!(q.h > share * beyond.h + kMargin && q.h < 1 - share * (1 - beyond.h) - kMargin)) return std::nullopt;
   const double wa = cross(c, other), wc = cross(other, a), wo = cross(a, c), sum = wa + wc + wo;
-  if (std::abs(sum) < kPositive) return std::nullopt;
+  if (std::abs(sum) < kLeastTurn) return std::nullopt;
   const double height = (wa * a.h + wc * c.h + wo * other.h) / sum;
   if (!(height > kMargin && height < 1 - kMargin)) return std::nullopt;
   return height;
@@ -42,7 +42,7 @@ std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
 EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
   // The corners must go around the edge, each less than half a turn on, or there is no envelope to be in.
   for (int i = 0; i < 4; ++i)
-    if (cross(r[i], r[(i + 1) % 4]) < kPositive) return {.height = hit};
+    if (cross(r[i], r[(i + 1) % 4]) < kLeastTurn) return {.height = hit};
   std::array<std::optional<double>, 2> heights;
   for (int d = 0; d < 2; ++d) heights[d] = height_if_safe(r, d);
   if (!heights[0] && !heights[1]) return {.height = hit};
@@ -62,7 +62,7 @@ EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
 
 EnvelopeCut cut_triangle(const std::array<Corner, 3>& r, double hit) {
   const double wa = cross(r[1], r[2]), wb = cross(r[2], r[0]), wc = cross(r[0], r[1]);
-  if (wa < kPositive || wb < kPositive || wc < kPositive) return {.height = hit};
+  if (wa < kLeastTurn || wb < kLeastTurn || wc < kLeastTurn) return {.height = hit};
   // Barycentric weights: the edge stands at the origin of (u, v).
   const double height = (wa * r[0].h + wb * r[1].h + wc * r[2].h) / (wa + wb + wc);
   if (!(height > kMargin && height < 1 - kMargin)) return {.height = hit};

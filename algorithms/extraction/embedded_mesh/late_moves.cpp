@@ -19,7 +19,7 @@ constexpr double kLeastArea = 1e-4;
 constexpr double kFulfilled = 1e-3;
 
 /// More than rounding to the file's precision may move a place, in voxels: a place is tried as the file will hold it.
-constexpr double kRounding = 0.05;
+constexpr double kBoxMargin = 0.05;
 
 /// How often all points are tried: one move makes room for another.
 constexpr int kSweeps = 2;
@@ -47,8 +47,8 @@ class Star {
     for (const Vector3d& place : places) box_.add(place);
     for (const Triangle& t : star_)
       for (const std::uint32_t p : t) box_.add(points_[p]);
-    box_.lower.array() -= kRounding;
-    box_.upper.array() += kRounding;
+    box_.lower.array() -= kBoxMargin;
+    box_.upper.array() += kBoxMargin;
   }
 
   /// Moves the point, if the mesh stays embedded. The mesh itself is changed for the trial, and changed back: no other

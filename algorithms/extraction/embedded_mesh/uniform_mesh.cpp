@@ -22,13 +22,13 @@ using Eigen::Vector3d;
 
 /// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and root mean
 /// square: next to a feature that passes outside.
-constexpr double kWorthLeaving = 0.03;
+constexpr double kWorthLeavingCell = 0.03;
 
 /// A place within the cell that is as near to the planes as this will do, in voxels and root mean square.
 constexpr double kGoodEnough = 0.005;
 
 /// What a determinant whose terms are of the order of one must exceed to be called positive: far above rounding.
-constexpr double kPositive = 1e-5;
+constexpr double kLeastVolume = 1e-5;
 
 /// Six times the signed volume of a tetrahedron, voxels cubed.
 double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
@@ -88,9 +88,9 @@ class CellRecords {
 };
 
 /// Makes the uniform mesh step by step: cells, points, moves by the rule of tetrahedra, polygons, late moves.
-class Contourer {
+class UniformContourer {
  public:
-  Contourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
+  UniformContourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
             RunContext& context, PolygonEdges* numbers)
       : numbers_(numbers),
         cells_(grid, context),
@@ -230,7 +230,7 @@ class Contourer {
                           {.truncation = static_cast<float>(options_.truncation),
                            .smooth_share = static_cast<float>(options_.smooth_share()),
                            .margin = static_cast<float>(cells_.margin()),
-                           .most_error = static_cast<float>(reach_ > 0 ? kWorthLeaving * kWorthLeaving : 1e6),
+                           .most_error = static_cast<float>(reach_ > 0 ? kWorthLeavingCell * kWorthLeavingCell : 1e6),
                            .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
                           out, is_placed.data());
     }
@@ -296,7 +296,7 @@ class Contourer {
     const bool meet = reach_ > 0 && !options_.linear_crossings && qef.planes_meet(free, nearest);
     if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return mass + share * (nearest - mass);
     const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
-    if (reach_ > 0 && (qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes() ||
+    if (reach_ > 0 && (qef.error(held) > kWorthLeavingCell * kWorthLeavingCell * qef.planes() ||
                        (meet && qef.planes_meet(free, held)))) {
       const auto is_near = [&](const Vector3d& p) {
         return (p - corner - Vector3d::Constant(0.5)).cwiseAbs().maxCoeff() <= 0.5 + reach_;
@@ -383,7 +383,7 @@ class Contourer {
         };
         // Corners run counter-clockwise for a viewer whom the face's axis points at.
         const double v = volume(at(corners[i]), at(corners[(i + 1) % 4]), point, beside[face]);
-        if ((face & 1 ? v : -v) < kPositive) return false;
+        if ((face & 1 ? v : -v) < kLeastVolume) return false;
       }
     }
     return true;
@@ -474,7 +474,7 @@ struct UniformCells::Made {
 
   // Before the contourer, which refers to it.
   const HermiteCells grid;
-  Contourer contourer;
+  UniformContourer contourer;
   LargeArray<BlockMask> placed;  ///< cells of each block whose points are there
 };
 
@@ -511,7 +511,7 @@ EdgePolygons UniformCells::connect(const EdgeMasks* edges, RunContext& context) 
 
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context, PolygonEdges* edges) {
-  return Contourer(grid, options, file, context, edges).run(context);
+  return UniformContourer(grid, options, file, context, edges).run(context);
 }
 
 }  // namespace hermesh

@@ -62,7 +62,7 @@ void change_sign(Voxel& voxel) {
 }
 /// Calls f(number) for every set bit.
 template <class F>
-void for_each_bit(std::uint64_t word, F&& f) {
+void for_each_bit_of_word(std::uint64_t word, F&& f) {
   for (; word != 0; word &= word - 1) f(static_cast<Index>(std::countr_zero(word)));
 }
 
@@ -236,13 +236,13 @@ class Merge {
       const std::uint64_t inside_a = signs(to + 64 * x), inside = rule_.inside(inside_a, signs(from + 64 * x));
       // A voxel is active if an edge of it is still crossed.
       word = 0;
-      for_each_bit(either, [&](Index i) {
+      for_each_bit_of_word(either, [&](Index i) {
         Voxel& voxel = to[64 * x + i];
         Rules::combine(rule_, voxel, from[64 * x + i]);
         word |= std::uint64_t{voxel.crosses(0) || voxel.crosses(1) || voxel.crosses(2)} << i;
       });
       // Where neither operand has a crossing a voxel is nothing but its sign, and most signs stay.
-      for_each_bit((inside ^ inside_a) & ~either, [&](Index i) { change_sign(to[64 * x + i]); });
+      for_each_bit_of_word((inside ^ inside_a) & ~either, [&](Index i) { change_sign(to[64 * x + i]); });
     }
     a.setValueMask(active);
   }
@@ -358,12 +358,12 @@ DenseHermite<Voxel> complement(DenseHermite<Voxel> hermite, RunContext& context)
   return with_tree<Voxel>(hermite.placement, hermite.normal_code, tree);
 }
 
-#define HERMESH_INSTANTIATE(Voxel)                                                                      \
+#define HERMESH_INSTANTIATE_COMBINE(Voxel)                                                                      \
   template DenseHermite<Voxel> combine(Boolean, DenseHermite<Voxel>, DenseHermite<Voxel>, RunContext&); \
   template DenseHermite<Voxel> complement(DenseHermite<Voxel>, RunContext&);
-HERMESH_INSTANTIATE(FloatVoxel)
-HERMESH_INSTANTIATE(DirectedVoxel)
-HERMESH_INSTANTIATE(ThesisVoxel)
-HERMESH_INSTANTIATE(FixedVoxel)
+HERMESH_INSTANTIATE_COMBINE(FloatVoxel)
+HERMESH_INSTANTIATE_COMBINE(DirectedVoxel)
+HERMESH_INSTANTIATE_COMBINE(ThesisVoxel)
+HERMESH_INSTANTIATE_COMBINE(FixedVoxel)
 
 }  // namespace hermesh

@@ -252,16 +252,16 @@ void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context) {
 }
 
 // OpenVDB trees take seconds to compile, so the four are made here and nowhere else.
-#define HERMESH_INSTANTIATE(Voxel)                                                              \
+#define HERMESH_INSTANTIATE_DENSE(Voxel)                                                              \
   template struct DenseHermite<Voxel>;                                                          \
   template DenseHermite<Voxel> to_dense<Voxel>(const FloatHermite&, RunContext&, NormalCodeId); \
   template DenseHermite<Voxel> to_dense<Voxel>(const PackedHermite&, RunContext&);              \
   template FloatHermite to_sparse(const DenseHermite<Voxel>&, RunContext&, std::size_t*);       \
   template void check_consistent(const DenseHermite<Voxel>&, RunContext&);
-HERMESH_INSTANTIATE(FloatVoxel)
-HERMESH_INSTANTIATE(DirectedVoxel)
-HERMESH_INSTANTIATE(ThesisVoxel)
-HERMESH_INSTANTIATE(FixedVoxel)
+HERMESH_INSTANTIATE_DENSE(FloatVoxel)
+HERMESH_INSTANTIATE_DENSE(DirectedVoxel)
+HERMESH_INSTANTIATE_DENSE(ThesisVoxel)
+HERMESH_INSTANTIATE_DENSE(FixedVoxel)
 
 void register_hermite_grids() {
   // Registering a type a second time is an error in OpenVDB.

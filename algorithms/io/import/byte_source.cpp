@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 /// Most bytes that a byte of gzip data unpacks to: deflate codes at most 258 bytes by two bits.
 constexpr std::uint64_t kLargestRatio = 1032;
-constexpr std::size_t kPart = std::size_t{1} << 24;
+constexpr std::size_t kLargestRead = std::size_t{1} << 24;
 
 }  // namespace
 
@@ -48,7 +48,7 @@ void ByteSource::fail(const std::string& what) const { throw Error(path_.string(
 
 std::size_t ByteSource::some(unsigned char* to, std::size_t bytes) {
   // gzread() returns an int, so it is asked for less than that holds.
-  const int got = gzread(file_, to, static_cast<unsigned>(std::min(bytes, kPart)));
+  const int got = gzread(file_, to, static_cast<unsigned>(std::min(bytes, kLargestRead)));
   int status = Z_OK;
   gzerror(file_, &status);
   // At the end of the file zlib speaks of a buffer error where the gzip data break off.
@@ -72,7 +72,7 @@ void ByteSource::read(std::span<unsigned char> bytes, const RunContext& context)
 
 void ByteSource::skip(std::uint64_t bytes, const RunContext& context) {
   // By reading, because in gzip data no place can be found otherwise.
-  std::vector<unsigned char> ignored(std::min<std::uint64_t>(bytes, kPart));
+  std::vector<unsigned char> ignored(std::min<std::uint64_t>(bytes, kLargestRead));
   while (bytes > 0) {
     const std::uint64_t part = std::min<std::uint64_t>(bytes, ignored.size());
     read(std::span(ignored).first(part), context);

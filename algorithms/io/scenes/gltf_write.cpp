@@ -7,7 +7,7 @@ namespace hermesh::mesh_formats {
 
 namespace {
 
-constexpr std::size_t kPiece = std::size_t(1) << 16;
+constexpr std::size_t kBufferPiece = std::size_t(1) << 16;
 
 /// The shortest text that reads back as the same number of the same precision.
 template <class T>
@@ -32,7 +32,7 @@ class BufferWriter {
     if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
     piece_.append(bytes.data(), bytes.size());
     // A multiple of three bytes at a time, so that padding comes at the end alone.
-    if (piece_.size() >= 3 * kPiece) flush();
+    if (piece_.size() >= 3 * kBufferPiece) flush();
   }
 
   void flush() {

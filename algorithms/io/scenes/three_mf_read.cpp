@@ -12,14 +12,14 @@ namespace hermesh::mesh_formats {
 namespace {
 
 /// How deeply components may be nested; a file that goes deeper is damaged, or contains itself.
-constexpr int kDeepest = 100;
+constexpr int kDeepestObject = 100;
 /// Bytes that the work on one component counts for, so that components of nothing cannot keep it busy for
 /// ever.
 constexpr double kVisit = 1024.0;
 
 /// Extensions that a file may require although nothing is known of them here: none changes where a triangle
 /// is.
-bool leaves_shapes_alone(std::string_view address) {
+bool address_leaves_shapes_alone(std::string_view address) {
   for (const char* part : {"/3dmanufacturing/production/", "/3dmanufacturing/material/",
                            "/3dmanufacturing/slice/", "/3dmanufacturing/trianglesets/"})
     if (address.find(part) != std::string_view::npos) return true;
@@ -131,7 +131,7 @@ class ThreeMfReader {
       const std::size_t end = std::min(required.find_first_of(" \t\r\n"), required.size());
       const std::string prefix(required.substr(0, end));
       const std::string_view address = xml.attribute("xmlns:" + prefix).value_or(prefix);
-      if (!leaves_shapes_alone(address))
+      if (!address_leaves_shapes_alone(address))
         builder_.fail("it requires the extension " + quoted_word(address) +
                       ", which is not read; export it without");
       required = trimmed(required.substr(end));
@@ -281,9 +281,9 @@ class ThreeMfReader {
     for (const Component& component : whole.components) {
       // On the way down for those that contain themselves, on the way up for those that were summed up
       // before.
-      if (depth < kDeepest) cost += cost_of(component.object, depth + 1);
+      if (depth < kDeepestObject) cost += cost_of(component.object, depth + 1);
       whole.height = std::max(whole.height, 1 + object(component.object).height);
-      if (depth >= kDeepest || whole.height > kDeepest)
+      if (depth >= kDeepestObject || whole.height > kDeepestObject)
         builder_.fail(
             "its components are nested more than 100 deep, or contain themselves; the file is damaged");
     }

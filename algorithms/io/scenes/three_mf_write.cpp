@@ -6,7 +6,7 @@ namespace hermesh::mesh_formats {
 
 namespace {
 
-constexpr std::string_view kTypes =
+constexpr std::string_view kContentTypes =
     R"(<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
 )";
@@ -21,7 +21,7 @@ constexpr std::string_view kHead =
 <metadata name="Application">hermesh</metadata>
 )";
 constexpr std::string_view kObject = "<resources>\n<object id=\"1\" type=\"model\"><mesh><vertices>\n";
-constexpr std::size_t kPiece = std::size_t(1) << 16;
+constexpr std::size_t kModelPiece = std::size_t(1) << 16;
 
 /// The text of a model: the object, and the build with it. It is made piece by piece, and may be gone through
 /// more than once. It must stay where it is.
@@ -45,7 +45,7 @@ class ModelText {
   std::string_view next() {
     piece_.clear();
     if (part_ == 0) left_out_ = 0;
-    while (part_ < parts_.size() && piece_.size() < kPiece) {
+    while (part_ < parts_.size() && piece_.size() < kModelPiece) {
       if (element_ < parts_[part_].elements)
         parts_[part_].add(element_++);
       else
@@ -121,7 +121,7 @@ void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, const std::str
   // The order is that in which readers look for them: what kinds of files there are, where the model is, the
   // model.
   ZipWriter archive;
-  archive.add("[Content_Types].xml", std::string(kTypes));
+  archive.add("[Content_Types].xml", std::string(kContentTypes));
   archive.add("_rels/.rels", std::string(kRelationships));
   archive.add("3D/3dmodel.model", size, next);
   archive.write(out);

@@ -10,8 +10,8 @@ namespace hermesh::mesh_formats {
 
 namespace {
 
-constexpr std::size_t kDeepest = 1000;
-constexpr std::size_t kPiece = std::size_t(1) << 18;
+constexpr std::size_t kDeepestElement = 1000;
+constexpr std::size_t kParsedPiece = std::size_t(1) << 18;
 /// Bytes of an element's text that are kept; only short words are ever asked for.
 constexpr std::size_t kMostText = 1000;
 /// Memory that the parsers of a thread may take. They keep each name once, and the tag that they are in as a
@@ -79,9 +79,9 @@ void XmlReader::read(const Visit& visit) {
   XML_ParsingStatus state = {XML_INITIALIZED, XML_FALSE};
   while (state.parsing != XML_FINISHED) {
     builder_.context().check();
-    void* const room = XML_GetBuffer(parser_.get(), kPiece);
+    void* const room = XML_GetBuffer(parser_.get(), kParsedPiece);
     if (!room) fail_by(XML_GetErrorCode(parser_.get()));
-    const std::size_t size = text_.read({static_cast<char*>(room), kPiece});
+    const std::size_t size = text_.read({static_cast<char*>(room), kParsedPiece});
     const XML_Status status = XML_ParseBuffer(parser_.get(), static_cast<int>(size), size == 0);
     if (thrown_) std::rethrow_exception(thrown_);
     XML_GetParsingStatus(parser_.get(), &state);
@@ -94,7 +94,7 @@ void XmlReader::read(const Visit& visit) {
 
 /// Reads what is left of the archive's member, whose checksum is known at its end alone.
 void XmlReader::read_rest() {
-  std::string room(kPiece, '\0');
+  std::string room(kParsedPiece, '\0');
   while (text_.read(room) > 0) builder_.context().check();
 }
 
@@ -102,7 +102,7 @@ void XmlReader::start(const char* name, const char** attributes) {
   guard([&] {
     builder_.tick(text_.done(), text_.size());
     // Only what is damaged, or made to do harm, nests deeper.
-    if (visits_.size() > kDeepest) fail("elements are nested too deeply; the file is damaged");
+    if (visits_.size() > kDeepestElement) fail("elements are nested too deeply; the file is damaged");
     name_ = name, attributes_ = attributes;
     if (visits_.size() == 1) root_prefix_ = prefix();
     visits_.emplace_back();

@@ -42,9 +42,9 @@ PointsAround points_of(const MaskGrid& mask, const std::array<LatticePlace, 4>& 
 }
 
 /// One run of adaptive_dual_contouring(), stage by stage.
-class Contourer {
+class AdaptiveContourer {
  public:
-  Contourer(const EdgeSource& edges, const IndexToWorld& placement, const AdaptiveOptions& options,
+  AdaptiveContourer(const EdgeSource& edges, const IndexToWorld& placement, const AdaptiveOptions& options,
             const AdaptivityField* field, RunContext& context)
       : context_(context),
         edges_(edges),
@@ -226,7 +226,7 @@ class Contourer {
 };
 
 /// The options that set AdaptiveOptions.
-const OptionTable<AdaptiveOptions>& option_table() {
+const OptionTable<AdaptiveOptions>& adaptive_option_table() {
   using Options = AdaptiveOptions;
   using Placement = Options::Placement;
   using Nearest = Options::Nearest;
@@ -262,7 +262,7 @@ PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const Adaptive
     Stage stage(context, "blocks");
     return SparseEdges(hermite, context);
   }();
-  return Contourer(edges, hermite.placement, options, field, context).run();
+  return AdaptiveContourer(edges, hermite.placement, options, field, context).run();
 }
 
 PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveOptions& options,
@@ -271,7 +271,7 @@ PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveO
     Stage stage(context, "blocks");
     return PackedEdges(hermite, context);
   }();
-  PolygonMesh mesh = Contourer(edges, hermite.placement, options, field, context).run();
+  PolygonMesh mesh = AdaptiveContourer(edges, hermite.placement, options, field, context).run();
   // A region may have lost all edges that lead out of it, and its point is then no polygon's.
   if (edges.lost() + edges.needless() > 0) drop_unused_points(mesh);
   context.figure("lost_crossings", static_cast<double>(edges.lost()));
@@ -284,7 +284,7 @@ PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveO
 }
 
 PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
-  const AdaptiveOptions options = option_table().read(input.options);
+  const AdaptiveOptions options = adaptive_option_table().read(input.options);
   // As printed: what is meshed are the 10 bytes themselves, with the edges that they say have data.
   if (input.options.is("representation", "thesis") && input.options.is("lost_crossings", "kept"))
     return adaptive_dual_contouring(thesis_hermite_input(input, "adaptive-dual-contouring"), options, input.field,
@@ -296,7 +296,7 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> adaptive_dual_contouring_options() {
-  std::vector<OptionSpec> options = option_table().specs();
+  std::vector<OptionSpec> options = adaptive_option_table().specs();
   // The Hermite data has options of its own: where the crossings come from, and how they are stored
   // (hermite_input.h).
   // What the print says is the default here: its own 10 bytes.

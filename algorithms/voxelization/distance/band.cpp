@@ -21,7 +21,7 @@ using kernels::Kernels;
 
 /// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer,
 /// a triangle for its voxels. Where the two take equally long, measured.
-constexpr std::size_t kMany = 1000;
+constexpr std::size_t kManyTriangles = 1000;
 
 /// Up to sixteen triangles on their way to the kernels.
 struct Pending {
@@ -67,7 +67,7 @@ class LeafWork {
     gather(block);
     // Kernels that look from voxels take whole clusters, which may hold triangles to leave out. Of equally near
     // triangles the first one looked at stays the nearest; the bins give them in one order whatever the threads do.
-    if (triangles_ > kMany && !without_)
+    if (triangles_ > kManyTriangles && !without_)
       look_from_voxels();
     else
       for (const TriangleBins::Cluster& cluster : clusters_) add(cluster.triangles);

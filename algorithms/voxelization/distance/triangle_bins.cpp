@@ -24,7 +24,7 @@ constexpr std::size_t kMostSlabs = 16;
 /// bins, or as many triangles.
 constexpr std::size_t kCachedBins = 64, kCachedTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
-constexpr std::size_t kMany = 256;
+constexpr std::size_t kManyPieces = 256;
 
 std::int32_t block_of(double voxel) { return static_cast<std::int32_t>(std::floor(voxel)) >> 3; }
 
@@ -513,7 +513,7 @@ void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, S
     const BoundsOf<float> box = box_of(t);
     centres.push_back({box.lower + box.upper, t});
   }
-  if (centres.size() > kMany) {
+  if (centres.size() > kManyPieces) {
     sort_by_cell(centres, bin_at_[bin], soup_.scale(), sorter.cells, sorter.sorted);
     centres.swap(sorter.sorted);
   } else {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 /// Share of the area beyond which faces that tell no side leave the whole mesh without one.
-constexpr double kMost = 0.5;
+constexpr double kMostOfArea = 0.5;
 /// A flat sheet has no volume but for rounding; below this share of area^1.5 it is not turned over.
 constexpr double kNoVolume = 1e-6;
 
@@ -67,9 +67,9 @@ class Orienter {
     for (const std::int8_t turn : result_.turns) result_.flipped += turn < 0;
     if (!(area_ > 0) && !(cancelling_area_ > 0))
       result_.verdict = Orientation::Verdict::no_area;
-    else if (cancelling_area_ > kMost * area_)
+    else if (cancelling_area_ > kMostOfArea * area_)
       result_.verdict = Orientation::Verdict::cancelling;
-    else if (one_sided_area_ > kMost * area_)
+    else if (one_sided_area_ > kMostOfArea * area_)
       result_.verdict = Orientation::Verdict::not_orientable;
     return std::move(result_);
   }

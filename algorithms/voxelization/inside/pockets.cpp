@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 /// A region of more voxels than this is no pocket.
-constexpr std::size_t kMost = 64;
+constexpr std::size_t kLargestPocket = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
@@ -28,7 +28,7 @@ constexpr std::size_t kMostWork = 20'000'000;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 /// Blocks whose triangles a thread keeps.
-constexpr std::size_t kKept = 27;
+constexpr std::size_t kNeighboursKept = 27;
 
 /// A region of few voxels that the flood from infinity did not reach.
 struct Pocket {
@@ -53,7 +53,7 @@ class PocketOpener {
         blocks_(blocks),
         regions_(regions),
         context_(context),
-        obstacles_([&] { return CellObstacles(soup, bins, kKept); }) {}
+        obstacles_([&] { return CellObstacles(soup, bins, kNeighboursKept); }) {}
 
   void run() {
     find_pockets();
@@ -163,7 +163,7 @@ class PocketOpener {
   /// Opens the pockets that a way along their walls leads out of. It asks one after the other, with obstacles of
   /// their own: what these cost must not depend on what threads asked before.
   void open_along_walls(std::vector<char>& open) {
-    CellObstacles obstacles(soup_, bins_, kKept);
+    CellObstacles obstacles(soup_, bins_, kNeighboursKept);
     goals_ = open;
     std::vector<char> known(pockets_.size(), 0);
     for (const std::uint32_t pocket : closed_ones(open)) {
@@ -242,7 +242,7 @@ class PocketOpener {
     for (std::size_t i = 0; i < blocks_.size(); ++i)
       for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c) {
         const BlockComponent& component = regions_.components[c];
-        if (component.region == Regions::kOutside || size[component.region] > kMost) continue;
+        if (component.region == Regions::kOutside || size[component.region] > kLargestPocket) continue;
         if (pocket_of_[component.region] == BlockTable::kNone) {
           pocket_of_[component.region] = std::uint32_t(pockets_.size());
           pockets_.push_back({component.region, {}, {}});

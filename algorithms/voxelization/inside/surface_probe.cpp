@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "algorithms/lattice/sample_side.h"
+#include "algorithms/voxelization/inside/wall_walk.h"
 
 namespace hermesh {
 namespace {
@@ -13,17 +14,12 @@ namespace {
 using Eigen::Vector3d;
 
 /// Blocks whose triangles are kept: as many as meet at a corner, since places next to each other are asked for in turn.
-constexpr std::size_t kKept = 8;
+constexpr std::size_t kBlocksKept = 8;
 /// Steps of at most a voxel that a crevice is followed.
 constexpr int kSteps = 8;
 constexpr int kWays = 8;  ///< directions along a sheet
 /// Nowhere is a way to be found through a cell with more triangles, and to look for it takes long.
 constexpr std::size_t kCrowded = 64;
-
-CellObstacles::Voxel cell_of(const Vector3d& p) {
-  const auto cell = [&](int axis) { return static_cast<std::int32_t>(std::floor(p[axis])); };
-  return {cell(0), cell(1), cell(2)};
-}
 
 /// The corner of a cell that is up from it along x if bit 2 is set, along y if bit 1 is and along z if bit 0
 /// is.
@@ -35,7 +31,7 @@ CellObstacles::Voxel corner(const CellObstacles::Voxel& cell, unsigned i) {
 
 SurfaceProbe::SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins,
                            const std::vector<BlockMask>& inside)
-    : inside_(inside), finder_(bins.blocks()), obstacles_(soup, bins, kKept) {}
+    : inside_(inside), finder_(bins.blocks()), obstacles_(soup, bins, kBlocksKept) {}
 
 /// Whether a voxel is inside: 0 or 1, or 2 where there is no block and nobody knows.
 int SurfaceProbe::inside_at(const Voxel& voxel) {

@@ -12,10 +12,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 /// A corner that is no farther from a plane, in voxels, lies in it.
-constexpr double kOn = 1e-7;
+constexpr double kOnPlane = 1e-7;
 /// What ends this near to a triangle, in voxels, parts the space next to it, from which voxels are looked for: as far
 /// as sheet_prober.h starts its ways at most.
-constexpr double kTouching = 1e-3;
+constexpr double kTouchingPlane = 1e-3;
 /// A strip along a face's border that is no wider, in voxels, stays with the face.
 constexpr double kBorder = 1e-6;
 
@@ -82,14 +82,14 @@ void TriangleCutter::add(const Facet& other) {
   for (int i = 0; i < 3; ++i) height[i] = normal_.dot(other.corner[i] - triangle_.corner[0]);
   const auto [lowest, highest] = std::minmax({height[0], height[1], height[2]});
   // Wholly above or below.
-  if (lowest > kTouching || highest < -kTouching) return;
+  if (lowest > kTouchingPlane || highest < -kTouchingPlane) return;
   std::vector<Place> met, touching;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
     // The line of the crossing ends where sides of the other triangle pass the plane, or at corners in it.
-    if (std::abs(height[i]) <= kOn) met.push_back(flat(other.corner[i]));
-    if (std::abs(height[i]) <= kTouching) touching.push_back(flat(other.corner[i]));
-    if ((height[i] > kOn && height[j] < -kOn) || (height[i] < -kOn && height[j] > kOn)) {
+    if (std::abs(height[i]) <= kOnPlane) met.push_back(flat(other.corner[i]));
+    if (std::abs(height[i]) <= kTouchingPlane) touching.push_back(flat(other.corner[i]));
+    if ((height[i] > kOnPlane && height[j] < -kOnPlane) || (height[i] < -kOnPlane && height[j] > kOnPlane)) {
       const double part = height[i] / (height[i] - height[j]);
       met.push_back(flat(other.corner[i] + part * (other.corner[j] - other.corner[i])));
     }

@@ -21,7 +21,7 @@ constexpr std::size_t kMaxBatch = 512;  ///< points that share one descent
 constexpr std::size_t kGroup = 64;      ///< points that share a list of triangles
 /// Triangles that reach farther than this many extents of the batch are taken in double precision: single
 /// precision would misplace their corners by more than 1e-6 of the extent.
-constexpr double kWide = 16.0;
+constexpr double kFarAway = 16.0;
 /// Boxes this many radii away add less than 1e-23, and their cubes would overflow.
 constexpr double kVeryFar = 1e12;
 
@@ -262,7 +262,7 @@ class Batch {
       const Eigen::Vector3d c = tree_.corner(t, turn > 0 ? 2 : 1) - origin_;
       // Corners far outside the batch would lose in single precision what tells the samples apart.
       const double reach = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
-      if (reach <= kWide * kWide * extent_ * extent_)
+      if (reach <= kFarAway * kFarAway * extent_ * extent_)
         kernels_.add_triangle(placed<float>(a, b, c), targets);
       else
         kernels_.add_large_triangle(placed<double>(a, b, c), targets);

@@ -21,12 +21,12 @@ using Eigen::Vector3d;
 
 constexpr double kMostPlaces = 200'000;      ///< where every triangle is larger than its share
 constexpr std::size_t kMostProbes = 20'000;  ///< lost places whose thickness is measured
-constexpr std::size_t kChunk = 4096;         ///< triangles to a task
+constexpr std::size_t kTrianglesPerTask = 4096;  ///< triangles to a task
 constexpr double kReach = 2.0;               ///< voxels: how far an opposite wall is looked for
 constexpr double kOff = 1e-4;                ///< voxels: where the way to it begins
 constexpr double kSameDistance =
     1e-3;                           ///< voxels: up to here a sample's distance is that to the place's polygon
-constexpr double kTouching = 1e-3;  ///< voxels: what is thinner is no wall to be kept
+constexpr double kNoWall = 1e-3;  ///< voxels: what is thinner is no wall to be kept
 
 /// A place of the surface without a change of sign around it.
 struct LostPlace {
@@ -59,11 +59,11 @@ class Search {
   LostSurface run() {
     // Area that a place stands for: a voxel², or more of a surface so large that there would be too many.
     const double share = std::max(1.0, total_area() / kMostPlaces);
-    std::vector<Part> parts((triangles_.size() + kChunk - 1) / kChunk);
+    std::vector<Part> parts((triangles_.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
       context_.check();
       auto samples = grid_.getConstUnsafeAccessor();
-      for (std::size_t t = i * kChunk; t < std::min(triangles_.size(), (i + 1) * kChunk); ++t)
+      for (std::size_t t = i * kTrianglesPerTask; t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t)
         look(Facet(corner(t, 0), corner(t, 1), corner(t, 2)), share, samples, parts[i]);
     });
     LostSurface result;
@@ -89,9 +89,9 @@ class Search {
 
   /// Area of the mesh in voxels², by parts of a fixed size.
   double total_area() const {
-    std::vector<double> area((triangles_.size() + kChunk - 1) / kChunk, 0.0);
+    std::vector<double> area((triangles_.size() + kTrianglesPerTask - 1) / kTrianglesPerTask, 0.0);
     tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t i) {
-      for (std::size_t t = i * kChunk; t < std::min(triangles_.size(), (i + 1) * kChunk); ++t) {
+      for (std::size_t t = i * kTrianglesPerTask; t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t) {
         const Triangle& corners = triangles_[t];
         const Vector3d a = mesh_.points[corners[0]].cast<double>(),
                        b = mesh_.points[corners[1]].cast<double>(),
@@ -208,7 +208,7 @@ class Search {
       cells.fill(openvdb::CoordBBox(cell.offsetBy(-2), cell.offsetBy(2)), true);
     }
     std::vector<std::uint8_t> near(mesh_.points.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), kChunk), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), kTrianglesPerTask), [&](const auto& range) {
       const openvdb::tree::ValueAccessor<const openvdb::MaskTree> marked(cells);
       for (std::size_t i = range.begin(); i < range.end(); ++i)
         near[i] = marked.isValueOn(cell_of(origin_ + scale_ * mesh_.points[i].cast<double>()));
@@ -276,7 +276,7 @@ std::string lost_surface_note(const LostSurface& lost, double voxel_size) {
           short_text(lost.thinnest_at.x()) + ", " + short_text(lost.thinnest_at.y()) + ", " +
           short_text(lost.thinnest_at.z()) + ")";
   // Where polygons all but touch, as at the tips of needles, no size that anybody would use keeps them apart.
-  if (lost.thickness < kTouching * voxel_size) return note;
+  if (lost.thickness < kNoWall * voxel_size) return note;
   // Rounded down, for a wall exactly a voxel thick is the thinnest that is kept.
   const double digit = std::pow(10.0, std::floor(std::log10(lost.thickness)) - 2.0);
   return note + ", and voxels of " + short_text(std::floor(lost.thickness / digit) * digit) +

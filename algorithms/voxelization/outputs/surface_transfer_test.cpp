@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "algorithms/core/level_set_grid.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
 
 namespace hermesh {
@@ -124,8 +125,6 @@ typename Grid::Ptr find(const VolumeOutputs& outputs, const std::string& name) {
     if (grid->getName() == name) return openvdb::gridPtrCast<Grid>(grid);
   return nullptr;
 }
-
-Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
 TEST(SurfaceTransfer, AttributesOfASphere) {
   const PolygonMesh mesh = sphere_with_attributes();

@@ -113,8 +113,6 @@ typename Grid::Ptr find(const VolumeOutputs& outputs, const std::string& name) {
   return nullptr;
 }
 
-Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
-
 template <class Grid, class Iterator>
 Vector3d world(const Grid& grid, const Iterator& voxel) {
   return to_eigen(grid.indexToWorld(voxel.getCoord()));
