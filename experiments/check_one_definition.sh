@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Whether every name has one definition: what the linker takes for granted and no compiler sees.
 #   experiments/check_one_definition.sh names    classes of one name in two files: seconds, builds nothing
-#   experiments/check_one_definition.sh odr      the program linked from its types with -Wodr: seven minutes without a cache
+#   experiments/check_one_definition.sh odr      the program linked from its types with -Wodr: ten minutes without a cache
 #   experiments/check_one_definition.sh plain    the program without optimisation, and what certified-octree then makes
 #   experiments/check_one_definition.sh          all of them
 # Says what is wrong and exits with 1; builds in build/odr and build/plain.
