@@ -38,7 +38,7 @@ std::string format(const char* pattern, double value) {
 std::string gibibytes(double bytes) { return format("%.3g GiB", bytes / (1024.0 * 1024.0 * 1024.0)); }
 
 /// Items that one task goes through; fixed, so that sums do not depend on the number of threads.
-constexpr std::size_t kPointsPerTask = 1 << 16;
+constexpr std::size_t kItemsPerTask = 1 << 16;
 
 Bounds joined(Bounds a, const Bounds& b) {
   // Written so that a NaN of either stays.
@@ -83,9 +83,9 @@ class Measure {
 Measured measure(const PolygonMesh& mesh) {
   const std::size_t triangles = mesh.triangles.size(), n = triangles + mesh.quads.size();
   // A task writes its own entry of `parts` alone; they are joined in order below.
-  std::vector<Measured> parts((n + kPointsPerTask - 1) / kPointsPerTask);
+  std::vector<Measured> parts((n + kItemsPerTask - 1) / kItemsPerTask);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
-    const std::size_t begin = part * kPointsPerTask, end = std::min(n, begin + kPointsPerTask);
+    const std::size_t begin = part * kItemsPerTask, end = std::min(n, begin + kItemsPerTask);
     Measure measure;
     for (std::size_t i = begin; i < std::min(end, triangles); ++i) {
       const Triangle& t = mesh.triangles[i];
@@ -110,10 +110,10 @@ Measured measure(const PolygonMesh& mesh) {
 /// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses
 /// count, too; there are few.
 std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
-  std::vector<BlockSet> parts((mesh.points.size() + kPointsPerTask - 1) / kPointsPerTask);
+  std::vector<BlockSet> parts((mesh.points.size() + kItemsPerTask - 1) / kItemsPerTask);
   const double scale = 1.0 / (8.0 * voxel_size);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
-    for (std::size_t i = part * kPointsPerTask; i < std::min(mesh.points.size(), (part + 1) * kPointsPerTask); ++i) {
+    for (std::size_t i = part * kItemsPerTask; i < std::min(mesh.points.size(), (part + 1) * kItemsPerTask); ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
         // Held within the range of integers: estimate_band() does not check how far out a mesh lies.

@@ -40,7 +40,7 @@ class Figure94Measurer {
     reference_ = to_mesh_file(statue_.mesh);
     for (const double resolution : resolutions)
       for (const char* name : kVoxelizers)
-        if (input_.wants("statue", label(name, resolution))) measure_figure_9_4(name, resolution);
+        if (input_.wants("statue", label(name, resolution))) measure(name, resolution);
     draw();
     return std::move(rows_);
   }
@@ -50,7 +50,7 @@ class Figure94Measurer {
     return voxelizer + ", " + readable(resolution);
   }
 
-  void measure_figure_9_4(const std::string& name, double resolution) {
+  void measure(const std::string& name, double resolution) {
     input_.context.check();
     RunContext child = child_context(input_.context, false);
     // One voxel of band on either side, as table 9.1's dimensions have it.

@@ -136,7 +136,7 @@ class Growth {
     load(0.5 * length_);
     for (const Treatment* treatment : wanted) base[treatment] = points(*treatment, 1.0);
     load(length_);
-    for (const Treatment* treatment : wanted) measure_tables_9_3_and_9_4(*treatment, base[treatment]);
+    for (const Treatment* treatment : wanted) measure(*treatment, base[treatment]);
     return std::move(rows_);
   }
 
@@ -159,7 +159,7 @@ class Growth {
     return double(extract(level_set_, nullptr, recipe, child).mesh.points.size());
   }
 
-  void measure_tables_9_3_and_9_4(const Treatment& treatment, double base) {
+  void measure(const Treatment& treatment, double base) {
     std::map<double, double> found;  // growth by divisor
     const double most = points(treatment, std::numeric_limits<double>::infinity()) / base;
     for (const double divisor : kDivisors) {
@@ -233,10 +233,10 @@ class Tables93And94Measurer {
     if (adaptive || guaranteed || input_.wants("input", kMaskLabel)) make_mask();
     const double threshold = 250.0 / input_.parameters.number("units_per_square_voxel");
     if (adaptive)
-      measure_tables_9_3_and_9_4("adaptive-dual-contouring",
+      measure("adaptive-dual-contouring",
               {{"threshold", std::to_string(threshold)}, {"hermite", "level-set"}});
     if (guaranteed)
-      measure_tables_9_3_and_9_4("manifold-dual-contouring",
+      measure("manifold-dual-contouring",
               {{"tolerance", input_.parameters.text("tolerance")}, {"hermite", "level-set"}});
     if (old) measure_old();
     if (!meshes_.empty()) draw();
@@ -279,11 +279,11 @@ class Tables93And94Measurer {
   int repetitions() const { return static_cast<int>(input_.parameters.number("repetitions")); }
 
   /// What is wanted, and always the first, which the others are set against.
-  void measure_tables_9_3_and_9_4(const std::string& name, const GivenOptions& options) {
+  void measure(const std::string& name, const GivenOptions& options) {
     double all = 0.0;
     for (const Treatment& treatment : kTreatments) {
       if (treatment.outside != Outside::everywhere && !input_.wants(name, treatment.label)) continue;
-      MeasuredRow row = measure_tables_9_3_and_9_4(name, options, treatment);
+      MeasuredRow row = measure(name, options, treatment);
       if (treatment.outside == Outside::everywhere) all = row.values["points"].get<double>();
       row.values["share"] = 100.0 * row.values["points"].get<double>() / all;
       rows_.push_back(std::move(row));
@@ -310,7 +310,7 @@ class Tables93And94Measurer {
     if (printed.seconds) row.values["printed_seconds"] = *printed.seconds;
   }
 
-  MeasuredRow measure_tables_9_3_and_9_4(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
+  MeasuredRow measure(const std::string& name, const GivenOptions& given, const Treatment& treatment) {
     const AdaptivityField field{.mask = mask_, .outside = treatment.outside, .scale = {}};
     auto [row, mesh] = repeat(name, treatment.label,
                               {.chosen = choose(input_.tables.extractors, name, given), .field = &field});

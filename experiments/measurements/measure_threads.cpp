@@ -21,8 +21,8 @@ namespace {
 constexpr auto kAllowedThreads = tbb::global_control::max_allowed_parallelism;
 constexpr const char* kTimedVoxelizers[] = {"thesis", "hermesh", "openvdb"};
 constexpr const char* kTimedExtractors[] = {"adaptive-dual-contouring", "dual-contouring",
-                                       "marching-cubes",           "certified-octree",
-                                       "manifold-dual-contouring", "openvdb"};
+                                            "marching-cubes",           "certified-octree",
+                                            "manifold-dual-contouring", "openvdb"};
 constexpr const char* kTimedSampling[] = {"level set → sparse, packed", "polygons → sparse, float"};
 constexpr const char* kBooleans[] = {"union, sparse, packed", "union, thesis's 10-byte voxels",
                                      "union, fixed 10-byte voxels"};
@@ -39,7 +39,7 @@ std::vector<std::size_t> thread_counts() {
 
 /// One piece of work with every number of threads, in turns; it returns its seconds.
 std::vector<MeasuredRow> times_by_threads(const std::string& table, const std::string& label,
-                                    const std::function<double()>& work, const MeasurementInput& input) {
+                                          const std::function<double()>& work, const MeasurementInput& input) {
   const std::vector<std::size_t> counts = thread_counts();
   std::vector<double> cpu(counts.size(), 0.0);
   std::vector<Contender> contenders;

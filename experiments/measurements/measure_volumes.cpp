@@ -62,14 +62,14 @@ class VolumesMeasurer {
         pixels_(int(input.parameters.number("pixels"))) {}
 
   std::vector<MeasuredRow> run() {
-    for (const Entry& entry : kEntries) measure_volumes(entry);
+    for (const Entry& entry : kEntries) measure(entry);
     return std::move(rows_);
   }
 
  private:
   static constexpr const char* kVolumeLabel = "the volume";
 
-  void measure_volumes(const Entry& entry) {
+  void measure(const Entry& entry) {
     if (!input_.wants(entry.table, kVolumeLabel) && !input_.wants_any(entry.table, kExtractors)) return;
     const LoadedVolume loaded = load_volume(entry.volume, input_.context);
     const bool stand_in = loaded.origin.starts_with("stand-in");

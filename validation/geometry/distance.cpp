@@ -33,7 +33,7 @@ struct DistanceSums {
 // answer of one query is a good first guess for the next.
 template <class Point, class Weight>
 DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& weight, const TriangleTree& to,
-                   const RunContext& context) {
+                           const RunContext& context) {
   const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, DistanceSums sums) {
     context.check();
     std::uint32_t guess = 0;

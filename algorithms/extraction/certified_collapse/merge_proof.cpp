@@ -16,7 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::uint32_t kNoPoint = MergeForest::kNone;
 /// What the bound is at least, in voxels: what rounding makes of the distance of a triangle to itself.
 constexpr double kLeastBound = 1e-6;
 
@@ -80,7 +79,7 @@ void MergeProof::take_in_joins() {
   const std::size_t known = std::exchange(known_, forest_.size());
   unproven_.assign(known_, 0);
   const auto is_new = [&](std::uint32_t p) {
-    return forest_.set_of(p) != kNoPoint && forest_.set_of(p) >= known;
+    return forest_.set_of(p) != MergeForest::kNone && forest_.set_of(p) >= known;
   };
   parallel_blocks(proofs_.size(), context_, [&](std::size_t i) {
     const auto t = static_cast<std::uint32_t>(i);
@@ -108,12 +107,13 @@ bool MergeProof::stays(std::uint32_t t) const {
 
 bool MergeProof::is_single(std::uint32_t t) const {
   const Triangle& c = fine_.triangles()[t];
-  return forest_.set_of(c[0]) == kNoPoint && forest_.set_of(c[1]) == kNoPoint && forest_.set_of(c[2]) == kNoPoint;
+  return forest_.set_of(c[0]) == MergeForest::kNone && forest_.set_of(c[1]) == MergeForest::kNone &&
+         forest_.set_of(c[2]) == MergeForest::kNone;
 }
 
 /// Makes the merged mesh. Its points are numbered in the order of the fine ones that they go by.
 void MergeProof::build() {
-  merged_.number.assign(fine_.points().size(), kNoPoint);
+  merged_.number.assign(fine_.points().size(), MergeForest::kNone);
   const auto for_each_corner = [&](auto&& f) {
     parallel_blocks(merged_.origin.size(), context_, [&](std::size_t i) {
       const Triangle& fine = fine_.triangles()[merged_.origin[i]];
@@ -126,14 +126,14 @@ void MergeProof::build() {
   });
   merged_.leaders.clear();
   for (std::uint32_t p = 0; p < merged_.number.size(); ++p) {
-    if (merged_.number[p] == kNoPoint) continue;
+    if (merged_.number[p] == MergeForest::kNone) continue;
     merged_.number[p] = static_cast<std::uint32_t>(merged_.leaders.size());
     merged_.leaders.push_back(p);
   }
   std::vector<Vector3d> points(merged_.leaders.size());
   parallel_blocks(points.size(), context_, [&](std::size_t i) {
     const std::uint32_t set = forest_.set_of(merged_.leaders[i]);
-    points[i] = set == kNoPoint ? fine_.points()[merged_.leaders[i]] : forest_.node(set).place;
+    points[i] = set == MergeForest::kNone ? fine_.points()[merged_.leaders[i]] : forest_.node(set).place;
   });
   std::vector<Triangle> triangles(merged_.origin.size());
   for_each_corner([&](std::size_t i, int corner, std::uint32_t leader) {
@@ -149,17 +149,17 @@ void MergeProof::build() {
 void MergeProof::call_unproven(std::uint32_t t) {
   const auto moves = [&](std::uint32_t p) {
     const std::uint32_t set = forest_.set_of(p);
-    return set != kNoPoint && forest_.node(set).moves;
+    return set != MergeForest::kNone && forest_.node(set).moves;
   };
   const bool any_moves = std::ranges::any_of(fine_.triangles()[t], moves);
-  std::uint32_t last = kNoPoint;
+  std::uint32_t last = MergeForest::kNone;
   for (const std::uint32_t p : fine_.triangles()[t]) {
     const std::uint32_t set = forest_.set_of(p);
-    if (set == kNoPoint || (any_moves && !moves(p))) continue;
+    if (set == MergeForest::kNone || (any_moves && !moves(p))) continue;
     if (splits_ >= kPatience) std::atomic_ref(unproven_[set]).store(1, std::memory_order_relaxed);
-    if (last == kNoPoint || set > last) last = set;
+    if (last == MergeForest::kNone || set > last) last = set;
   }
-  if (last != kNoPoint) std::atomic_ref(unproven_[last]).store(1, std::memory_order_relaxed);
+  if (last != MergeForest::kNone) std::atomic_ref(unproven_[last]).store(1, std::memory_order_relaxed);
 }
 
 /// Calls sets unproven where an edge goes from one point to another twice. Every set is a disc: a block's by
@@ -168,7 +168,7 @@ void MergeProof::call_unproven(std::uint32_t t) {
 /// (Edges of the fine mesh itself may be those of several patches.)
 void MergeProof::look_at_topology() {
   const FineMesh& mesh = *merged_.mesh;
-  const auto is_set = [&](std::uint32_t p) { return forest_.set_of(merged_.leaders[p]) != kNoPoint; };
+  const auto is_set = [&](std::uint32_t p) { return forest_.set_of(merged_.leaders[p]) != MergeForest::kNone; };
   parallel_blocks(mesh.points().size(), context_, [&](std::size_t p) {
     const auto point = static_cast<std::uint32_t>(p);
     const auto around = mesh.around(point);
@@ -289,9 +289,9 @@ void MergeProof::look_at_fine() {
     const std::array<std::uint32_t, 3> leaders = this->leaders(t);
     // Not from a single point, which may be one of other patches too.
     int in_set = 0;
-    while (forest_.set_of(fine_.triangles()[t][in_set]) == kNoPoint) ++in_set;
+    while (forest_.set_of(fine_.triangles()[t][in_set]) == MergeForest::kNone) ++in_set;
     const std::uint32_t point = merged_.number[leaders[in_set]];
-    if (point == kNoPoint) return call_unproven(t);  // all that hangs together here has vanished
+    if (point == MergeForest::kNone) return call_unproven(t);  // all that hangs together here has vanished
     // The proof is kept only if it rests on triangles that forget_covered() finds again when one of them
     // changes.
     bool known = true;
@@ -403,7 +403,7 @@ void MergeProof::forget_covered(const std::vector<std::uint32_t>& changed) {
   std::vector<std::uint8_t> found(mesh.points().size());
   std::vector<std::uint32_t> points;
   const auto add = [&](std::uint32_t p) {
-    if (p != kNoPoint && !std::exchange(found[p], 1)) points.push_back(p);
+    if (p != MergeForest::kNone && !std::exchange(found[p], 1)) points.push_back(p);
   };
   for (const std::uint32_t p : changed)
     for (const std::uint32_t t : fine_.around(p))
@@ -416,7 +416,7 @@ void MergeProof::forget_covered(const std::vector<std::uint32_t>& changed) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::uint32_t leader = merged_.leaders[points[i]], set = forest_.set_of(leader);
     const Proof which = i < next_to_them ? kCovered : kFar;
-    if (set == kNoPoint)
+    if (set == MergeForest::kNone)
       forget_covered(leader, which);
     else
       for (const std::uint32_t p : forest_.members(set)) forget_covered(p, which);

@@ -16,7 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::uint32_t kNoSet = MergeForest::kNone;
 /// Rounds over all points in which the equations of one sweep are solved. (Twice as many change the distance by less than a
 /// hundredth.)
 constexpr int kRounds = 10;
@@ -33,7 +32,7 @@ constexpr double kParts[] = {0.25, 0.5, 1.0};
 
 /// A place of the fine mesh with the share of its area that it stands for, and the triangle under it.
 struct Sample {
-  std::uint32_t face = kNoSet;
+  std::uint32_t face = FineMesh::kNone;
   float weight = 0;             ///< square voxels
   Eigen::Vector3f barycentric;  ///< of the nearest place within the triangle, roughly
   float height = 0;             ///< above the triangle's plane, voxels
@@ -146,9 +145,9 @@ void Relaxation::lay_samples(const FineMesh& mesh) {
   parallel_blocks(samples_.size(), context_, [&](std::size_t i) {
     Sample& sample = samples_[i];
     if (!(sample.weight > 0)) return;
-    if (sample.face == kNoSet) {
+    if (sample.face == FineMesh::kNone) {
       const std::uint32_t point = merged_.number[forest_.leader(fine_point(i))];
-      if (point == kNoSet) return;  // all that hangs together here has vanished; the proof brings it back
+      if (point == MergeForest::kNone) return;  // all that hangs together here has vanished; the proof brings it back
       sample.face = mesh.around(point).front();
     }
     const Vector3d p = place(i);
@@ -173,7 +172,7 @@ void Relaxation::lay_samples(const FineMesh& mesh) {
 void Relaxation::sum_up(const FineMesh& mesh) {
   sums_.assign(mesh.triangles().size(), {});
   for (const Sample& sample : samples_) {
-    if (sample.face == kNoSet) continue;
+    if (sample.face == FineMesh::kNone) continue;
     const Vector3d share = sample.barycentric.cast<double>();
     sums_[sample.face].products += double(sample.weight) * share * share.transpose();
     sums_[sample.face].heights += double(sample.weight) * double(sample.height) * share;
@@ -241,10 +240,10 @@ void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const Fin
       const Vector3d& before = merged.mesh->points()[v];
       const Vector3d place = file.rounded(before + part * (relaxation.places()[v] - before));
       const std::uint32_t p = merged.leaders[v], set = forest.set_of(p);
-      const Vector3d last = set == kNoSet ? fine.points()[p] : forest.node(set).place;
+      const Vector3d last = set == MergeForest::kNone ? fine.points()[p] : forest.node(set).place;
       if (place == last) continue;
       WideQuadric moved;
-      moved.add(set == kNoSet ? quadric_at(fine, p) : forest.node(set).quadric, last - place);
+      moved.add(set == MergeForest::kNone ? quadric_at(fine, p) : forest.node(set).quadric, last - place);
       forest.join(p, {.first = p,
                       .merges = true,
                       .moves = true,

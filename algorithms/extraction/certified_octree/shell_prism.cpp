@@ -10,7 +10,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// The least cosine of the angle between a pillar and the normal of a triangle at its foot.
-constexpr double kLeastLean = 0.3;
+constexpr double kLeastPillarCosine = 0.3;
 
 constexpr double kPrismRounding = ShellPrism::kRounding;
 using Places = std::array<OverTriangle::Place, 3>;
@@ -61,7 +61,7 @@ ShellPrism::ShellPrism(const Corners& corners, const std::array<Vector3d, 3>& pi
     : over_(corners), pillars_(pillars), height_(height) {
   if (over_.degenerate()) return;
   for (const Vector3d& pillar : pillars_)
-    if (!(pillar.dot(over_.normal()) >= kLeastLean)) return;
+    if (!(pillar.dot(over_.normal()) >= kLeastPillarCosine)) return;
   for (std::size_t side = 0; side < 3; ++side)
     for (std::size_t end = 0; end < 2; ++end) leans_[side][end] = lean(pillars_[(side + end) % 3], side);
   lid_ = through(corners, height_);

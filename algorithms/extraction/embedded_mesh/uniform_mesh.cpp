@@ -91,7 +91,7 @@ class CellRecords {
 class UniformContourer {
  public:
   UniformContourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
-            RunContext& context, PolygonEdges* numbers)
+                   RunContext& context, PolygonEdges* numbers)
       : numbers_(numbers),
         cells_(grid, context),
         options_(options),

@@ -358,7 +358,7 @@ DenseHermite<Voxel> complement(DenseHermite<Voxel> hermite, RunContext& context)
   return with_tree<Voxel>(hermite.placement, hermite.normal_code, tree);
 }
 
-#define HERMESH_INSTANTIATE_COMBINE(Voxel)                                                                      \
+#define HERMESH_INSTANTIATE_COMBINE(Voxel)                                                              \
   template DenseHermite<Voxel> combine(Boolean, DenseHermite<Voxel>, DenseHermite<Voxel>, RunContext&); \
   template DenseHermite<Voxel> complement(DenseHermite<Voxel>, RunContext&);
 HERMESH_INSTANTIATE_COMBINE(FloatVoxel)

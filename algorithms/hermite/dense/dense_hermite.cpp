@@ -252,7 +252,7 @@ void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context) {
 }
 
 // OpenVDB trees take seconds to compile, so the four are made here and nowhere else.
-#define HERMESH_INSTANTIATE_DENSE(Voxel)                                                              \
+#define HERMESH_INSTANTIATE_DENSE(Voxel)                                                        \
   template struct DenseHermite<Voxel>;                                                          \
   template DenseHermite<Voxel> to_dense<Voxel>(const FloatHermite&, RunContext&, NormalCodeId); \
   template DenseHermite<Voxel> to_dense<Voxel>(const PackedHermite&, RunContext&);              \

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint16_t kDate = 1 << 5 | 1;
 // The library's own default is 9, which takes four times as long for a thirtieth of the length.
 constexpr int kLevel = 6;
-constexpr std::size_t kUnpackedPiece = std::size_t(1) << 16;
+constexpr std::size_t kPackedPiece = std::size_t(1) << 16;
 
 struct FreeSource {
   void operator()(zip_source_t* source) const { zip_source_free(source); }
@@ -208,7 +208,7 @@ void ZipWriter::write(const ByteSink& out) {
   const Source target(zip_source_buffer_create(nullptr, 0, 0, &error));
   if (!target) throw std::bad_alloc();
   pack(target.get());
-  std::string piece(kUnpackedPiece, '\0');
+  std::string piece(kPackedPiece, '\0');
   zip_int64_t count = zip_source_open(target.get());
   while (count >= 0 && (count = zip_source_read(target.get(), piece.data(), piece.size())) > 0)
     out({piece.data(), static_cast<std::size_t>(count)});

@@ -45,7 +45,7 @@ PointsAround points_of(const MaskGrid& mask, const std::array<LatticePlace, 4>& 
 class AdaptiveContourer {
  public:
   AdaptiveContourer(const EdgeSource& edges, const IndexToWorld& placement, const AdaptiveOptions& options,
-            const AdaptivityField* field, RunContext& context)
+                    const AdaptivityField* field, RunContext& context)
       : context_(context),
         edges_(edges),
         placement_(placement),
