@@ -1,6 +1,7 @@
 #include "algorithms/extraction/certified_mesh.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +12,39 @@
 
 namespace hermesh {
 namespace {
+
+/// How far off a plane, in cubes of its longest side, a quad may be that some reader takes for plane, and the part of its
+/// area that counts as none.
+constexpr double kPlane = 1e-5, kNoArea = 1e-9;
+
+/// Whether a quad means one surface by its first diagonal, folded back beyond itself, and another one to whoever takes it
+/// for plane and concave, and cuts it along the diagonal inside.
+bool is_folded_in_its_plane(const std::vector<Eigen::Vector3f>& points, const Quad& q) {
+  const Eigen::Vector3d a = points[q[0]].cast<double>(), u = points[q[1]].cast<double>() - a,
+                        v = points[q[2]].cast<double>() - a, w = points[q[3]].cast<double>() - a;
+  const Eigen::Vector3d first = u.cross(v), second = v.cross(w), whole = first + second;
+  const double longest = std::sqrt(std::max({u.squaredNorm(), v.squaredNorm(), w.squaredNorm()}));
+  return std::min(first.dot(whole), second.dot(whole)) < -kNoArea * whole.squaredNorm() &&
+         std::abs(first.dot(w)) <= kPlane * longest * longest * longest;
+}
+
+/// Writes such quads as the two triangles that were proved, which mean the same to everybody.
+void part_folded_quads(PolygonMesh& mesh, RunContext& context) {
+  std::vector<std::uint8_t> folded(mesh.quads.size());
+  parallel_blocks(folded.size(), context,
+                  [&](std::size_t i) { folded[i] = is_folded_in_its_plane(mesh.points, mesh.quads[i]); });
+  const auto first = std::find(folded.begin(), folded.end(), 1);
+  if (first == folded.end()) return;
+  std::size_t kept = std::size_t(first - folded.begin());
+  for (std::size_t i = kept; i < folded.size(); ++i) {
+    const Quad q = mesh.quads[i];
+    if (folded[i])
+      mesh.triangles.insert(mesh.triangles.end(), {Triangle{q[0], q[1], q[2]}, Triangle{q[0], q[2], q[3]}});
+    else
+      mesh.quads[kept++] = q;
+  }
+  mesh.quads.resize(kept);
+}
 
 /// The mesh in the coordinates that a file holds, relative to the placement's origin.
 PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunContext& context) {
@@ -26,6 +60,7 @@ PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunCont
     for (Quad& quad : result.quads) std::swap(quad[1], quad[3]);
     for (Triangle& triangle : result.triangles) std::swap(triangle[1], triangle[2]);
   }
+  part_folded_quads(result, context);
   return result;
 }
 

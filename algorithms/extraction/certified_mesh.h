@@ -75,7 +75,8 @@ void report(const UniformCounts& counts, RunContext& context);
 CertifiedPolygons as_they_are(UniformMesh uniform);
 
 /// The mesh as a file will hold it, without what the field leaves out: a triangle of the uniform mesh whose middle lies
-/// outside of the mask, and a merged one (`shown`) that stands for nothing within.
+/// outside of the mask, and a merged one (`shown`) that stands for nothing within. A quad that is plane but for rounding,
+/// concave, and proved along the diagonal outside becomes its two triangles, so that it means the same to every reader.
 PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, const FilePoints& file, RunContext& context);
 
 /// The entries `tolerance` and `tolerance_world` of both tables.

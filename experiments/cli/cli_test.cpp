@@ -219,6 +219,22 @@ std::string boxes_obj(const std::vector<std::pair<double, double>>& heights) {
   return file.str();
 }
 
+TEST_F(CliTest, QuadsOfAReferenceAreCutAsItIsSaid) {
+  // Across b–d the quad bends less than across a–c, along which its file means it to be cut.
+  const std::string points = "v 0 0 0\nv 1 0 0\nv 2 1 0.5\nv 0 1 0\n";
+  write("quad.obj", points + "f 1 2 3 4\n");
+  write("triangles.obj", points + "f 1 2 3\nf 1 3 4\n");
+  const auto distance = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> line = {"validate", "triangles.obj", "--reference", "quad.obj", "--json"};
+    line.insert(line.end(), more.begin(), more.end());
+    return Json::parse(run(line).out).at("to_reference").at("max").get<double>();
+  };
+  EXPECT_LT(distance({"--reference-quads", "as-given"}), 1e-12);
+  EXPECT_GT(distance({}), 0.05);
+  EXPECT_GT(distance({"--reference-quads", "better"}), 0.05);
+  EXPECT_EQ(run({"validate", "quad.obj", "--reference-quads", "as-given"}).exit_code, 2);
+}
+
 TEST_F(CliTest, AWatertightMeshOfAnotherSolidDoesNotMeetTheRequirement) {
   // Inner walls of the reference: distances to it are small wherever a mesh follows them.
   write("reference.obj", boxes_obj({{0, 30}, {20, 60}}));

@@ -19,7 +19,7 @@ using validation::JudgeOptions;
 using validation::MeshReport;
 
 struct ValidateArguments {
-  std::string mesh, reference, features;
+  std::string mesh, reference, features, reference_quads = "better";
   std::string require;
   bool certify = false;
   std::int64_t samples = JudgeOptions().samples;
@@ -82,6 +82,7 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
     throw UsageError("--voxel-size says what explains a distance to a reference: name it with --reference");
   if (arguments.reference.empty() && arguments.features.empty())
     refuse_idle(command, {"--samples"}, "distances need a --reference");
+  if (arguments.reference.empty()) refuse_idle(command, {"--reference-quads"}, "it is about a --reference");
   if (arguments.features.empty()) refuse_idle(command, {"--dihedral"}, "sharp edges are those of --features");
 
   const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
@@ -89,6 +90,7 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
   const auto features = read_if_named(arguments.features, session.context);
   JudgeOptions options;
   options.reference = reference ? &*reference : nullptr;
+  if (arguments.reference_quads == "as-given") options.reference_quads = validation::QuadRule::as_given;
   options.features = features ? &*features : nullptr;
   options.samples = arguments.samples;
   options.certify = arguments.certify;
@@ -119,6 +121,12 @@ void add_validate(CLI::App& app, Session& session) {
   command->add_option("MESH", arguments->mesh, kMeshIn)->required();
   add_files(*command, session, {.inputs = {&arguments->mesh}, .takes_many = true});
   command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");
+  command
+      ->add_option("--reference-quads", arguments->reference_quads,
+                   "How quads of the reference are cut for the distances: better (along the diagonal that bends less, for "
+                   "a file of another program) or as-given (from the first corner to the third, which is what quads of "
+                   "hermesh mean) (default: better)")
+      ->check(CLI::IsMember({"better", "as-given"}));
   command->add_flag("--certify", arguments->certify,
                     "Bound the Hausdorff distances to the reference for certain");
   command->add_option("--features", arguments->features,
