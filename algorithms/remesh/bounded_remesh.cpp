@@ -256,9 +256,10 @@ class BoundedRemesher {
     const Stage stage(context_, "compare between points");
     std::vector<Far> far;
     const double error = options_.error;
-    for (const FarTriangle& f : surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_).far)
-      far.push_back({f.place + now.offset, f.distance, false, f.triangle});
-    const auto from = uniform.hold(now.surface.points, -now.offset, now.surface.triangles, error, context_, free_pieces());
+    const auto to = surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_, {}, Wanted::any_bound);
+    for (const FarTriangle& f : to.far) far.push_back({f.place + now.offset, f.distance, false, f.triangle});
+    const auto from = uniform.hold(now.surface.points, -now.offset, now.surface.triangles, error, context_, free_pieces(),
+                                   Wanted::any_bound);
     for (const FarTriangle& f : from.far) far.push_back({f.place, f.distance, true, f.triangle});
     return far;
   }

@@ -37,6 +37,9 @@ struct FreePieces {
   double radius = 0.0;
 };
 
+/// What is asked for: the bound of all that is near as small as comes out, or whatever is within the limit, sooner.
+enum class Wanted { small_bound, any_bound };
+
 /// A triangle soup that distances are measured to.
 ///
 /// **Why a limit holds** for a piece of a triangle: where the piece's three corners are within the limit of
@@ -59,10 +62,11 @@ class SurfaceDistance {
   /// @param limit greater than 0
   /// @param context asked whether to stop
   /// @param free tells which pieces need not be near, in the frame of the points
+  /// @param wanted whether the bound is to be small
   /// @throws Cancelled
   DistanceFromSurface hold(std::span<const Eigen::Vector3f> points, const Eigen::Vector3d& offset,
                            std::span<const Triangle> triangles, double limit, const RunContext& context,
-                           const FreePieces& free = {}) const;
+                           const FreePieces& free = {}, Wanted wanted = Wanted::small_bound) const;
 
   /// The distance of a place in the soup's frame, or `most` where it is farther away.
   double at(const Eigen::Vector3d& p, double most) const;

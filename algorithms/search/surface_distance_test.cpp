@@ -33,11 +33,24 @@ Soup square(float side, float height, std::uint32_t n = 1) {
   return soup;
 }
 
+/// What is found for a small bound. Whoever wants any bound is told of the same triangles that are far.
 DistanceFromSurface hold(const Soup& from, const Soup& to, double limit,
                          const Vector3d& offset = Vector3d::Zero(), const FreePieces& free = {}) {
   RunContext context;
-  return SurfaceDistance(to.points, to.triangles)
-      .hold(from.points, offset, from.triangles, limit, context, free);
+  const SurfaceDistance surface(to.points, to.triangles);
+  const auto found = [&](Wanted wanted) {
+    return surface.hold(from.points, offset, from.triangles, limit, context, free, wanted);
+  };
+  DistanceFromSurface small = found(Wanted::small_bound);
+  const DistanceFromSurface any = found(Wanted::any_bound);
+  const auto numbers = [](const DistanceFromSurface& d) {
+    std::vector<std::uint32_t> far;
+    for (const FarTriangle& f : d.far) far.push_back(f.triangle);
+    return far;
+  };
+  EXPECT_EQ(numbers(any), numbers(small));
+  EXPECT_LE(any.upper, limit);
+  return small;
 }
 
 TEST(SurfaceDistance, ParallelSquaresAreTheirHeightApart) {
@@ -58,6 +71,17 @@ TEST(SurfaceDistance, ALargeTriangleIsCoveredByManySmallOnes) {
   const DistanceFromSurface found = hold(square(1, 0), square(1, 1e-3f, 64), 2e-3);
   EXPECT_TRUE(found.far.empty());
   EXPECT_GE(found.upper, 1e-3 - 1e-9);
+}
+
+TEST(SurfaceDistance, WhatIsJustTooFarIsFarAtEverySizeAndTurn) {
+  // A triangle that is cut into few parts or many, at a slant to the square: one corner alone is too far, then none.
+  const Soup to = square(4, 0, 40);
+  for (const float side : {0.1f, 0.3f, 0.5f, 1.0f, 2.5f})
+    for (const float slim : {1.0f, 0.5f, 0.05f}) {
+      const Soup from{{{0.7f, 0.7f, 0.05f}, {0.7f + side, 0.8f, 0.0f}, {0.8f, 0.7f + slim * side, 0.1f}}, {{0, 1, 2}}};
+      EXPECT_EQ(hold(from, to, 0.0995).far.size(), 1u) << side << ' ' << slim;
+      EXPECT_TRUE(hold(from, to, 0.1005).far.empty()) << side << ' ' << slim;
+    }
 }
 
 TEST(SurfaceDistance, AHoleIsFoundWithItsDistance) {

@@ -155,7 +155,8 @@ void TriangleTree::build_boxes() {
   }
 }
 
-NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bound_squared) const {
+NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bound_squared,
+                                      double enough_squared) const {
   // Branch and bound, depth first and the nearest box first, so that the bound shrinks early.
   NearestTriangle best{upper_bound_squared, kNone};
   if (packs_.empty()) return best;
@@ -179,6 +180,7 @@ NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bou
       if (squared_distance_to_box(p, a, b, c) > best.squared) continue;
       const double d = squared_distance(p, a, b, c);
       if (d < best.squared || (d == best.squared && t < best.triangle)) best = {d, t};
+      if (d <= enough_squared) return best;
     }
   }
   return best;

@@ -45,9 +45,11 @@ class TriangleTree {
 
   /// The triangle nearest to p, in index space, that is no farther than the bound; of several that are equally near
   /// the one of lowest number. The distance is that to the triangles with each corner moved by a few units in the last
-  /// place of the longest side, whatever their shape: slivers, segments and points are triangles, too.
+  /// place of the longest side, whatever their shape: slivers, segments and points are triangles, too. Whoever is
+  /// content with any triangle that is no farther than `enough_squared` gets the first that is met, sooner.
   NearestTriangle nearest(const Eigen::Vector3d& p,
-                          double upper_bound_squared = std::numeric_limits<double>::infinity()) const;
+                          double upper_bound_squared = std::numeric_limits<double>::infinity(),
+                          double enough_squared = -1.0) const;
 
   /// Calls f(triangle) for the triangles of every leaf whose box meets the box from `low` to `high` (index space);
   /// some of them may lie outside of that box.
