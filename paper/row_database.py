@@ -72,13 +72,12 @@ def latest_groups(rows):
     for row in rows:
         groups = runs.setdefault(tuple(text_at(row, part) for part in parts), {})
         run = text_at(row, "/run")
-        if run not in groups:
-            additive = find(row, "/table/additive") is not None and groups
-            groups[run] = list(list(groups.values())[-1]) if additive else []
+        # The rows of an additive table are one group, in whatever order its runs stand in the file.
+        of = "" if find(row, "/table/additive") is not None else run
         same = (text_at(row, "/variant/label"), find(row, "/values/resolution"))
-        groups[run] = [old for old in groups[run] if text_at(old, "/run") == run or
-                       (text_at(old, "/variant/label"), find(old, "/values/resolution")) != same]
-        groups[run].append(row)
+        groups[of] = [old for old in groups.get(of, []) if text_at(old, "/run") == run or
+                      (text_at(old, "/variant/label"), find(old, "/values/resolution")) != same]
+        groups[of].append(row)
     shown = []
     for groups in runs.values():
         last = list(groups.values())[-1]

@@ -183,7 +183,7 @@ const OptionTable<AskedTolerance>& tolerance_table() {
       OptionTable<AskedTolerance>()
           .number("tolerance", &AskedTolerance::voxels, {.maximum = 1e6},
                   "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
-                  "gives fewer polygons, 0 the uniform mesh itself",
+                  "gives fewer polygons, 0 the uniform mesh itself, whose quads are cut from their first corner to the third",
                   {"tolerance_world=0"})
           .number("tolerance_world", &AskedTolerance::world, {.maximum = 1e30},
                   "the same in world units, instead of tolerance where it is greater than 0");

@@ -136,6 +136,12 @@ TEST(Groups, RunsOfAnAdditiveTableAddUp) {
   EXPECT_EQ(groups[0].rows[2]["run"], "3");
   EXPECT_EQ(groups[0].earlier_runs, 0);
 
+  // Rows of two runs that stand among each other, as when files were joined by hand, are all there.
+  const std::vector<RowGroup> mixed =
+      latest_groups({row("1", "a"), row("2", "b"), row("1", "c"), row("2", "d"), row("1", "e")});
+  ASSERT_EQ(mixed.size(), 1u);
+  EXPECT_EQ(mixed[0].rows.size(), 5u);
+
   Json coarse = row("1", "a"), fine = row("2", "a");
   coarse["values"]["resolution"] = 50;
   fine["values"]["resolution"] = 400;

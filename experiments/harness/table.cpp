@@ -96,13 +96,11 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
       key += text_at(row, part) + "\n";
     if (!runs.contains(key)) order.push_back(key);
     auto& groups = runs[key];
-    const std::string run = text_at(row, "/run");
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == run; });
-    if (group == groups.end()) {
-      RowGroup before{{}, static_cast<int>(groups.size())};
-      if (find(row, "/table/additive") && !groups.empty()) before = groups.back().second;
-      group = groups.insert(groups.end(), {run, std::move(before)});
-    }
+    // The rows of an additive table are one group, in whatever order its runs stand in the file.
+    const std::string run = text_at(row, "/run"), of = find(row, "/table/additive") ? "" : run;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == of; });
+    if (group == groups.end())
+      group = groups.insert(groups.end(), {of, RowGroup{{}, static_cast<int>(groups.size())}});
     std::erase_if(group->second.rows, [&](const Json& old) {
       return text_at(old, "/run") != run && text_at(old, "/variant/label") == text_at(row, "/variant/label") &&
              resolution(old) == resolution(row);

@@ -18,8 +18,8 @@ struct RowGroup {
 };
 
 /// Groups in the order in which they first appear; of groups that differ in the run alone, the last one. In
-/// an additive table (measurements.h) a run replaces the rows of the labels and resolutions that it has, and
-/// adds to the others of the run before it; those of one label stand together.
+/// an additive table (measurements.h) rows replace those of other runs above them that have the same label and
+/// resolution, and add to all others; those of one label stand together.
 std::vector<RowGroup> latest_groups(const std::vector<Json>& rows);
 
 /// One Markdown table with what it was measured on above, and below it, in capitals, every broken promise,
