@@ -18,6 +18,7 @@
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/search/surface_distance.h"
 #include "algorithms/voxelization/inside/oriented_winding.h"
+#include "algorithms/voxelization/outputs/surface_transfer.h"
 #include "algorithms/voxelization/voxelize.h"
 
 namespace hermesh {
@@ -44,8 +45,10 @@ constexpr float kLowering = 0.4f;
 constexpr double kThinVoxels = 2.0, kVoxelOfThickness = 0.9;
 /// Cosine of the angle between neighbours' normals below which they are two sides of a fin.
 constexpr double kFolded = -0.5;
-/// Places at most that are asked how thick the surface is there.
-constexpr std::size_t kMostAsked = 2000;
+/// Places at most that are asked how thick the surface is there, polygons around each of them that are asked, and how
+/// near these are, in errors.
+constexpr std::size_t kMostAsked = 500, kMostAround = 64;
+constexpr double kAround = 0.8;
 /// Radius of the pieces of polygons that are asked whether they bound something, in errors.
 constexpr double kFreePiece = 1.0 / 16.0;
 /// How far from a polygon its sides are looked at, in extents of the polygons: what is thinner is rounding.
@@ -450,7 +453,7 @@ class BoundedRemesher {
     // that may be thinner: a wedge is as thin as can be at its edge, and only there.
     std::vector<std::pair<double, std::size_t>> thick;
     for (std::size_t i = 0; i < far.size(); i += 1 + far.size() / kMostAsked)
-      if (const double found = thickness(of, surface, far[i]); std::isfinite(found))
+      if (const double found = thickness_to_show(of, surface, far[i]); std::isfinite(found))
         thick.emplace_back(found, i);
     std::sort(thick.begin(), thick.end());
     const double thinnest =
@@ -472,21 +475,39 @@ class BoundedRemesher {
     return false;
   }
 
-  /// The width of the wall or of the gap beside a place of the surface that is far from the mesh: how far the
-  /// next polygon is along the normal or against it, whichever is less. Infinity for a place of the mesh, and
-  /// where there is none within four errors.
-  double thickness(const Surface& of, const SurfaceDistance& surface, const Far& at) const {
+  /// The width of the wall or of the gap that voxels have to show so that the mesh may come within the error of a place:
+  /// the largest of those about it that are nearly as near. What is thinner than that, as the edge of a wedge is and a
+  /// shallow fin, need not be shown. Infinity for a place of the mesh, and where something about it is thick.
+  double thickness_to_show(const Surface& of, const SurfaceDistance& surface, const Far& at) const {
+    if (!at.of_surface || at.distance <= options_.error) return std::numeric_limits<double>::infinity();
+    const TriangleTree& tree = surface.tree();
+    const double reach = kAround * options_.error;
+    std::vector<std::pair<std::uint32_t, Eigen::Vector3d>> around;
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(reach);
+    tree.for_each_near(at.place - half, at.place + half, [&](std::uint32_t t) {
+      const Eigen::Vector3d a = tree.corner(t, 0), b = tree.corner(t, 1), c = tree.corner(t, 2), inner = (a + b + c) / 3.0;
+      // The place of the triangle that is most within, as far as that is near.
+      const Eigen::Vector3d nearest = closest_point(at.place, a, b, c).position;
+      const double left = reach - (nearest - at.place).norm(), way = (inner - nearest).norm();
+      if (left >= 0.0) around.emplace_back(t, nearest + (way > left ? left / way : 1.0) * (inner - nearest));
+    });
+    double largest = thickness(of, tree, at.triangle, at.place);
+    for (std::size_t i = 0; i < around.size() && std::isfinite(largest); i += 1 + around.size() / kMostAround)
+      largest = std::max(largest, thickness(of, tree, around[i].first, around[i].second));
+    return largest;
+  }
+
+  /// The width of the wall or of the gap at a place of a polygon: how far the next polygon is along the normal or against
+  /// it, whichever is less. Infinity where there is none within four errors.
+  double thickness(const Surface& of, const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& from) const {
     constexpr double kNone = std::numeric_limits<double>::infinity();
-    if (!at.of_surface || at.distance <= options_.error) return kNone;
-    const Triangle& t = of.triangles[at.triangle];
+    const Triangle& t = of.triangles[triangle];
     std::array<Eigen::Vector3d, 3> corner;
     for (int i = 0; i < 3; ++i) corner[i] = of.points[t[i]].cast<double>();
     const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
-    const Eigen::Vector3d from = middle(of, at.triangle);
     const double most = 4.0 * options_.error;
     double nearest = most;
     const Eigen::Vector3d reach = most * normal.cwiseAbs();
-    const TriangleTree& tree = surface.tree();
     tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {
       const Eigen::Vector3d a = tree.corner(other, 0), b = tree.corner(other, 1), c = tree.corner(other, 2);
       // Neighbours are no opposite wall, but for the other side of a fin, which is folded over along an edge.

@@ -137,9 +137,9 @@ TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
   EXPECT_LE(made.voxel_size, 0.02);
 }
 
-TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
-  // A box with a fin over a diagonal of its lid, 2e-4 thick at the middle of its foot, nothing at its ends and its tip. (In a
-  // cube the diagonal would run through samples.)
+/// A box with a fin of a height over a diagonal of its lid, 2e-4 thick at the middle of its foot, nothing at its ends and its
+/// tip. (In a cube the diagonal would run through samples.)
+PolygonMesh box_with_fin(double height) {
   const double width = 0.83;
   PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, width, 1));
   std::erase_if(mesh.triangles, [&](const Triangle& t) {
@@ -157,17 +157,29 @@ TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
   const std::uint32_t a = corner(0, 0), b = corner(1, 0), c = corner(1, width), d = corner(0, width);
   const Vector3d middle(0.5, 0.5 * width, 1), across = 1e-4 * Vector3d(width, -1, 0).normalized();
   const std::uint32_t foot = add(middle + across), other_foot = add(middle - across),
-                      tip = add(middle + Vector3d(0, 0, 0.5));
+                      tip = add(middle + Vector3d(0, 0, height));
   for (const Triangle& t : {Triangle{a, b, foot}, {b, c, foot}, {c, d, other_foot}, {d, a, other_foot},
                             {a, foot, tip}, {foot, c, tip}, {c, other_foot, tip}, {other_foot, a, tip}})
     mesh.triangles.push_back(t);
-  const BoundedMesh refused = remesh(mesh, {.error = 0.05});
+  return mesh;
+}
+
+TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
+  const BoundedMesh refused = remesh(box_with_fin(0.5), {.error = 0.05});
   ASSERT_FALSE(refused.unmet.empty());
   EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
-  EXPECT_GT(refused.unmet.front().place.z(), 1.0);
-  // At the middles of the sides a third of the foot's.
-  EXPECT_NEAR(refused.thickness, 2e-4 / 3.0, 1e-5);
+  const Vector3d at = refused.unmet.front().place;
+  EXPECT_GT(at.z(), 1.05);
+  // The sides are planes, so that the fin thins out evenly from the middle of its foot to its ends and its tip.
+  EXPECT_NEAR(refused.thickness, 2e-4 * (2.0 * std::min(at.x(), 1.0 - at.x()) - (at.z() - 1.0) / 0.5), 1e-6);
   EXPECT_EQ(refused.rounds, 0);
+}
+
+TEST(BoundedRemesh, AFinThatIsShallowerThanTheErrorNeedNotBeShown) {
+  const BoundedMesh made = remesh(box_with_fin(0.03), {.error = 0.05});
+  ASSERT_TRUE(made.unmet.empty()) << explanation(made);
+  EXPECT_LE(made.from_surface, 0.05);
+  EXPECT_GT(made.voxel_size, 2e-3);
 }
 
 TEST(BoundedRemesh, ABudgetIsKept) {

@@ -73,7 +73,8 @@ class SurfaceDistance::Walk {
         continue;
       }
       const bool is_last = ++pieces > kMostPieces || radius < kSmallestPiece * limit_;
-      if (is_far && free_.is_free && (radius <= free_.radius || is_last) && is_free(piece.corners)) {
+      // The last pieces where what is near meets what is free are a little too far, though their middles are not.
+      if (free_.is_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
         free_area +=
             0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
         continue;

@@ -125,6 +125,14 @@ TEST(SurfaceDistance, FreePiecesNeedNotBeNear) {
   const DistanceFromSurface found = hold(from, to, 0.1, Vector3d::Zero(), free);
   EXPECT_TRUE(found.far.empty());
   EXPECT_NEAR(found.free_area, 0.4, 0.02);  // what is farther than a tenth from the half
+  // Where all may be far, nothing is: nor are pieces on the border of what is near, at whatever limit.
+  const Soup slanted{{{0.03f, 0.02f, 0.01f}, {0.97f, 0.41f, 0.3f}, {0.33f, 0.99f, 0.5f}}, {{0, 1, 2}}},
+      corner{{{0, 0, 0}, {0.4f, 0, 0}, {0.4f, 0.3f, 0}}, {{0, 1, 2}}};
+  free.is_free = [](const std::array<Vector3d, 3>&) { return true; };
+  for (const double limit : {0.05, 0.1, 0.1003, 0.1234}) {
+    EXPECT_TRUE(hold(from, to, limit, Vector3d::Zero(), free).far.empty()) << limit;
+    EXPECT_TRUE(hold(slanted, corner, limit, Vector3d::Zero(), free).far.empty()) << limit;
+  }
   free.is_free = [](const std::array<Vector3d, 3>&) { return false; };
   EXPECT_EQ(hold(from, to, 0.1, Vector3d::Zero(), free).far.size(), 2u);
 }
