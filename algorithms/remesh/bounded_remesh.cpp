@@ -459,15 +459,17 @@ class BoundedRemesher {
     const double thinnest =
         thick.empty() ? std::numeric_limits<double>::infinity() : thick[thick.size() / 20].first;
     // Voxels that are as thick as the thinnest wall show it wherever samples fall into it, or nearly.
-    const bool is_thin = std::isfinite(thinnest), too_thin = is_thin && kThinVoxels * thinnest < smallest;
+    const bool is_thin = std::isfinite(thinnest), is_hopeless = is_thin && kThinVoxels * thinnest < smallest;
     if (is_thin) factor = std::clamp(kVoxelOfThickness * thinnest / voxel_size, 0.2, 0.7);
-    if (!too_thin && voxel_size > 1.1 * smallest) {
+    if (!is_hopeless && voxel_size > 1.1 * smallest) {
       result_.voxel_size = std::max(smallest, factor * voxel_size);
       return false;
     }
     result_.voxel_size = smallest;
-    result_.thickness = is_thin ? thinnest : 0.0;
-    if (is_thin)
+    // What is thicker than that is shown, and not what keeps the bound from being reached.
+    const bool is_too_thin = is_thin && kVoxelOfThickness * thinnest < smallest;
+    result_.thickness = is_too_thin ? thinnest : 0.0;
+    if (is_too_thin)
       add(Unmet::thin, far[thick[thick.size() / 20].second]);
     else
       for (const Far& f : far) add(Unmet::thin, f);
