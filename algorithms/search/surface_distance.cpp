@@ -110,9 +110,9 @@ class SurfaceDistance::Walk {
   /// the searches that halving does. False, soon, for what is too large, too slim or too far for that.
   bool all_near_in_rows(const Corners& piece, double& upper) {
     const Eigen::Vector3d u = piece[1] - piece[0], v = piece[2] - piece[0];
-    const double a = u.norm(), b = v.norm(), c = (v - u).norm(), longest = std::max({a, b, c}), area = u.cross(v).norm();
-    if (!(area >= kLeastHeight * longest * longest)) return false;
-    const double circumradius = a * b * c / (2.0 * area), parts = std::ceil(circumradius / (kBetweenRows * limit_));
+    const double a = u.norm(), b = v.norm(), c = (v - u).norm(), longest = std::max({a, b, c}), twice_area = u.cross(v).norm();
+    if (!(twice_area >= kLeastHeight * longest * longest)) return false;
+    const double circumradius = a * b * c / (2.0 * twice_area), parts = std::ceil(circumradius / (kBetweenRows * limit_));
     if (!(parts >= 2.0 && parts <= kMostParts)) return false;
     const int n = int(parts);
     const double between = circumradius / n, enough = (limit_ - between) * (limit_ - between);
