@@ -27,8 +27,18 @@ namespace {
 // Shares of the error. A uniform mesh that is within kUniform of it leaves the collapses the rest; points of
 // both surfaces tell only nearly how far these are apart, which kUnseen allows for.
 constexpr double kUniform = 0.6, kUsed = 0.97, kUnseen = 1.1;
-/// Voxels of the first try and, where nobody says so, the smallest, in errors.
+/// In errors: what points may be apart at most, and from where on distances are not told apart.
+constexpr double kNear = 0.85, kFarthest = 4.0;
+/// Voxels of the first try that looks for what is thin and, where nobody says so, the smallest, in errors.
 constexpr double kFirstVoxel = 1.5, kSmallestVoxel = 0.125;
+/// How much larger voxels must be than these to be worth a try, for shapes that are plane or smooth; how many tries there are
+/// in which all but a few places are near, and the voxels of the next one, in those of this one.
+constexpr double kWorthLarger = 2.0, kNextLarger = 0.8;
+constexpr int kLargerTries = 4;
+/// Share of the error that such a voxel's uniform mesh may use up in the mean: triangles are about as many more.
+constexpr double kLittle = 0.02;
+/// Points of it that are asked first whether it does.
+constexpr std::size_t kAskedFirst = 1000;
 /// Voxels along the longest side at least, so that there is something to collapse.
 constexpr double kFewestVoxels = 16.0;
 /// Voxels of the next try where points did not tell what is too far, in those of this one.
@@ -103,6 +113,8 @@ struct Attempt {
   std::vector<Eigen::Vector3f> file_points;  ///< world units relative to the placement's origin
   Eigen::Vector3d offset;                    ///< of the placement's origin from the mesh's, world units
 
+  /// A point of the uniform mesh in the frame of the input's origin.
+  Eigen::Vector3d place(std::size_t point) const { return offset + file_points[point].cast<double>(); }
   std::vector<Eigen::Vector3f> in_file(const std::vector<Eigen::Vector3d>& points) const {
     std::vector<Eigen::Vector3f> result(points.size());
     std::transform(points.begin(), points.end(), result.begin(),
@@ -139,24 +151,77 @@ class BoundedRemesher {
     result_.error = options_.error;
     result_.over_holes = options_.over_holes;
     result_.voxel_size = std::min(kFirstVoxel * options_.error, longest_ / kFewestVoxels);
+    if (try_larger(result_.voxel_size)) return std::move(result_);
     while (!try_at(result_.voxel_size) && result_.unmet.empty()) ++result_.rounds;
     if (!result_.unmet.empty()) result_.mesh = {};
     return std::move(result_);
   }
 
  private:
+  /// Whether the bound was reached with larger voxels than `first`, which is so where their uniform mesh already leaves the
+  /// collapses nearly all of the error: of plane parts and smooth ones. A try with twice the voxels costs a quarter.
+  /// Nothing is refused here: what larger voxels do not show, smaller ones may.
+  bool try_larger(double first) {
+    int tries = 0;
+    for (double voxel_size = longest_ / kFewestVoxels; voxel_size > kWorthLarger * first && tries < kLargerTries;) {
+      const std::optional<Attempt> made = attempt(voxel_size);
+      if (!made) {
+        voxel_size *= 0.5;
+        continue;
+      }
+      const SurfaceDistance surface(made->surface.points, made->surface.triangles);
+      std::vector<double> apart;
+      if (const double used = share_used(*made, surface, apart); used > kLittle) {
+        // Halved voxels bring a smooth surface four times as near.
+        voxel_size *= std::clamp(std::sqrt(kLittle / used), 0.1, 0.7);
+        continue;
+      }
+      if (reaches(*made, surface, apart)) {
+        result_.voxel_size = voxel_size;
+        note_surface(*made);
+        return true;
+      }
+      voxel_size *= kNextLarger;
+      ++tries;
+    }
+    result_.rounds = 0;
+    return false;
+  }
+
+  /// The share of the error that a uniform mesh uses up in the mean over its points. `apart` says by point how far the surface
+  /// is from it and from the triangles around it; where the share is more than kLittle, some points and triangles may have
+  /// said so, and it is empty.
+  double share_used(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
+    const std::vector<Triangle>& triangles = now.fine.triangles();
+    double used = mean_share(apart_at_points(now, surface, 1 + now.file_points.size() / kAskedFirst));
+    if (used <= kLittle) used = mean_share(apart_in_triangles(now, surface, 1 + triangles.size() / kAskedFirst));
+    if (used > kLittle) return used;
+    apart = apart_at_points(now, surface, 1);
+    const std::vector<double> within = apart_in_triangles(now, surface, 1);
+    for (std::size_t t = 0; t < within.size(); ++t)
+      for (const std::uint32_t p : triangles[t]) apart[p] = std::max(apart[p], within[t]);
+    return mean_share(apart);
+  }
+
+  /// Whether the bound is reached from a uniform mesh that uses up little of the error in the mean.
+  bool reaches(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
+    if (std::ranges::max(apart) > kNear * options_.error) return false;
+    const SurfaceDistance uniform(now.file_points, now.fine.triangles());
+    return look(now, uniform, apart).empty() && far_between_points(now, surface, uniform).empty() &&
+           collapse(now, surface, uniform, apart).empty();
+  }
+
   /// Whether the bound was reached with voxels of this size. If not, result_.voxel_size is the size to try
   /// next, or result_.unmet says why there is none.
   bool try_at(double voxel_size) {
     std::optional<Attempt> made = attempt(voxel_size);
     if (!made) return smaller(voxel_size);
     const Attempt& now = *made;
-    result_.hole_area = now.surface.cap_area;
-    result_.left_out_area = std::max(0.0, area_ - now.surface.area);
+    note_surface(now);
     const SurfaceDistance surface(now.surface.points, now.surface.triangles),
         uniform(now.file_points, now.fine.triangles());
-    std::vector<double> apart;  // by point of the uniform mesh, about how far the surfaces are apart there
-    if (const std::vector<Far> far = look(now, surface, uniform, apart); !far.empty()) {
+    std::vector<double> apart = apart_at_points(now, surface, 1);
+    if (const std::vector<Far> far = look(now, uniform, apart); !far.empty()) {
       double worst = 0.0;
       for (const Far& f : far) worst = std::max(worst, f.distance);
       if (explained(now, far)) return false;
@@ -168,7 +233,15 @@ class BoundedRemesher {
       if (explained(now, far)) return false;
       return smaller(voxel_size, now.surface, kFinerBetween, far);
     }
-    return collapse(now, surface, uniform, apart);
+    const std::vector<Far> far = collapse(now, surface, uniform, apart);
+    if (far.empty()) return true;
+    if (explained(now, far)) return false;
+    return smaller(now.voxel_size, now.surface, kFinerBetween, far);
+  }
+
+  void note_surface(const Attempt& now) {
+    result_.hole_area = now.surface.cap_area;
+    result_.left_out_area = std::max(0.0, area_ - now.surface.area);
   }
 
   /// Voxels and their uniform mesh; none if that is empty.
@@ -203,23 +276,44 @@ class BoundedRemesher {
     return result;
   }
 
-  /// How far the surfaces are apart at the points of both, and where that is more than the collapses can do
-  /// with.
-  std::vector<Far> look(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
-                        std::vector<double>& apart) {
+  /// By point of the uniform mesh, or for every `step`-th, how far it is from the surface, world units; kFarthest errors
+  /// where that is more.
+  std::vector<double> apart_at_points(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
     const Stage stage(context_, "compare");
-    const double most = 4.0 * options_.error;
-    const std::size_t n = now.file_points.size();
-    apart.assign(n, 0.0);
-    std::vector<Eigen::Vector3d> at(n);
-    parallel_blocks(n, context_, [&](std::size_t i) {
-      at[i] = now.offset + now.file_points[i].cast<double>();
-      apart[i] = surface.at(at[i], most);
+    std::vector<double> apart((now.file_points.size() + step - 1) / step);
+    parallel_blocks(apart.size(), context_,
+                    [&](std::size_t i) { apart[i] = surface.at(now.place(i * step), kFarthest * options_.error); });
+    return apart;
+  }
+  double mean_share(const std::vector<double>& apart) const {
+    return std::accumulate(apart.begin(), apart.end(), 0.0) / (double(apart.size()) * options_.error);
+  }
+
+  /// By triangle of the uniform mesh, or for every `step`-th, the most that its middle and those of its sides are from the
+  /// surface, as apart_at_points() says it.
+  std::vector<double> apart_in_triangles(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
+    const Stage stage(context_, "compare");
+    const std::vector<Triangle>& triangles = now.fine.triangles();
+    std::vector<double> apart((triangles.size() + step - 1) / step);
+    parallel_blocks(apart.size(), context_, [&](std::size_t i) {
+      const Triangle& t = triangles[i * step];
+      const Eigen::Vector3d a = now.place(t[0]), b = now.place(t[1]), c = now.place(t[2]);
+      for (const Eigen::Vector3d& p : {Eigen::Vector3d((a + b + c) / 3.0), Eigen::Vector3d((a + b) / 2.0),
+                                       Eigen::Vector3d((b + c) / 2.0), Eigen::Vector3d((c + a) / 2.0)})
+        apart[i] = std::max(apart[i], surface.at(p, kFarthest * options_.error));
     });
+    return apart;
+  }
+
+  /// Where points of the surfaces are farther apart than the collapses can do with. `apart`, as of apart_at_points(), becomes
+  /// what counts at each point: what is farthest of the triangles around it and of the surface nearest to these.
+  std::vector<Far> look(const Attempt& now, const SurfaceDistance& uniform, std::vector<double>& apart) {
+    const Stage stage(context_, "compare");
+    const double most = kFarthest * options_.error;
     std::vector<Far> far;
-    const double limit = 0.85 * options_.error;
-    for (std::size_t i = 0; i < n; ++i)
-      if (apart[i] > limit) far.push_back({at[i], apart[i], false, now.fine.around(std::uint32_t(i))[0]});
+    const double limit = kNear * options_.error;
+    for (std::size_t i = 0; i < apart.size(); ++i)
+      if (apart[i] > limit) far.push_back({now.place(i), apart[i], false, now.fine.around(std::uint32_t(i))[0]});
 
     // The other way, each place of the surface counts at the corners of the uniform triangle that is nearest.
     std::vector<std::uint8_t> used(now.surface.points.size(), 0);
@@ -267,9 +361,9 @@ class BoundedRemesher {
     return far;
   }
 
-  /// Collapses with what is left of the error, and the proof.
-  bool collapse(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
-                const std::vector<double>& apart) {
+  /// Collapses with what is left of the error, and the proof: the places where it fails, or none and the mesh in the result.
+  std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
+                            const std::vector<double>& apart) {
     // A place of the mesh is then within the error by the triangle inequality, as far as `apart` is right.
     std::vector<float> tolerance(apart.size());
     for (std::size_t i = 0; i < apart.size(); ++i)
@@ -284,12 +378,11 @@ class BoundedRemesher {
         mesh.origin = now.file.placement().origin;
         mesh.points = now.in_file(coarse.points);
         mesh.triangles = coarse.triangles;
-        return true;
+        break;
       }
       if (!lower_around(now, uniform.tree(), far, tolerance)) break;
     }
-    if (explained(now, far)) return false;
-    return smaller(now.voxel_size, now.surface, kFinerBetween, far);
+    return far;
   }
 
   /// What of the polygons need not be near: pieces that bound nothing.
@@ -507,7 +600,7 @@ class BoundedRemesher {
     std::array<Eigen::Vector3d, 3> corner;
     for (int i = 0; i < 3; ++i) corner[i] = of.points[t[i]].cast<double>();
     const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
-    const double most = 4.0 * options_.error;
+    const double most = kFarthest * options_.error;
     double nearest = most;
     const Eigen::Vector3d reach = most * normal.cwiseAbs();
     tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {

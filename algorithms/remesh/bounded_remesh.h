@@ -9,7 +9,8 @@
 // their middle. That is the one part of the bound that is looked at in places and not proved: the area of
 // what counts as free so is told.
 //
-// **The way.** Voxels are made smaller until the uniform mesh is within most of the error both ways, as far
+// **The way.** Of shapes that are plane or smooth large voxels have a uniform mesh that uses up next to nothing of the error;
+// these are tried first, for a try costs little beside the next. Else voxels are made smaller until the uniform mesh is within most of the error both ways, as far
 // as points of both tell, and within the error between these, triangle by triangle
 // (search/surface_distance.h). What is left of the error at each place, and a little less, is the tolerance
 // of the collapses there (certified_collapse/). The outcome is held against the surface in the same way:
@@ -60,7 +61,7 @@ struct BoundedMesh {
   double to_surface = 0.0,
          from_surface = 0.0;      ///< bounds of the distance, each way, that are proved; world units
   double voxel_size = 0.0;        ///< world units
-  int rounds = 0;                 ///< how often voxels or tolerances were made smaller
+  int rounds = 0;                 ///< how often voxels or tolerances were made smaller than those that suit any shape
   double free_area = 0.0;         ///< area of polygons far from the mesh that bound nothing, world units²
   double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
   bool over_holes = false;        ///< as it was asked for

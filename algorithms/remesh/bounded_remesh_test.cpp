@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -65,6 +66,42 @@ TEST(BoundedRemesh, ABoxIsKeptToTheErrorWithAFewTriangles) {
       nearest = std::min(nearest, (made.mesh.world(i) - at).norm());
     EXPECT_LE(nearest, 0.03);
   }
+}
+
+TEST(BoundedRemesh, PlanePartsNeedFewVoxelsHoweverSmallTheError) {
+  const PolygonMesh polygons = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  for (const double error : {0.02, 0.002, 0.0005}) {
+    const BoundedMesh made = remesh(polygons, {.error = error});
+    ASSERT_TRUE(made.unmet.empty());
+    EXPECT_LE(made.mesh.triangle_count(), 20u);  // 12 if the collapses were lucky
+    EXPECT_LE(made.to_surface, error);
+    EXPECT_LE(made.from_surface, error);
+    EXPECT_GT(made.voxel_size, 0.01);
+  }
+  // Across the lattice, too.
+  PolygonMesh turned = box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9));
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
+  for (Eigen::Vector3f& p : turned.points) p = (turn * p.cast<double>()).cast<float>();
+  const BoundedMesh made = remesh(turned, {.error = 0.01});
+  ASSERT_TRUE(made.unmet.empty());
+  EXPECT_EQ(made.mesh.triangle_count(), 12u);
+  EXPECT_GT(made.voxel_size, 0.04);
+}
+
+TEST(BoundedRemesh, WhatLargeVoxelsDoNotShowIsThereAllTheSame) {
+  // A box with a shaft within, a sixtieth of it wide.
+  PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 0.7, 0.6));
+  const PolygonMesh shaft = box(Vector3d(0.4013, 0.3307, 0.2), Vector3d(0.4173, 0.3467, 0.5));
+  const auto first = std::uint32_t(both.points.size());
+  for (std::size_t i = 0; i < shaft.points.size(); ++i) both.points.push_back((shaft.world(i) - both.origin).cast<float>());
+  // Facing inwards: a cavity.
+  for (const Triangle& t : shaft.triangles) both.triangles.push_back({first + t[0], first + t[2], first + t[1]});
+  const BoundedMesh made = remesh(both, {.error = 0.004});
+  ASSERT_TRUE(made.unmet.empty());
+  double nearest = 1;
+  for (std::size_t i = 0; i < made.mesh.points.size(); ++i)
+    nearest = std::min(nearest, (made.mesh.world(i) - Vector3d(0.4013, 0.3307, 0.2)).norm());
+  EXPECT_LE(nearest, 0.0061);
 }
 
 TEST(BoundedRemesh, ASphereNeedsFewerTrianglesTheLargerTheError) {

@@ -1,6 +1,7 @@
 #include "algorithms/search/surface_distance.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -20,6 +21,11 @@ constexpr double kSmallestPiece = 1.0 / 4096.0;  // of the limit
 constexpr double kBetweenRows = 0.8;
 constexpr int kMostParts = 16;
 constexpr double kLeastHeight = 0.3;
+/// Sides of a triangle of the soup, in limits, from which on pieces are cut along them: pieces of about a limit in size hold
+/// anyway.
+constexpr double kLongSide = 2.0;
+/// How far, in limits, a piece must reach over such a side, and how far it must lie within it, to be cut there.
+constexpr double kReachesOver = 1.0 / 64.0;
 
 double radius_about(const Eigen::Vector3d& middle, const Corners& piece) {
   double squared = 0.0;
@@ -60,7 +66,7 @@ class SurfaceDistance::Walk {
       stack_.pop_back();
       // What was nearest to the whole is most often near its parts, which saves the search.
       if (piece.nearest != TriangleTree::kNone && all_near(piece.corners, piece.nearest, upper)) continue;
-      if (wanted_ == Wanted::any_bound && all_near_in_rows(piece.corners, upper)) continue;
+      if (wanted_ == Wanted::any_bound && !is_large(piece.nearest) && all_near_in_rows(piece.corners, upper)) continue;
       const Eigen::Vector3d middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
       const double radius = radius_about(middle, piece.corners);
       const NearestTriangle found = nearest(middle, piece.nearest, radius);
@@ -87,7 +93,7 @@ class SurfaceDistance::Walk {
       }
       if (!is_far && found.triangle != piece.nearest && all_near(piece.corners, found.triangle, upper))
         continue;
-      halve(piece.corners, found.triangle);
+      if (is_far || !cut_along(piece.corners, found.triangle)) halve(piece.corners, found.triangle);
     }
     return true;
   }
@@ -142,6 +148,52 @@ class SurfaceDistance::Walk {
   bool is_free(Corners piece) const {
     for (Eigen::Vector3d& p : piece) p -= offset_;
     return free_.is_free(piece);
+  }
+
+  bool is_large(std::uint32_t triangle) const {
+    if (triangle == TriangleTree::kNone) return false;
+    const Eigen::Vector3d a = tree_.corner(triangle, 0), b = tree_.corner(triangle, 1), c = tree_.corner(triangle, 2);
+    const double least = kLongSide * kLongSide * limit_ * limit_;
+    return (b - a).squaredNorm() > least || (c - b).squaredNorm() > least || (a - c).squaredNorm() > least;
+  }
+
+  /// Cuts a piece by the plane through a side of a triangle of the soup, upright on it, that it reaches over most. What is
+  /// over the triangle alone is then near it, so that a plane part is shown to be near another by as many pieces as their
+  /// triangles overlap in, however small the limit. False, and nothing cut, where the triangle is small or too low under the
+  /// piece.
+  bool cut_along(const Corners& piece, std::uint32_t triangle) {
+    if (!is_large(triangle)) return false;
+    const Corners at = {tree_.corner(triangle, 0), tree_.corner(triangle, 1), tree_.corner(triangle, 2)};
+    const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]).normalized();
+    if (!normal.allFinite() || normal.isZero()) return false;
+    for (const Eigen::Vector3d& p : piece)
+      if (std::abs(normal.dot(p - at[0])) > limit_) return false;
+    double most = kReachesOver * limit_;
+    std::array<double, 3> over;  // of the corners, over the side where the piece reaches farthest
+    bool found = false;
+    for (int side = 0; side < 3; ++side) {
+      const Eigen::Vector3d outwards = (at[(side + 1) % 3] - at[side]).cross(normal).normalized();
+      std::array<double, 3> here;
+      for (int i = 0; i < 3; ++i) here[i] = outwards.dot(piece[i] - at[side]);
+      const auto [least, largest] = std::minmax_element(here.begin(), here.end());
+      if (*least > -kReachesOver * limit_ || *largest <= most) continue;
+      most = *largest;
+      over = here;
+      found = true;
+    }
+    if (!found) return false;
+    // One corner is on one side of the plane, two are on the other.
+    int lone = 0;
+    while ((over[lone] > 0) == (over[(lone + 1) % 3] > 0) || (over[lone] > 0) == (over[(lone + 2) % 3] > 0)) ++lone;
+    const int i = (lone + 1) % 3, j = (lone + 2) % 3;
+    const auto on_plane = [&](int other) -> Eigen::Vector3d {
+      return piece[lone] + over[lone] / (over[lone] - over[other]) * (piece[other] - piece[lone]);
+    };
+    const Eigen::Vector3d p = on_plane(i), q = on_plane(j);
+    stack_.push_back({{p, piece[i], piece[j]}, triangle});
+    stack_.push_back({{p, piece[j], q}, triangle});
+    stack_.push_back({{piece[lone], p, q}, triangle});
+    return true;
   }
 
   // Across its longest side, so that pieces do not become needles, whose radius would fall slowly.

@@ -46,7 +46,8 @@ enum class Wanted { small_bound, any_bound };
 /// one triangle of the soup, all of the piece is, for the distance to a convex set is a convex function; and
 /// where the distance of the piece's middle and the piece's radius add up to no more than the limit, by the
 /// triangle inequality, as it does where points in rows over the piece are near enough for how far they are from each
-/// other. Pieces for which none of these holds are halved. (Compare Tang, Lee and Kim, Interactive
+/// other. Pieces for which none of these holds are cut along the sides of the triangle below where that is large, so that
+/// the first rule holds for what is over it, and halved elsewhere. (Compare Tang, Lee and Kim, Interactive
 /// Hausdorff Distance Computation for General Polygonal Models, 2009.) What has come to more than four
 /// million pieces, or to pieces smaller than a 4096th of the limit, counts as far. The limit is lowered by
 /// 1e-7 of the soup's extent for rounding.

@@ -73,6 +73,24 @@ TEST(SurfaceDistance, ALargeTriangleIsCoveredByManySmallOnes) {
   EXPECT_GE(found.upper, 1e-3 - 1e-9);
 }
 
+TEST(SurfaceDistance, PlanePartsAreShownToBeNearHoweverSmallTheLimit) {
+  // By as many pieces as the triangles overlap in: halved ones would be millions, which count as far.
+  for (const std::uint32_t n : {1u, 3u, 7u}) {
+    Soup to = square(1, 5e-7f, n);
+    for (Triangle& t : to.triangles) t = {t[2], t[0], t[1]};
+    Soup from = square(1, 0, 5);
+    for (Vector3f& p : from.points) p.x() = 1 - p.x();  // the other diagonals
+    const DistanceFromSurface near = hold(from, to, 1e-6);
+    EXPECT_TRUE(near.far.empty());
+    EXPECT_GE(near.upper, 5e-7);
+    EXPECT_EQ(hold(from, to, 4e-7).far.size(), from.triangles.size());
+    // A notch between the triangles is not stepped over, nor is a rim.
+    to.triangles.pop_back();
+    EXPECT_FALSE(hold(from, to, 1e-6).far.empty());
+    EXPECT_FALSE(hold(square(1.00001f, 0, 2), square(1, 5e-7f, n), 1e-6).far.empty());
+  }
+}
+
 TEST(SurfaceDistance, WhatIsJustTooFarIsFarAtEverySizeAndTurn) {
   // A triangle that is cut into few parts or many, at a slant to the square: one corner alone is too far, then none.
   const Soup to = square(4, 0, 40);
