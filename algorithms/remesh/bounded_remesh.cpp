@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -43,6 +44,8 @@ constexpr std::size_t kAskedFirst = 1000;
 constexpr double kFewestVoxels = 16.0;
 /// Voxels of the next try where points did not tell what is too far, in those of this one.
 constexpr double kFinerBetween = 0.6;
+/// Least tolerance of what is collapsed again, in errors, and the triangles that must be left of it for another time.
+constexpr double kLeastShare = 0.02, kWorthAgain = 0.95;
 /// A tolerance that was lowered below this many voxels is of no more use.
 constexpr double kLeastTolerance = 0.02;
 /// Memory that a point of the uniform mesh takes until it is written, bytes.
@@ -104,10 +107,10 @@ Eigen::Vector3d middle(const Surface& surface, std::uint32_t triangle) {
          3.0;
 }
 
-/// The uniform mesh at one voxel size, and the surface that it stands for.
+/// A mesh to collapse, first the uniform one at a voxel size, and the surface that it stands for.
 struct Attempt {
   double voxel_size;
-  Surface surface;
+  std::shared_ptr<const Surface> surface;
   FilePoints file;
   FineMesh fine;                             ///< index space
   std::vector<Eigen::Vector3f> file_points;  ///< world units relative to the placement's origin
@@ -169,7 +172,7 @@ class BoundedRemesher {
         voxel_size *= 0.5;
         continue;
       }
-      const SurfaceDistance surface(made->surface.points, made->surface.triangles);
+      const SurfaceDistance surface(made->surface->points, made->surface->triangles);
       std::vector<double> apart;
       if (const double used = share_used(*made, surface, apart); used > kLittle) {
         // Halved voxels bring a smooth surface four times as near.
@@ -192,14 +195,10 @@ class BoundedRemesher {
   /// is from it and from the triangles around it; where the share is more than kLittle, some points and triangles may have
   /// said so, and it is empty.
   double share_used(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
-    const std::vector<Triangle>& triangles = now.fine.triangles();
     double used = mean_share(apart_at_points(now, surface, 1 + now.file_points.size() / kAskedFirst));
-    if (used <= kLittle) used = mean_share(apart_in_triangles(now, surface, 1 + triangles.size() / kAskedFirst));
+    if (used <= kLittle) used = mean_share(apart_in_triangles(now, surface, 1 + now.fine.triangles().size() / kAskedFirst));
     if (used > kLittle) return used;
-    apart = apart_at_points(now, surface, 1);
-    const std::vector<double> within = apart_in_triangles(now, surface, 1);
-    for (std::size_t t = 0; t < within.size(); ++t)
-      for (const std::uint32_t p : triangles[t]) apart[p] = std::max(apart[p], within[t]);
+    apart = apart_around_points(now, surface);
     return mean_share(apart);
   }
 
@@ -208,7 +207,7 @@ class BoundedRemesher {
     if (std::ranges::max(apart) > kNear * options_.error) return false;
     const SurfaceDistance uniform(now.file_points, now.fine.triangles());
     return look(now, uniform, apart).empty() && far_between_points(now, surface, uniform).empty() &&
-           collapse(now, surface, uniform, apart).empty();
+           collapse_all(now, surface, apart).empty();
   }
 
   /// Whether the bound was reached with voxels of this size. If not, result_.voxel_size is the size to try
@@ -218,30 +217,30 @@ class BoundedRemesher {
     if (!made) return smaller(voxel_size);
     const Attempt& now = *made;
     note_surface(now);
-    const SurfaceDistance surface(now.surface.points, now.surface.triangles),
+    const SurfaceDistance surface(now.surface->points, now.surface->triangles),
         uniform(now.file_points, now.fine.triangles());
     std::vector<double> apart = apart_at_points(now, surface, 1);
     if (const std::vector<Far> far = look(now, uniform, apart); !far.empty()) {
       double worst = 0.0;
       for (const Far& f : far) worst = std::max(worst, f.distance);
       if (explained(now, far)) return false;
-      return smaller(voxel_size, now.surface, std::clamp(kUniform * options_.error / worst, 0.35, 0.7), far);
+      return smaller(voxel_size, *now.surface, std::clamp(kUniform * options_.error / worst, 0.35, 0.7), far);
     }
     // Points tell nearly, and at once. Where the uniform mesh itself is too far between them, no tolerance helps, and
     // collapses and their proof, which take most of the time, would be for nothing.
     if (const std::vector<Far> far = far_between_points(now, surface, uniform); !far.empty()) {
       if (explained(now, far)) return false;
-      return smaller(voxel_size, now.surface, kFinerBetween, far);
+      return smaller(voxel_size, *now.surface, kFinerBetween, far);
     }
-    const std::vector<Far> far = collapse(now, surface, uniform, apart);
+    const std::vector<Far> far = collapse_all(now, surface, apart);
     if (far.empty()) return true;
     if (explained(now, far)) return false;
-    return smaller(now.voxel_size, now.surface, kFinerBetween, far);
+    return smaller(now.voxel_size, *now.surface, kFinerBetween, far);
   }
 
   void note_surface(const Attempt& now) {
-    result_.hole_area = now.surface.cap_area;
-    result_.left_out_area = std::max(0.0, area_ - now.surface.area);
+    result_.hole_area = now.surface->cap_area;
+    result_.left_out_area = std::max(0.0, area_ - now.surface->area);
   }
 
   /// Voxels and their uniform mesh; none if that is empty.
@@ -266,12 +265,12 @@ class BoundedRemesher {
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
     Attempt result{
         voxel_size,
-        surface_of(std::move(volume.boundary), turns_, options_.over_holes),
+        std::make_shared<const Surface>(surface_of(std::move(volume.boundary), turns_, options_.over_holes)),
         file,
         FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads), context_),
         {},
         file.placement().origin - mesh_.origin};
-    if (result.surface.triangles.empty()) return std::nullopt;
+    if (result.surface->triangles.empty()) return std::nullopt;
     result.file_points = result.in_file(result.fine.points());
     return result;
   }
@@ -305,6 +304,15 @@ class BoundedRemesher {
     return apart;
   }
 
+  /// By point, the most that it and the triangles around it are from the surface, as far as their middles and sides tell.
+  std::vector<double> apart_around_points(const Attempt& now, const SurfaceDistance& surface) {
+    std::vector<double> apart = apart_at_points(now, surface, 1);
+    const std::vector<double> within = apart_in_triangles(now, surface, 1);
+    for (std::size_t t = 0; t < within.size(); ++t)
+      for (const std::uint32_t p : now.fine.triangles()[t]) apart[p] = std::max(apart[p], within[t]);
+    return apart;
+  }
+
   /// Where points of the surfaces are farther apart than the collapses can do with. `apart`, as of apart_at_points(), becomes
   /// what counts at each point: what is farthest of the triangles around it and of the surface nearest to these.
   std::vector<Far> look(const Attempt& now, const SurfaceDistance& uniform, std::vector<double>& apart) {
@@ -316,22 +324,22 @@ class BoundedRemesher {
       if (apart[i] > limit) far.push_back({now.place(i), apart[i], false, now.fine.around(std::uint32_t(i))[0]});
 
     // The other way, each place of the surface counts at the corners of the uniform triangle that is nearest.
-    std::vector<std::uint8_t> used(now.surface.points.size(), 0);
+    std::vector<std::uint8_t> used(now.surface->points.size(), 0);
     std::vector<std::uint32_t> one(used.size(), 0);
-    for (std::uint32_t t = 0; t < now.surface.triangles.size(); ++t)
-      for (const std::uint32_t p : now.surface.triangles[t]) used[p] = 1, one[p] = t;
+    for (std::uint32_t t = 0; t < now.surface->triangles.size(); ++t)
+      for (const std::uint32_t p : now.surface->triangles[t]) used[p] = 1, one[p] = t;
     std::vector<NearestTriangle> nearest(used.size(), NearestTriangle{0.0, TriangleTree::kNone});
     parallel_blocks(used.size(), context_, [&](std::size_t i) {
       if (used[i])
-        nearest[i] = uniform.tree().nearest(now.surface.points[i].cast<double>() - now.offset, most * most);
+        nearest[i] = uniform.tree().nearest(now.surface->points[i].cast<double>() - now.offset, most * most);
     });
     std::vector<double> own = apart;
     for (std::size_t i = 0; i < used.size(); ++i) {
       if (!used[i]) continue;
       const double distance = std::sqrt(nearest[i].squared);
       if (distance > limit) {
-        const Far place{now.surface.points[i].cast<double>(), distance, true, one[i]};
-        if (bounds_nothing(now.surface, place)) continue;
+        const Far place{now.surface->points[i].cast<double>(), distance, true, one[i]};
+        if (bounds_nothing(*now.surface, place)) continue;
         far.push_back(place);
       }
       if (nearest[i].triangle == TriangleTree::kNone) continue;
@@ -355,32 +363,60 @@ class BoundedRemesher {
     const double error = options_.error;
     const auto to = surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_, {}, Wanted::any_bound);
     for (const FarTriangle& f : to.far) far.push_back({f.place + now.offset, f.distance, false, f.triangle});
-    const auto from = uniform.hold(now.surface.points, -now.offset, now.surface.triangles, error, context_, free_pieces(),
+    const auto from = uniform.hold(now.surface->points, -now.offset, now.surface->triangles, error, context_, free_pieces(),
                                    Wanted::any_bound);
     for (const FarTriangle& f : from.far) far.push_back({f.place, f.distance, true, f.triangle});
     return far;
   }
 
-  /// Collapses with what is left of the error, and the proof: the places where it fails, or none and the mesh in the result.
-  std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
-                            const std::vector<double>& apart) {
-    // A place of the mesh is then within the error by the triangle inequality, as far as `apart` is right.
+  /// Collapses with what is left of the error, again as long as that is worth it: the places where the first time fails, or
+  /// none and the mesh in the result.
+  std::vector<Far> collapse_all(const Attempt& uniform, const SurfaceDistance& surface, const std::vector<double>& apart) {
+    CertifiedMesh mesh;
+    std::vector<Far> far = collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh);
+    if (!far.empty()) return far;
+    // What is reached may be collapsed like what it came from, for the proof is against the polygons each time. Cubes and
+    // passes leave points on plane parts where two thirds may go; of a scan next to none are left.
+    for (bool is_worth_it = true; is_worth_it;) {
+      const BoundedMesh before = result_;
+      const Attempt now{uniform.voxel_size, uniform.surface, uniform.file, FineMesh(mesh.points, mesh.triangles, context_),
+                        uniform.in_file(mesh.points), uniform.offset};
+      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh).empty()) {
+        result_ = before;
+        break;
+      }
+      result_.rounds = before.rounds;
+      is_worth_it = double(mesh.triangles.size()) < kWorthAgain * double(before.mesh.triangle_count());
+    }
+    return far;
+  }
+
+  /// What is left of the error at each point, voxels, and at least a share of it.
+  std::vector<float> tolerances(const Attempt& now, const std::vector<double>& apart, double least) const {
     std::vector<float> tolerance(apart.size());
     for (std::size_t i = 0; i < apart.size(); ++i)
-      tolerance[i] = float(std::max(0.0, (kUsed * options_.error - kUnseen * apart[i]) / now.voxel_size));
+      tolerance[i] =
+          float(std::max(least * options_.error, kUsed * options_.error - kUnseen * apart[i]) / now.voxel_size);
+    return tolerance;
+  }
+
+  /// Collapses, and the proof: the places where it fails, or none, and what came of it in `mesh` and in the result.
+  std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, std::vector<float> tolerance,
+                            CertifiedMesh& mesh) {
+    // A place of the mesh is then within the error by the triangle inequality, as far as the tolerances are right.
     std::vector<Far> far;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
-      const CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
+      CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
       far = prove(now, surface, coarse);
       // Nothing is written but what was proved just now, as the file will hold it.
       if (far.empty()) {
-        PolygonMesh& mesh = result_.mesh;
-        mesh.origin = now.file.placement().origin;
-        mesh.points = now.in_file(coarse.points);
-        mesh.triangles = coarse.triangles;
+        result_.mesh.origin = now.file.placement().origin;
+        result_.mesh.points = now.in_file(coarse.points);
+        result_.mesh.triangles = coarse.triangles;
+        mesh = std::move(coarse);
         break;
       }
-      if (!lower_around(now, uniform.tree(), far, tolerance)) break;
+      if (!lower_around(now, far, tolerance)) break;
     }
     return far;
   }
@@ -401,7 +437,7 @@ class BoundedRemesher {
     // Polygons that have the same on both sides are not part of the surface; each piece of them that is not
     // near is asked.
     const DistanceFromSurface from =
-        hold(mesh, now.surface.points, -now.offset, now.surface.triangles, free_pieces());
+        hold(mesh, now.surface->points, -now.offset, now.surface->triangles, free_pieces());
     result_.to_surface = to.upper;
     result_.from_surface = from.upper;
     result_.free_area = from.free_area;
@@ -451,15 +487,16 @@ class BoundedRemesher {
   }
 
   /// Lowers the tolerance around the places. False if it is next to nothing at one of them already.
-  bool lower_around(const Attempt& now, const TriangleTree& uniform, const std::vector<Far>& far,
+  bool lower_around(const Attempt& now, const std::vector<Far>& far,
                     std::vector<float>& tolerance) {
+    const TriangleTree triangles(now.file_points, now.fine.triangles(), 1.0);
     std::vector<std::uint8_t> lowered(tolerance.size(), 0);
     bool useful = true;
     for (const Far& f : far) {
       const Eigen::Vector3d reach = Eigen::Vector3d::Constant(options_.error + 2.0 * now.voxel_size);
       const Eigen::Vector3d p = f.place - now.offset;
       float largest = 0.0f;
-      uniform.for_each_near(p - reach, p + reach, [&](std::uint32_t t) {
+      triangles.for_each_near(p - reach, p + reach, [&](std::uint32_t t) {
         for (const std::uint32_t corner : now.fine.triangles()[t]) {
           lowered[corner] = 1;
           largest = std::max(largest, tolerance[corner]);
@@ -499,8 +536,8 @@ class BoundedRemesher {
 
   /// Says so if smaller voxels would not help, for a hole is closed there.
   bool explained(const Attempt& now, const std::vector<Far>& far) {
-    if (!options_.over_holes && !now.surface.caps.empty()) {
-      const SurfaceDistance caps(now.surface.points, now.surface.caps);
+    if (!options_.over_holes && !now.surface->caps.empty()) {
+      const SurfaceDistance caps(now.surface->points, now.surface->caps);
       for (const Far& f : far)
         if (!f.of_surface && f.distance > options_.error && caps.at(f.place, f.distance) < f.distance)
           add(Unmet::hole, f);

@@ -15,7 +15,7 @@
 // (search/surface_distance.h). What is left of the error at each place, and a little less, is the tolerance
 // of the collapses there (certified_collapse/). The outcome is held against the surface in the same way:
 // that, and nothing before it, is the proof. Around places where it fails the tolerance is lowered, or else
-// the voxels are made smaller.
+// the voxels are made smaller. What was reached is collapsed and held again, as long as that is worth it.
 #pragma once
 
 #include <Eigen/Core>
