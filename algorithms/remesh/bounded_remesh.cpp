@@ -3,10 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
@@ -134,6 +137,31 @@ struct Far {
   std::uint32_t triangle;  ///< of that surface
 };
 
+/// Tells the progress of many stages as that of one, as long as it lives.
+class OneProgress {
+ public:
+  OneProgress(RunContext& context, std::string name)
+      : context_(context), name_(std::move(name)), notes_(context.notes.size()), on_progress_(std::exchange(context.on_progress, {})) {
+    update(0.0);
+  }
+  ~OneProgress() {
+    update(1.0);
+    context_.on_progress = on_progress_;
+  }
+  OneProgress(const OneProgress&) = delete;
+  OneProgress& operator=(const OneProgress&) = delete;
+  void update(double fraction) const {
+    if (on_progress_) on_progress_(name_, fraction);
+  }
+  std::size_t notes_before() const { return notes_; }
+
+ private:
+  RunContext& context_;
+  std::string name_;
+  std::size_t notes_;
+  std::function<void(std::string_view stage, double fraction)> on_progress_;
+};
+
 class BoundedRemesher {
  public:
   BoundedRemesher(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context)
@@ -165,8 +193,13 @@ class BoundedRemesher {
   /// collapses nearly all of the error: of plane parts and smooth ones. A try with twice the voxels costs a quarter.
   /// Nothing is refused here: what larger voxels do not show, smaller ones may.
   bool try_larger(double first) {
+    const OneProgress progress(context_, "try larger voxels");
+    const double largest = longest_ / kFewestVoxels, smallest = kWorthLarger * first;
     int tries = 0;
-    for (double voxel_size = longest_ / kFewestVoxels; voxel_size > kWorthLarger * first && tries < kLargerTries;) {
+    for (double voxel_size = largest; voxel_size > smallest && tries < kLargerTries;) {
+      progress.update(std::log(largest / voxel_size) / std::log(largest / smallest));
+      // What a try that fails had to say is no news to the user, and the one that counts says it again.
+      context_.notes.resize(progress.notes_before());
       const std::optional<Attempt> made = attempt(voxel_size);
       if (!made) {
         voxel_size *= 0.5;
@@ -187,6 +220,7 @@ class BoundedRemesher {
       voxel_size *= kNextLarger;
       ++tries;
     }
+    context_.notes.resize(progress.notes_before());
     result_.rounds = 0;
     return false;
   }

@@ -33,7 +33,7 @@ Plan plan_of(std::string_view command) {
     append(plan, {{"write", 0.01}});
   }
   if (command == "remesh --error") {
-    append(plan, {{"read", 0.04}});
+    append(plan, {{"read", 0.04}, {"try larger voxels", 0.4}});
     // A rough mesh tells how large the voxels of the next one have to be.
     for (int pass = 0; pass < 2; ++pass) {
       append(plan, kVoxelize);
