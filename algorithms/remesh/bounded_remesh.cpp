@@ -141,7 +141,10 @@ struct Far {
 class OneProgress {
  public:
   OneProgress(RunContext& context, std::string name)
-      : context_(context), name_(std::move(name)), notes_(context.notes.size()), on_progress_(std::exchange(context.on_progress, {})) {
+      : context_(context),
+        name_(std::move(name)),
+        notes_(context.notes.size()),
+        on_progress_(std::exchange(context.on_progress, {})) {
     update(0.0);
   }
   ~OneProgress() {
@@ -309,8 +312,8 @@ class BoundedRemesher {
     return result;
   }
 
-  /// By point of the uniform mesh, or for every `step`-th, how far it is from the surface, world units; kFarthest errors
-  /// where that is more.
+  /// How far the points of a mesh are from the surface, or every `step`-th of them; world units, kFarthest errors where it
+  /// is more.
   std::vector<double> apart_at_points(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
     const Stage stage(context_, "compare");
     std::vector<double> apart((now.file_points.size() + step - 1) / step);
@@ -322,8 +325,8 @@ class BoundedRemesher {
     return std::accumulate(apart.begin(), apart.end(), 0.0) / (double(apart.size()) * options_.error);
   }
 
-  /// By triangle of the uniform mesh, or for every `step`-th, the most that its middle and those of its sides are from the
-  /// surface, as apart_at_points() says it.
+  /// How far the triangles of a mesh are from the surface at most, in their middles and those of their sides, or every
+  /// `step`-th of them; as apart_at_points() says it.
   std::vector<double> apart_in_triangles(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
     const Stage stage(context_, "compare");
     const std::vector<Triangle>& triangles = now.fine.triangles();
@@ -338,7 +341,7 @@ class BoundedRemesher {
     return apart;
   }
 
-  /// By point, the most that it and the triangles around it are from the surface, as far as their middles and sides tell.
+  /// How far the points of a mesh and the triangles around each of them are from the surface at most, as those two say it.
   std::vector<double> apart_around_points(const Attempt& now, const SurfaceDistance& surface) {
     std::vector<double> apart = apart_at_points(now, surface, 1);
     const std::vector<double> within = apart_in_triangles(now, surface, 1);

@@ -9,13 +9,14 @@
 // their middle. That is the one part of the bound that is looked at in places and not proved: the area of
 // what counts as free so is told.
 //
-// **The way.** Of shapes that are plane or smooth large voxels have a uniform mesh that uses up next to nothing of the error;
-// these are tried first, for a try costs little beside the next. Else voxels are made smaller until the uniform mesh is within most of the error both ways, as far
-// as points of both tell, and within the error between these, triangle by triangle
-// (search/surface_distance.h). What is left of the error at each place, and a little less, is the tolerance
-// of the collapses there (certified_collapse/). The outcome is held against the surface in the same way:
-// that, and nothing before it, is the proof. Around places where it fails the tolerance is lowered, or else
-// the voxels are made smaller. What was reached is collapsed and held again, as long as that is worth it.
+// **The way.** Of shapes that are plane or smooth large voxels have a uniform mesh that uses up next to
+// nothing of the error; these are tried first, for a try costs little beside the next. Else voxels are made
+// smaller until the uniform mesh is within most of the error both ways, as far as points of both tell, and
+// within the error between these, triangle by triangle (search/surface_distance.h). What is left of the error
+// at each place, and a little less, is the tolerance of the collapses there (certified_collapse/). The outcome
+// is held against the surface in the same way: that, and nothing before it, is the proof. Around places where
+// it fails the tolerance is lowered, or else the voxels are made smaller. What was reached is collapsed and
+// held again, as long as that is worth it.
 #pragma once
 
 #include <Eigen/Core>
