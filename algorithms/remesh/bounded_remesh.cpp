@@ -3,16 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/one_progress.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
 #include "algorithms/extraction/certified_mesh.h"
@@ -20,9 +18,10 @@
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/remesh/solid_surface.h"
+#include "algorithms/remesh/wall_width.h"
 #include "algorithms/search/surface_distance.h"
 #include "algorithms/voxelization/inside/oriented_winding.h"
-#include "algorithms/voxelization/outputs/surface_transfer.h"
 #include "algorithms/voxelization/voxelize.h"
 
 namespace hermesh {
@@ -59,12 +58,8 @@ constexpr float kLowering = 0.4f;
 /// Voxels that a wall has to be thick so that a mesh may show it, and the voxel that is tried for a
 /// thickness.
 constexpr double kThinVoxels = 2.0, kVoxelOfThickness = 0.9;
-/// Cosine of the angle between neighbours' normals below which they are two sides of a fin.
-constexpr double kFolded = -0.5;
-/// Places at most that are asked how thick the surface is there, polygons around each of them that are asked, and how
-/// near these are, in errors.
-constexpr std::size_t kMostAsked = 500, kMostAround = 64;
-constexpr double kAround = 0.8;
+/// Places at most that are asked how thick the surface is there.
+constexpr std::size_t kMostAsked = 500;
 /// Radius of the pieces of polygons that are asked whether they bound something, in errors.
 constexpr double kFreePiece = 1.0 / 16.0;
 /// How far from a polygon its sides are looked at, in extents of the polygons: what is thinner is rounding.
@@ -72,48 +67,10 @@ constexpr double kOffSurface = 1e-6;
 /// The first limit that is tried, and what is added to the largest distance that was met, in errors.
 constexpr double kFirstLimit = 0.8, kLimitStep = 0.02;
 
-/// The surface that the bound is about, relative to the mesh's origin.
-struct Surface {
-  std::vector<Eigen::Vector3f> points;
-  std::vector<Triangle> triangles;
-  std::vector<Triangle> caps;         ///< what closes holes
-  double area = 0.0, cap_area = 0.0;  ///< of the polygons, and of the caps; world units²
-};
-
-double area(const std::vector<Eigen::Vector3f>& points, const Triangle& t) {
-  const Eigen::Vector3d a = points[t[0]].cast<double>(), b = points[t[1]].cast<double>(),
-                        c = points[t[2]].cast<double>();
-  return 0.5 * (b - a).cross(c - a).norm();
-}
-
-/// The polygons' surface as a voxelization found it. `turns` are those of orient_faces().
-Surface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turns, bool over_holes) {
-  Surface surface{std::move(boundary.points), {}, {}};
-  for (std::size_t i = 0; i < boundary.triangles.size(); ++i) {
-    const Triangle& t = boundary.triangles[i];
-    if (boundary.ids[i] < 0) {
-      surface.caps.push_back(t);
-      surface.cap_area += area(surface.points, t);
-    } else if (turns.empty() || turns[static_cast<std::size_t>(boundary.ids[i])] != 0) {
-      surface.triangles.push_back(t);
-      surface.area += area(surface.points, t);
-    }
-  }
-  if (over_holes) surface.triangles.insert(surface.triangles.end(), surface.caps.begin(), surface.caps.end());
-  return surface;
-}
-
-Eigen::Vector3d middle(const Surface& surface, std::uint32_t triangle) {
-  const Triangle& t = surface.triangles[triangle];
-  return (surface.points[t[0]].cast<double>() + surface.points[t[1]].cast<double>() +
-          surface.points[t[2]].cast<double>()) /
-         3.0;
-}
-
 /// A mesh to collapse, first the uniform one at a voxel size, and the surface that it stands for.
 struct Attempt {
   double voxel_size;
-  std::shared_ptr<const Surface> surface;
+  std::shared_ptr<const SolidSurface> surface;
   FilePoints file;
   FineMesh fine;                             ///< index space
   std::vector<Eigen::Vector3f> file_points;  ///< world units relative to the placement's origin
@@ -135,34 +92,6 @@ struct Far {
   double distance;
   bool of_surface;         ///< it lies on the polygons' surface, else on the mesh
   std::uint32_t triangle;  ///< of that surface
-};
-
-/// Tells the progress of many stages as that of one, as long as it lives.
-class OneProgress {
- public:
-  OneProgress(RunContext& context, std::string name)
-      : context_(context),
-        name_(std::move(name)),
-        notes_(context.notes.size()),
-        on_progress_(std::exchange(context.on_progress, {})) {
-    update(0.0);
-  }
-  ~OneProgress() {
-    update(1.0);
-    context_.on_progress = on_progress_;
-  }
-  OneProgress(const OneProgress&) = delete;
-  OneProgress& operator=(const OneProgress&) = delete;
-  void update(double fraction) const {
-    if (on_progress_) on_progress_(name_, fraction);
-  }
-  std::size_t notes_before() const { return notes_; }
-
- private:
-  RunContext& context_;
-  std::string name_;
-  std::size_t notes_;
-  std::function<void(std::string_view stage, double fraction)> on_progress_;
 };
 
 class BoundedRemesher {
@@ -287,8 +216,7 @@ class BoundedRemesher {
     if (!volume.is_signed)
       throw Error(
           "the polygons give no inside that a distance could be measured to (a note says why); give a sheet "
-          "a thickness "
-          "with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
+          "a thickness with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
     const LevelSet level_set = make_level_set(volume.distance);
     FloatHermite hermite = sample_polygons(level_set, 0.0, mesh_, context_);
     if (hermite.crossings.empty()) return std::nullopt;
@@ -302,7 +230,7 @@ class BoundedRemesher {
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
     Attempt result{
         voxel_size,
-        std::make_shared<const Surface>(surface_of(std::move(volume.boundary), turns_, options_.over_holes)),
+        std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), turns_, options_.over_holes)),
         file,
         FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads), context_),
         {},
@@ -524,8 +452,7 @@ class BoundedRemesher {
   }
 
   /// Lowers the tolerance around the places. False if it is next to nothing at one of them already.
-  bool lower_around(const Attempt& now, const std::vector<Far>& far,
-                    std::vector<float>& tolerance) {
+  bool lower_around(const Attempt& now, const std::vector<Far>& far, std::vector<float>& tolerance) {
     const TriangleTree triangles(now.file_points, now.fine.triangles(), 1.0);
     std::vector<std::uint8_t> lowered(tolerance.size(), 0);
     bool useful = true;
@@ -556,7 +483,7 @@ class BoundedRemesher {
     return (winding_->number().at(middle + step) > 0.5) == (winding_->number().at(middle - step) > 0.5);
   }
   /// Whether a triangle of the surface bounds nothing beside one of its corners.
-  bool bounds_nothing(const Surface& surface, const Far& at) const {
+  bool bounds_nothing(const SolidSurface& surface, const Far& at) const {
     if (!winding_) return false;
     const Triangle& t = surface.triangles[at.triangle];
     std::array<Eigen::Vector3d, 3> piece;
@@ -594,7 +521,7 @@ class BoundedRemesher {
 
   /// Asks for smaller voxels where there was no mesh at all, from which all polygons are far.
   bool smaller(double voxel_size) {
-    const Surface all{mesh_.points, triangulated(mesh_), {}};
+    const SolidSurface all{mesh_.points, triangulated(mesh_), {}};
     std::vector<Far> far;
     for (std::uint32_t t = 0; t < all.triangles.size(); ++t)
       far.push_back({middle(all, t), std::numeric_limits<double>::infinity(), true, t});
@@ -613,14 +540,14 @@ class BoundedRemesher {
 
   /// Asks for smaller voxels: as small as what is far is thin, or `factor` of what they were where nothing
   /// is. Gives up where these would be too many.
-  bool smaller(double voxel_size, const Surface& of, double factor, const std::vector<Far>& far) {
+  bool smaller(double voxel_size, const SolidSurface& of, double factor, const std::vector<Far>& far) {
     const SurfaceDistance surface(of.points, of.triangles);
     const double smallest = smallest_voxel();
     // Most of what is far is next to more of it, so that an even sample tells how thin it is. A twentieth of
     // that may be thinner: a wedge is as thin as can be at its edge, and only there.
     std::vector<std::pair<double, std::size_t>> thick;
     for (std::size_t i = 0; i < far.size(); i += 1 + far.size() / kMostAsked)
-      if (const double found = thickness_to_show(of, surface, far[i]); std::isfinite(found))
+      if (const double found = thickness_to_show(surface, far[i]); std::isfinite(found))
         thick.emplace_back(found, i);
     std::sort(thick.begin(), thick.end());
     const double thinnest =
@@ -644,56 +571,10 @@ class BoundedRemesher {
     return false;
   }
 
-  /// The width of the wall or of the gap that voxels have to show so that the mesh may come within the error of a place:
-  /// the largest of those about it that are nearly as near. What is thinner than that, as the edge of a wedge is and a
-  /// shallow fin, need not be shown. Infinity for a place of the mesh, and where something about it is thick.
-  double thickness_to_show(const Surface& of, const SurfaceDistance& surface, const Far& at) const {
+  /// The width that voxels have to show for a place to be near; infinity for a place of the mesh, and for what is near.
+  double thickness_to_show(const SurfaceDistance& surface, const Far& at) const {
     if (!at.of_surface || at.distance <= options_.error) return std::numeric_limits<double>::infinity();
-    const TriangleTree& tree = surface.tree();
-    const double reach = kAround * options_.error;
-    std::vector<std::pair<std::uint32_t, Eigen::Vector3d>> around;
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(reach);
-    tree.for_each_near(at.place - half, at.place + half, [&](std::uint32_t t) {
-      const Eigen::Vector3d a = tree.corner(t, 0), b = tree.corner(t, 1), c = tree.corner(t, 2), inner = (a + b + c) / 3.0;
-      // The place of the triangle that is most within, as far as that is near.
-      const Eigen::Vector3d nearest = closest_point(at.place, a, b, c).position;
-      const double left = reach - (nearest - at.place).norm(), way = (inner - nearest).norm();
-      if (left >= 0.0) around.emplace_back(t, nearest + (way > left ? left / way : 1.0) * (inner - nearest));
-    });
-    double largest = thickness(of, tree, at.triangle, at.place);
-    for (std::size_t i = 0; i < around.size() && std::isfinite(largest); i += 1 + around.size() / kMostAround)
-      largest = std::max(largest, thickness(of, tree, around[i].first, around[i].second));
-    return largest;
-  }
-
-  /// The width of the wall or of the gap at a place of a polygon: how far the next polygon is along the normal or against
-  /// it, whichever is less. Infinity where there is none within four errors.
-  double thickness(const Surface& of, const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& from) const {
-    constexpr double kNone = std::numeric_limits<double>::infinity();
-    const Triangle& t = of.triangles[triangle];
-    std::array<Eigen::Vector3d, 3> corner;
-    for (int i = 0; i < 3; ++i) corner[i] = of.points[t[i]].cast<double>();
-    const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
-    const double most = kFarthest * options_.error;
-    double nearest = most;
-    const Eigen::Vector3d reach = most * normal.cwiseAbs();
-    tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {
-      const Eigen::Vector3d a = tree.corner(other, 0), b = tree.corner(other, 1), c = tree.corner(other, 2);
-      // Neighbours are no opposite wall, but for the other side of a fin, which is folded over along an edge.
-      const bool folded = (b - a).cross(c - a).normalized().dot(normal) < kFolded;
-      for (const Eigen::Vector3d& p : corner)
-        if ((p == a || p == b || p == c) && !folded) return;
-      // The line along the normal in barycentric coordinates of the triangle (Möller & Trumbore 1997).
-      const Eigen::Vector3d across = normal.cross(c - a);
-      const double slope = (b - a).dot(across);
-      if (std::abs(slope) < 1e-12 * (b - a).norm() * (c - a).norm()) return;
-      const double u = (from - a).dot(across) / slope;
-      const Eigen::Vector3d turned = (from - a).cross(b - a);
-      const double v = normal.dot(turned) / slope, way = std::abs((c - a).dot(turned) / slope);
-      if (u < 0 || v < 0 || u + v > 1 || way < kOffSurface * extent_) return;
-      nearest = std::min(nearest, way);
-    });
-    return nearest < most ? nearest : kNone;
+    return width_to_show(surface.tree(), at.triangle, at.place, options_.error, kOffSurface * extent_);
   }
 
   const PolygonMesh& mesh_;
