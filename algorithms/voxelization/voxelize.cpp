@@ -19,6 +19,10 @@ namespace {
 /// as they get by looking at the blocks next to theirs, and each voxel beyond looks for its triangle (wide_band.h).
 constexpr double kWideBand = 16.0, kNearBand = 6.0;
 
+/// Where the surface runs through samples, the other end of a crossed edge is a whole voxel away from it: not below the width of
+/// a band of one voxel, yet with a sign that only a leaf can hold. In voxels, and a hair more (sample_side.h).
+constexpr double kEndOfEdge = 1.001;
+
 /// Widths of the band in world units.
 struct Widths {
   float exterior, interior;
@@ -30,13 +34,17 @@ struct Widths {
         least(float(kLeastDepth * voxel_size)) {}
 };
 
-/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side.
-void sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths,
+/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side. Returns whether the leaf is
+/// still needed: it has an active voxel, or one that may be the end of a crossed edge.
+bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths, double voxel_size,
                const kernels::Kernels& kernels) {
+  const float* values = leaf.buffer().data();
+  const float nearest = *std::min_element(values, values + FloatLeaf::SIZE);
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   kernels.apply_signs(inside.data(), widths.exterior, widths.interior, widths.least, leaf.buffer().data(),
                       &mask.getWord<openvdb::Index64>(0));
   leaf.setValueMask(mask);
+  return !leaf.isEmpty() || nearest <= float(kEndOfEdge * voxel_size);
 }
 
 /// A mesh in world units relative to the mesh's origin of triangles in voxels, each with corners of its own.
@@ -160,11 +168,11 @@ openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   return grid;
 }
 
-/// The grid of the distances. It takes the leaves out of the band; one without an active voxel becomes background.
+/// The grid of the distances. It takes the leaves out of the band.
 openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool is_signed) {
   const auto grid = openvdb::FloatGrid::create(widths.exterior);
   for (std::unique_ptr<FloatLeaf>& leaf : band.leaves)
-    if (leaf && !leaf->isEmpty()) grid->tree().addLeaf(leaf.release());
+    if (leaf) grid->tree().addLeaf(leaf.release());
   grid->setName(is_signed ? "sdf" : "udf");
   if (!is_signed) return grid;
   // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the sign of
@@ -194,7 +202,8 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
   if (!signs.caps.empty()) add_caps(signs, work.voxel_size, work.reach, bins.blocks(), band, context);
   const kernels::Kernels& kernels = chosen_kernels<kernels::Kernels>();
   parallel_blocks(band.leaves.size(), context, [&](std::size_t i) {
-    if (band.leaves[i]) sign_leaf(*band.leaves[i], signs.inside[i], widths, kernels);
+    std::unique_ptr<FloatLeaf>& leaf = band.leaves[i];
+    if (leaf && !sign_leaf(*leaf, signs.inside[i], widths, work.voxel_size, kernels)) leaf.reset();
   });
   boundary.caps = std::move(signs.caps);
   return boundary;
@@ -231,7 +240,8 @@ BoundaryTriangles boundary_triangles(const IndexSoup& soup, const Boundary& boun
 Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& options, const BandWidths& near,
                              RunContext& context) {
   const BandWidths wide{options.exterior_band, options.interior_band};
-  const BandWork work{.reach = std::max(near.exterior, near.interior),
+  const double width = std::max(near.exterior, near.interior);
+  const BandWork work{.reach = options.signs == SignRule::none ? width : std::max(width, kEndOfEdge),
                       .voxel_size = options.voxel_size,
                       .nearest = options.nearest};
   const IndexSoup soup(mesh, options.voxel_size);
@@ -289,7 +299,8 @@ Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, R
   Voxelization result = voxelize_within(mesh, options, near, context);
   // No inside was found. What is there already is right where the search went as far as the exterior band, no more
   // and no less.
-  if (result.is_signed || (!is_wide && wide.interior == wide.exterior)) return result;
+  const bool is_as_wide = !is_wide && wide.interior == wide.exterior && wide.exterior >= kEndOfEdge;
+  if (result.is_signed || is_as_wide) return result;
   return voxelize_within(mesh, outside_only, exterior, context);
 }
 

@@ -38,6 +38,38 @@ TEST(Voxelize, BoxByHand) {
   EXPECT_TRUE(v.distance->tree().isValueOn({12, 0, 0}));
 }
 
+TEST(Voxelize, ABandOfOneVoxelHasTheSignsOfFacesOnSamples) {
+  // Faces between two leaves: of the edges that they cross, one end is the only voxel of its leaf that matters, a whole voxel
+  // away and so not active.
+  for (const VoxelizeOptions& options : {VoxelizeOptions{.exterior_band = 1, .interior_band = 1},
+                                         VoxelizeOptions{.exterior_band = 1, .interior_band = 3},
+                                         VoxelizeOptions{.exterior_band = 3, .interior_band = 1}})
+    for (const double half : {8.0, 7.0, 9.0, 16.0}) {
+      const Voxelization narrow = run(box({-half, -half, -half}, {half, half, half}), options),
+                         wide = run(box({-half, -half, -half}, {half, half, half}));
+      const int most = int(half) + 2;
+      for (int x = -most; x <= most; ++x)
+        for (int y = -most; y <= most; ++y)
+          for (int z = -most; z <= most; ++z) {
+            const double should = std::clamp(at(wide, x, y, z), -options.interior_band, options.exterior_band);
+            ASSERT_EQ(at(narrow, x, y, z), should) << openvdb::Coord(x, y, z) << ' ' << half;
+          }
+    }
+}
+
+TEST(Voxelize, AnUnsignedBandOfOneVoxelIsNoWider) {
+  // Faces that cancel enclose nothing, so that by either rule no voxel has a sign.
+  PolygonMesh sheet;
+  add_triangle(sheet, {-9, -9, 0}, {9, -9, 0}, {0, 9, 0});
+  append(sheet, PolygonMesh(sheet), true);
+  for (const SignRule rule : {SignRule::none, SignRule::automatic}) {
+    const Voxelization v = run(sheet, {.exterior_band = 1, .interior_band = 1, .signs = rule});
+    EXPECT_FALSE(v.is_signed);
+    for (auto value = v.distance->cbeginValueOn(); value; ++value) ASSERT_LT(*value, 1.0f);
+    EXPECT_EQ(at(v, 0, 0, 1), 1.0);
+  }
+}
+
 TEST(Voxelize, ExactOnSpheresOfAnySize) {
   for (const double radius : {0.01, 0.7, 5.0, 23.0})
     for (const double band : {1.0, 3.0, 5.5}) {

@@ -75,11 +75,11 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
   const auto band = at_least(1.0, "a finite number of voxels of at least 1");
   command
       .add_option("--exterior-band", arguments.exterior_band,
-                  "Width of the band outside, in voxels (default: 3)")
+                  "Width of the band outside, in voxels (default: 3); where marching cubes follows, 1 is enough and faster")
       ->check(band);
   command
       .add_option("--interior-band", arguments.interior_band,
-                  "Width of the band inside, in voxels (default: 3)")
+                  "Width of the band inside, in voxels (default: 3; as --exterior-band)")
       ->check(band);
   return size;
 }

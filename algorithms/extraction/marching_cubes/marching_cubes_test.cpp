@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <map>
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
 namespace {
@@ -86,6 +88,32 @@ TEST(MarchingCubes, ASampleAtTheIsovalueIsOutside) {
   grid->tree().setValue(Coord(3, 3, 3), 0.0f);
   EXPECT_EQ(points(grid, 0.0), 0u);
   EXPECT_EQ(points(grid, 0.5), 6u);
+}
+
+TEST(MarchingCubes, ABandOfOneVoxelIsEnough) {
+  using namespace voxelize_for_tests;
+  // Where a face lies on samples, the other end of its edges is a whole voxel away, and so beyond the band.
+  for (const PolygonMesh& solid : {sphere({0.3, -0.2, 0.1}, 9.7), sphere({0, 0, 0}, 5.0, 140), box({-8, -8, -8}, {8, 8, 8})}) {
+    const auto mesh = [&](double band) {
+      RunContext context;
+      const Voxelization made = run(solid, {.exterior_band = band, .interior_band = band});
+      return marching_cubes(make_level_set(made.distance), 0.0, nullptr, context);
+    };
+    const auto volume = [](const PolygonMesh& made) {
+      double sum = 0.0;
+      for (const auto& [a, b, c] : made.triangles) {
+        const Eigen::Vector3d p = made.points[a].cast<double>(), q = made.points[b].cast<double>();
+        sum += p.cross(q).dot(made.points[c].cast<double>()) / 6.0;
+      }
+      return sum;
+    };
+    // Leaves differ, and with them the order of the points.
+    const PolygonMesh narrow = mesh(1.0), wide = mesh(3.0);
+    EXPECT_TRUE(is_closed(narrow));
+    EXPECT_EQ(narrow.triangles.size(), wide.triangles.size());
+    EXPECT_EQ(narrow.points.size(), wide.points.size());
+    EXPECT_NEAR(volume(narrow) / volume(wide), 1.0, 1e-6);
+  }
 }
 
 TEST(MarchingCubes, DenseFogIsInside) {
