@@ -109,6 +109,19 @@ TEST(Markdown, StandInsAreLoud) {
   EXPECT_EQ(lines_with(markdown({row}), "STAND-IN DATA").size(), 1u);
 }
 
+TEST(Markdown, RowsOfOtherProgramsAreNamed) {
+  const auto row = [](const char* run, const char* label, const char* commit) {
+    Json result = row_of(run, label, 1.0);
+    result["table"]["additive"] = true;
+    result["commit"] = commit;
+    return result;
+  };
+  const std::vector<Json> pieces = {row("1", "a", "0123456789abcdef"), row("2", "b", "fedcba9876543210"),
+                                    row("2", "c", "fedcba9876543210")};
+  EXPECT_EQ(lines_with(markdown(pieces), "- other rows: 2 of commit fedcba987654").size(), 1u);
+  EXPECT_TRUE(lines_with(markdown({pieces[0]}), "other rows").empty());
+}
+
 TEST(Groups, TheLatestRunIsShownAndTheOthersAreCounted) {
   Json other_size = row_of("1", "a", 1.0);
   other_size["resolution"] = 80;

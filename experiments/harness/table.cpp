@@ -118,7 +118,7 @@ std::vector<RowGroup> latest_groups(const std::vector<Json>& rows) {
 void write_markdown(const RowGroup& group, std::ostream& out) {
   if (!is_printed(group.rows)) return;
   out << "### " << for_markdown(group_title(group.rows.front())) << "\n\n";
-  for (const std::string& fact : group_facts(group.rows.front())) out << "- " << fact << "\n";
+  for (const std::string& fact : group_facts(group)) out << "- " << fact << "\n";
   if (group.earlier_runs > 0)
     out << "- earlier runs of these cells in the same folder, not shown: " << group.earlier_runs << "\n";
 
@@ -182,7 +182,7 @@ void write_latex(const RowGroup& group, std::ostream& out) {
     out << " \\\\\n";
   }
   out << "\\bottomrule\n\\end{tabular}\n\\caption{" << for_latex(group_title(group.rows.front())) << ".";
-  for (const std::string& fact : group_facts(group.rows.front())) out << " " << for_latex(fact) << ".";
+  for (const std::string& fact : group_facts(group)) out << " " << for_latex(fact) << ".";
   for (const std::string& sentence : alarms(group)) out << " \\textbf{" << for_latex(sentence) << ".}";
   out << "}\n\\end{table}\n\n";
 }

@@ -1,6 +1,7 @@
 #include "experiments/harness/table_text.h"
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace hermesh {
@@ -20,6 +21,19 @@ std::string run_fact(const Json& row) {
          text_at(row, "/threads") + " threads";
   if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
   return run;
+}
+
+/// Which rows are of other programs than the first one: a long experiment is made in pieces.
+std::vector<std::string> other_commits(const RowGroup& group) {
+  const std::string first = text_at(group.rows.front(), "/commit");
+  std::map<std::string, int> rows;
+  for (const Json& row : group.rows)
+    if (const std::string commit = text_at(row, "/commit"); commit != first) ++rows[commit];
+  if (rows.empty()) return {};
+  std::string fact = "other rows:";
+  for (const auto& [commit, count] : rows)
+    fact += std::string(fact.ends_with(':') ? " " : ", ") + std::to_string(count) + " of commit " + commit.substr(0, 12);
+  return {fact};
 }
 
 std::vector<std::string> joined_list(const Json& row, const std::string& pointer) {
@@ -65,11 +79,15 @@ std::string first_column(const Json& row) {
   return find(row, "/table/first_column") ? text_at(row, "/table/first_column") : "variant";
 }
 
-std::vector<std::string> group_facts(const Json& row) {
-  if (find(row, "/measurement"))
-    return {
-        "measured: " + text_at(row, "/measurement/parameters") + " seed=" + text_at(row, "/measurement/seed"),
-        run_fact(row)};
+std::vector<std::string> group_facts(const RowGroup& group) {
+  const Json& row = group.rows.front();
+  const std::vector<std::string> others = other_commits(group);
+  if (find(row, "/measurement")) {
+    std::vector<std::string> facts = {
+        "measured: " + text_at(row, "/measurement/parameters") + " seed=" + text_at(row, "/measurement/seed"), run_fact(row)};
+    facts.insert(facts.end(), others.begin(), others.end());
+    return facts;
+  }
   std::string input = "input: " + text_at(row, "/case/origin") + ", sha256 " +
                       text_at(row, "/case/sha256").substr(0, 12) + ", " +
                       readable(number_at(row, "/case/triangles")) + " triangles";
@@ -87,6 +105,7 @@ std::vector<std::string> group_facts(const Json& row) {
             readable(number_at(row, "/voxelization/memory_bytes") / (1 << 20)) + " MiB, made in " +
             readable(number_at(row, "/voxelization/seconds/median")) + " s";
   std::vector<std::string> facts = {input, grid, run_fact(row)};
+  facts.insert(facts.end(), others.begin(), others.end());
   if (find(row, "/judged_by"))
     facts.push_back("signs: judged by the " + text_at(row, "/judged_by/signs") + " of " +
                     text_at(row, "/judged_by/solid"));

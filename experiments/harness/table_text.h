@@ -20,8 +20,8 @@ bool is_printed(const std::vector<Json>& rows);
 
 /// The title of the table that a row belongs to, "dragon at resolution 400".
 std::string group_title(const Json& row);
-/// What a table was measured on, by which program and when.
-std::vector<std::string> group_facts(const Json& row);
+/// What a table was measured on, by which program and when; the commits of further programs that its rows are of, too.
+std::vector<std::string> group_facts(const RowGroup& group);
 /// Where the time goes, a line for every row of voxelizers: "hermesh: band 0.4 s (80 %), …", and what no
 /// stage claims.
 std::vector<std::string> stage_sentences(const RowGroup& group);

@@ -36,7 +36,7 @@ Json table_json(const RowGroup& group) {
                 {"title", group_title(first)},
                 {"case", text_at(first, "/case/name")},
                 {"resolution", text_at(first, "/resolution")},
-                {"facts", group_facts(first)},
+                {"facts", group_facts(group)},
                 {"sentences", stage_sentences(group)},
                 {"earlier", group.earlier_runs},
                 {"first_column", first_column(first)},
