@@ -6,7 +6,7 @@
 #include <map>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_point.h"
 #include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {

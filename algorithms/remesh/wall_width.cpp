@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_point.h"
 
 namespace hermesh {
 namespace {

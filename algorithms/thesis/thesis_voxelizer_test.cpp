@@ -16,7 +16,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/thesis/thesis_volumes.h"
-#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_point.h"
 
 namespace hermesh {
 namespace {

@@ -10,22 +10,11 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/io/vdb_archive.h"
+#include "algorithms/search/triangle_point.h"
 #include "algorithms/voxelization/distance/index_soup.h"
 
 namespace hermesh {
 namespace {
-
-/// The point of side i–j that is nearest to p; its first end where the side has no length.
-TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& corners, int i,
-                         int j) {
-  const Eigen::Vector3d along = corners[j] - corners[i];
-  const double length = along.squaredNorm();
-  const double t = length > 0.0 ? std::clamp((p - corners[i]).dot(along) / length, 0.0, 1.0) : 0.0;
-  TrianglePoint point{corners[i] + t * along, Eigen::Vector3d::Zero()};
-  point.weights[i] = 1.0 - t;
-  point.weights[j] = t;
-  return point;
-}
 
 // ---- What a voxel asks of an attribute.
 
@@ -105,7 +94,9 @@ class AttributeSampler {
 class Layer {
  public:
   virtual ~Layer() = default;
+  /// Gives voxels of a leaf the values at their closest points.
   virtual void fill(std::size_t leaf, std::span<const Foot> feet) = 0;
+  /// Makes a voxel of a leaf inactive, for no triangle is near it.
   virtual void leave_out(std::size_t leaf, std::uint32_t voxel) = 0;
   virtual openvdb::GridBase::Ptr finish(const std::string& name) = 0;
 };
@@ -130,6 +121,7 @@ class SampledLayer final : public Layer {
     leaves_[leaf]->setValueOff(voxel, grid_->background());
   }
   openvdb::GridBase::Ptr finish(const std::string& name) override {
+    // A leaf of which all voxels were left out says nothing.
     openvdb::tools::pruneInactive(grid_->tree());
     grid_->setName(name);
     return grid_;
@@ -269,33 +261,6 @@ openvdb::GridBase::Ptr finish(NamedLayer& layer) {
 }
 
 }  // namespace
-
-TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                            const Eigen::Vector3d& c) {
-  const std::array<Eigen::Vector3d, 3> corners = {a, b, c};
-  // The best of the three sides, then the foot of the perpendicular, if it lies within: on a degenerate triangle the
-  // sides alone are right.
-  TrianglePoint best = on_segment(p, corners, 0, 1);
-  const auto offer = [&](const TrianglePoint& other) {
-    if ((other.position - p).squaredNorm() < (best.position - p).squaredNorm()) best = other;
-  };
-  offer(on_segment(p, corners, 1, 2));
-  offer(on_segment(p, corners, 2, 0));
-  const Eigen::Vector3d normal = (b - a).cross(c - a);
-  Eigen::Vector3d weights;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d &u = corners[(i + 1) % 3], &v = corners[(i + 2) % 3];
-    // The part of the area opposite corner i, in proportion; projecting p first would change nothing.
-    weights[i] = (v - u).cross(p - u).dot(normal);
-  }
-  // On a sliver the weights may be rounded; the point is one of the triangle all the same, and only as good
-  // as it is near.
-  if (const double sum = weights.sum(); weights.minCoeff() >= 0.0 && sum > 0.0) {
-    weights /= sum;
-    offer({weights[0] * a + weights[1] * b + weights[2] * c, weights});
-  }
-  return best;
-}
 
 std::size_t bytes_per_voxel(const MeshAttribute& attribute) {
   // Two components become a vector of three.

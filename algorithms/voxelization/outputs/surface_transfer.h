@@ -16,17 +16,6 @@ struct TransferRequest {
   std::vector<const MeshAttribute*> attributes;
 };
 
-/// A point of a triangle.
-struct TrianglePoint {
-  Eigen::Vector3d position;
-  Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
-};
-
-/// The point of the triangle a b c that is nearest to p; of a degenerate triangle that of its segments, or the point
-/// that it is. Any unit, the same for all.
-TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                            const Eigen::Vector3d& c);
-
 /// Makes grids over the voxels of `nearest` (the triangle of each, as triangulated() numbers them; voxels that have
 /// none, −1, stay inactive), in the order of the request and with its transform, which is the voxel size and the
 /// mesh's origin:

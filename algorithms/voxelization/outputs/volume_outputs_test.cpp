@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_point.h"
 
 namespace hermesh {
 namespace {

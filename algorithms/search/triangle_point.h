@@ -1,0 +1,19 @@
+// The point of one triangle that is nearest to a place.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace hermesh {
+
+/// A point of a triangle.
+struct TrianglePoint {
+  Eigen::Vector3d position;
+  Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
+};
+
+/// The point of the triangle a b c that is nearest to p; of a degenerate triangle that of its segments, or the point
+/// that it is. Any unit, the same for all.
+TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                            const Eigen::Vector3d& c);
+
+}  // namespace hermesh
