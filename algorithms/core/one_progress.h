@@ -16,7 +16,6 @@ class OneProgress {
   OneProgress(RunContext& context, std::string name)
       : context_(context),
         name_(std::move(name)),
-        notes_(context.notes.size()),
         on_progress_(std::exchange(context.on_progress, {})) {
     update(0.0);
   }
@@ -29,12 +28,10 @@ class OneProgress {
   void update(double fraction) const {
     if (on_progress_) on_progress_(name_, fraction);
   }
-  std::size_t notes_before() const { return notes_; }
 
  private:
   RunContext& context_;
   std::string name_;
-  std::size_t notes_;
   std::function<void(std::string_view stage, double fraction)> on_progress_;
 };
 

@@ -126,12 +126,13 @@ class BoundedRemesher {
   /// Nothing is refused here: what larger voxels do not show, smaller ones may.
   bool try_larger(double first) {
     const OneProgress progress(context_, "try larger voxels");
+    const std::size_t notes = context_.notes.size();
     const double largest = longest_ / kFewestVoxels, smallest = kWorthLarger * first;
     int tries = 0;
     for (double voxel_size = largest; voxel_size > smallest && tries < kLargerTries;) {
       progress.update(std::log(largest / voxel_size) / std::log(largest / smallest));
       // What a try that fails had to say is no news to the user, and the one that counts says it again.
-      context_.notes.resize(progress.notes_before());
+      context_.notes.resize(notes);
       const std::optional<Attempt> made = attempt(voxel_size);
       if (!made) {
         voxel_size *= 0.5;
@@ -152,7 +153,7 @@ class BoundedRemesher {
       voxel_size *= kNextLarger;
       ++tries;
     }
-    context_.notes.resize(progress.notes_before());
+    context_.notes.resize(notes);
     result_.rounds = 0;
     return false;
   }
