@@ -26,25 +26,28 @@ constexpr double kEndOfEdge = 1.001;
 /// Widths of the band in world units.
 struct Widths {
   float exterior, interior;
-  float least;  ///< distance of a voxel inside that lies on the surface
+  float least;        ///< distance of a voxel inside that lies on the surface
+  float end_of_edge;  ///< see kEndOfEdge
 
   Widths(const BandWidths& band, double voxel_size)
       : exterior(float(band.exterior * voxel_size)),
         interior(float(band.interior * voxel_size)),
-        least(float(kLeastDepth * voxel_size)) {}
+        least(float(kLeastDepth * voxel_size)),
+        end_of_edge(float(kEndOfEdge * voxel_size)) {}
 };
 
 /// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side. Returns whether the leaf is
 /// still needed: it has an active voxel, or one that may be the end of a crossed edge.
-bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths, double voxel_size,
-               const kernels::Kernels& kernels) {
+bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths, const kernels::Kernels& kernels) {
+  // A wider band has such ends among its active voxels.
   const float* values = leaf.buffer().data();
-  const float nearest = *std::min_element(values, values + FloatLeaf::SIZE);
+  const bool has_end = std::min(widths.exterior, widths.interior) < widths.end_of_edge &&
+                       *std::min_element(values, values + FloatLeaf::SIZE) <= widths.end_of_edge;
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   kernels.apply_signs(inside.data(), widths.exterior, widths.interior, widths.least, leaf.buffer().data(),
                       &mask.getWord<openvdb::Index64>(0));
   leaf.setValueMask(mask);
-  return !leaf.isEmpty() || nearest <= float(kEndOfEdge * voxel_size);
+  return has_end || !leaf.isEmpty();
 }
 
 /// A mesh in world units relative to the mesh's origin of triangles in voxels, each with corners of its own.
@@ -203,7 +206,7 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
   const kernels::Kernels& kernels = chosen_kernels<kernels::Kernels>();
   parallel_blocks(band.leaves.size(), context, [&](std::size_t i) {
     std::unique_ptr<FloatLeaf>& leaf = band.leaves[i];
-    if (leaf && !sign_leaf(*leaf, signs.inside[i], widths, work.voxel_size, kernels)) leaf.reset();
+    if (leaf && !sign_leaf(*leaf, signs.inside[i], widths, kernels)) leaf.reset();
   });
   boundary.caps = std::move(signs.caps);
   return boundary;
