@@ -118,8 +118,8 @@ TEST(Markdown, RowsOfOtherProgramsAreNamed) {
   };
   const std::vector<Json> pieces = {row("1", "a", "0123456789abcdef"), row("2", "b", "fedcba9876543210"),
                                     row("2", "c", "fedcba9876543210")};
-  EXPECT_EQ(lines_with(markdown(pieces), "- other rows: 2 of commit fedcba987654").size(), 1u);
-  EXPECT_TRUE(lines_with(markdown({pieces[0]}), "other rows").empty());
+  EXPECT_EQ(lines_with(markdown(pieces), "; 2 rows of commit fedcba987654").size(), 1u);
+  EXPECT_TRUE(lines_with(markdown({pieces[0]}), "rows of commit").empty());
 }
 
 TEST(Groups, TheLatestRunIsShownAndTheOthersAreCounted) {

@@ -14,26 +14,20 @@ std::string cell_text_of(const Json& row) {
   return find(row, "/nominal_voxel_size") ? " at voxel " + text_at(row, "/nominal_voxel_size") : "";
 }
 
-std::string run_fact(const Json& row) {
-  std::string run = "run: commit " + text_at(row, "/commit").substr(0, 12);
+/// The program that made the first row, and when; a long experiment is made in pieces, so that other rows may be of others.
+std::string run_fact(const RowGroup& group) {
+  const Json& row = group.rows.front();
+  const std::string commit = text_at(row, "/commit");
+  std::string run = "run: commit " + commit.substr(0, 12);
   if (const Json* dirty = find(row, "/dirty"); dirty && *dirty == true) run += " with changes";
   run += ", " + text_at(row, "/date") + ", " + text_at(row, "/machine/cpu") + ", " +
          text_at(row, "/threads") + " threads";
   if (const Json* load = find(row, "/load")) run += ", load " + readable(load->at(0).get<double>());
+  std::map<std::string, int> others;
+  for (const Json& other : group.rows) ++others[text_at(other, "/commit")];
+  others.erase(commit);
+  for (const auto& [of, rows] : others) run += "; " + std::to_string(rows) + " rows of commit " + of.substr(0, 12);
   return run;
-}
-
-/// Which rows are of other programs than the first one: a long experiment is made in pieces.
-std::vector<std::string> other_commits(const RowGroup& group) {
-  const std::string first = text_at(group.rows.front(), "/commit");
-  std::map<std::string, int> rows;
-  for (const Json& row : group.rows)
-    if (const std::string commit = text_at(row, "/commit"); commit != first) ++rows[commit];
-  if (rows.empty()) return {};
-  std::string fact = "other rows:";
-  for (const auto& [commit, count] : rows)
-    fact += std::string(fact.ends_with(':') ? " " : ", ") + std::to_string(count) + " of commit " + commit.substr(0, 12);
-  return {fact};
 }
 
 std::vector<std::string> joined_list(const Json& row, const std::string& pointer) {
@@ -81,13 +75,10 @@ std::string first_column(const Json& row) {
 
 std::vector<std::string> group_facts(const RowGroup& group) {
   const Json& row = group.rows.front();
-  const std::vector<std::string> others = other_commits(group);
-  if (find(row, "/measurement")) {
-    std::vector<std::string> facts = {
-        "measured: " + text_at(row, "/measurement/parameters") + " seed=" + text_at(row, "/measurement/seed"), run_fact(row)};
-    facts.insert(facts.end(), others.begin(), others.end());
-    return facts;
-  }
+  if (find(row, "/measurement"))
+    return {
+        "measured: " + text_at(row, "/measurement/parameters") + " seed=" + text_at(row, "/measurement/seed"),
+        run_fact(group)};
   std::string input = "input: " + text_at(row, "/case/origin") + ", sha256 " +
                       text_at(row, "/case/sha256").substr(0, 12) + ", " +
                       readable(number_at(row, "/case/triangles")) + " triangles";
@@ -104,8 +95,7 @@ std::vector<std::string> group_facts(const RowGroup& group) {
     grid += ", " + readable(number_at(row, "/voxelization/active_voxels")) + " active voxels, " +
             readable(number_at(row, "/voxelization/memory_bytes") / (1 << 20)) + " MiB, made in " +
             readable(number_at(row, "/voxelization/seconds/median")) + " s";
-  std::vector<std::string> facts = {input, grid, run_fact(row)};
-  facts.insert(facts.end(), others.begin(), others.end());
+  std::vector<std::string> facts = {input, grid, run_fact(group)};
   if (find(row, "/judged_by"))
     facts.push_back("signs: judged by the " + text_at(row, "/judged_by/signs") + " of " +
                     text_at(row, "/judged_by/solid"));
