@@ -198,6 +198,9 @@ TEST_F(BadInputTest, Usage) {
   expect_refusal(2, {"validate", "cube.off", "--features", "cube.off", "--dihedral", "200"}, {"--dihedral"});
   expect_refusal(2, {"validate", "cube.off", "--samples", "0"}, {"--samples"});
   expect_refusal(2, {"run", "x.toml", "--tier", "huge"}, {"--tier", "quick"});
+  expect_refusal(2, {"run", "guarantee", "--set", "judge"}, {"judge"});
+  expect_refusal(2, {"run", "guarantee", "--set", "judge=no", "--set", "judge=yes"}, {"judge", "twice"});
+  expect_refusal(1, {"run", "guarantee", "--out", "rows", "--set", "jugde=no"}, {"jugde", "judge"});
   // What a variable of a script that was not set leaves.
   expect_refusal(2, {"validate", "cube.off", "--reference", ""}, {"--reference", "empty"});
   expect_refusal(2, {"import", "x.raw", "x.vdb", "--dims", "2,2,2", "--type", "uint8", "--offset", "99999999999999999999"},

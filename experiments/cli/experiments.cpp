@@ -63,6 +63,9 @@ void add_run(CLI::App& app, Session& session) {
       ->check(CLI::Range(2, 100'000));
   command->add_option("--repetitions", settings->overrides.repetitions, "At most so many timed runs of each variant")
       ->check(CLI::Range(1, 1000));
+  auto parameters = std::make_shared<std::vector<std::string>>();
+  command->add_option("--set", *parameters,
+                      "Parameters of a measurement as NAME=VALUE, before those of the file; every row says which it was made with");
   auto again = std::make_shared<bool>(false);
   command->add_flag("--again", *again,
                     "Make cells anew of which the folder has rows by this program, of the same data (default: take up where "
@@ -90,12 +93,17 @@ void add_run(CLI::App& app, Session& session) {
   command->callback([=, &session] {
     if (!shard->empty()) {
       as_usage([&] { return shard_of(*shard); });
-      for (const char* option : {"--filter", "--variant", "--case", "--resolution", "--repetitions"})
+      for (const char* option : {"--filter", "--variant", "--case", "--resolution", "--repetitions", "--set"})
         if (command->count(option) > 0)
           throw UsageError("--shard is a part of the whole file, of which " + std::string(option) + " leaves out or changes something");
       if (settings->out.empty()) throw UsageError("--shard needs --out, a folder for each shard");
     }
     if (limits->in_process) refuse_idle(*command, {"--timeout", "--memory"}, "--in-process cannot end what takes too much");
+    as_usage([&] {
+      for (const std::string& text : *parameters)
+        if (const auto parameter = parse_option(text); !settings->overrides.parameters.insert(parameter).second)
+          throw Error("--set " + parameter.first + " is given twice");
+    });
     session.command = [=, &session] {
       settings->experiment = experiment_file(*name);
       settings->resume = !*again;

@@ -98,9 +98,15 @@ Plan::Plan(const RunSettings& settings, const Tables& given) : tables(given) {
   if (experiment.kind == ExperimentKind::kMeasurement) {
     if (!overrides.variants.empty() || !overrides.cases.empty() || !overrides.resolutions.empty() || overrides.repetitions)
       throw Error(experiment.name + " is a measurement, which --variant, --case, --resolution and --repetitions do not change; "
-                  "--filter chooses among its rows");
+                  "--filter chooses among its rows, and --set changes its parameters");
+    for (const auto& [name, value] : overrides.parameters) tier.parameters[name] = value;
+    const auto measurement = std::ranges::find(tables.measurements, experiment.measurement, &Measurement::name);
+    Options(measurement->name, measurement->parameters, tier.parameters);  // throws for what the measurement does not know
     return;
   }
+  if (!overrides.parameters.empty())
+    throw Error(experiment.name + " is no measurement, and --set changes the parameters of one; --variant, --case, --resolution "
+                "and --repetitions change this experiment");
   if (experiment.kind == ExperimentKind::kVoxelization)
     experiment.voxelizers = chosen(experiment.voxelizers, overrides.variants, tables.voxelizers);
   else
@@ -260,6 +266,7 @@ int serve_cells(const Tables& tables, RunContext& context) {
     settings.overrides = {job.at("variants").get<std::vector<std::string>>(), job.at("cases").get<std::vector<std::string>>(),
                           job.at("resolutions").get<std::vector<int>>()};
     if (const int repetitions = job.at("repetitions").get<int>(); repetitions > 0) settings.overrides.repetitions = repetitions;
+    settings.overrides.parameters = job.at("parameters").get<std::map<std::string, std::string>>();
     const Plan plan(settings, tables);
     GroupWorker worker(plan, settings.out, settings.filter, context);
     const auto left_out = job.at("left_out").get<std::set<std::string>>();

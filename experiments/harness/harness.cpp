@@ -354,6 +354,7 @@ class Run {
                  {"cases", overrides.cases},
                  {"resolutions", overrides.resolutions},
                  {"repetitions", overrides.repetitions.value_or(0)},
+                 {"parameters", overrides.parameters},
                  {"require_data", data_are_required()},
                  {"threads", head_.at("threads")},
                  {"head", head_},

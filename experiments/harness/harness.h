@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +38,7 @@ struct Overrides {
   std::vector<std::string> cases;      ///< names in the file; else cases, or mesh files, at the resolutions of the first
   std::vector<int> resolutions;        ///< of all cases
   std::optional<int> repetitions = {};
+  std::map<std::string, std::string> parameters = {};  ///< of a measurement, by name
 };
 
 struct RunSettings {

@@ -157,6 +157,18 @@ TEST_F(Measurements, TheFilterChoosesRows) {
   EXPECT_EQ(rows().size(), 2u);
 }
 
+TEST_F(Measurements, WhatIsSetComesBeforeTheFile) {
+  run("base = 3");
+  RunSettings settings{folder_ / "x.toml", "quick", folder_ / "out", ""};
+  settings.overrides.parameters = {{"base", "5"}};
+  EXPECT_EQ(run_experiment(settings, tables_, context_, said_), 0);
+  EXPECT_EQ(rows().back()["measurement"]["parameters"], "base=5 mode=fine");
+  settings.overrides.parameters = {{"base", "11"}};
+  EXPECT_THROW(run_experiment(settings, tables_, context_, said_), Error);
+  settings.overrides.parameters = {{"exponent", "2"}};
+  EXPECT_THROW(run_experiment(settings, tables_, context_, said_), Error);
+}
+
 TEST(NormalCodesMeasurement, GivesWhatItDeclares) {
   Tables tables;
   tables.measurements = {normal_codes_measurement()};
