@@ -85,6 +85,31 @@ TEST(VoronoiCutters, CodeIsTheNearestSeedAndWallsLieBetween) {
   }
 }
 
+TEST(VoronoiCutters, ABlockMayHoldWhatItHoldsAndNotWhatIsFarAway) {
+  Random random(2);
+  std::vector<Vector3d> seeds;
+  for (int i = 0; i < 60; ++i)
+    seeds.push_back(80.0 * Vector3d(random.uniform(), random.uniform(), random.uniform()));
+  for (const double amplitude : {0.0, 4.0}) {
+    const auto cutters = voronoi_cutters(seeds, {amplitude, 10.0, 3}, {});
+    std::size_t possible = 0, held = 0;
+    for (int b = 0; b < 1000; ++b) {
+      const Cutters::At lower{8 * (b / 100), 8 * (b / 10 % 10), 8 * (b % 10)};
+      std::array<CutCode, 512> codes;
+      cutters->codes(lower, codes);
+      for (CutCode code = 0; code < seeds.size(); ++code) {
+        const bool holds = std::ranges::count(codes, code) > 0, may = cutters->may_hold(lower, code);
+        ASSERT_TRUE(may || !holds) << "block " << b << ", code " << code;
+        possible += may;
+        held += holds;
+      }
+    }
+    EXPECT_LT(possible, 30 * held);
+    EXPECT_LT(possible, 60'000U / 2) << "of 60 seeds, most are far from most blocks";
+    EXPECT_FALSE(cutters->may_hold({0, 0, 0}, 60)) << "there is no such seed";
+  }
+}
+
 TEST(VoronoiCutters, DisplacedWallsAreFoundToTheStatedError) {
   const std::vector<Vector3d> seeds = {{10, 10, 2}, {10, 10, 18}};
   const Displacement displacement{2.0, 6.0, 9};

@@ -159,6 +159,11 @@ class VoronoiCutters : public Cutters {
     }
   }
 
+  bool may_hold(const At& lower, CutCode code) const override {
+    const Vector3d middle = places_(lower, Vector3d::Constant(3.5));
+    return code < seeds_.size() && (seeds_[code] - middle).squaredNorm() <= squared_reach(middle);
+  }
+
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override {
     const Vector3d across = seeds_[second] - seeds_[first];
     const auto value = [&](double t) { return beyond(places_(at, t * Vector3d::Unit(axis)), first, second); };
@@ -229,6 +234,15 @@ class VoronoiCutters : public Cutters {
   /// Seeds that may be nearest to a sample of the block, ascending.
   std::vector<std::uint32_t> candidates(const At& lower) const {
     const Vector3d middle = places_(lower, Vector3d::Constant(3.5));
+    const double reach = squared_reach(middle);
+    std::vector<std::uint32_t> near;
+    for (std::uint32_t i = 0; i < seeds_.size(); ++i)
+      if ((seeds_[i] - middle).squaredNorm() <= reach) near.push_back(i);
+    return near;
+  }
+
+  /// The square of the distance from a block's middle beyond which no seed is nearest to a sample of the block.
+  double squared_reach(const Vector3d& middle) const {
     // A displaced sample is at most r = block_radius() + √3 · amplitude from the middle, for each component
     // of the displacement is at most the amplitude. Its nearest seed is no farther from it than the seed
     // nearest to the middle, hence no farther from the middle than that one by more than 2r; 1.001 covers
@@ -237,10 +251,7 @@ class VoronoiCutters : public Cutters {
     double least = std::numeric_limits<double>::infinity();
     for (const Vector3d& seed : seeds_) least = std::min(least, (seed - middle).squaredNorm());
     const double farthest = std::sqrt(least) + slack;
-    std::vector<std::uint32_t> near;
-    for (std::uint32_t i = 0; i < seeds_.size(); ++i)
-      if ((seeds_[i] - middle).squaredNorm() <= farthest * farthest) near.push_back(i);
-    return near;
+    return farthest * farthest;
   }
 
   Places places_;
