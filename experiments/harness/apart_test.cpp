@@ -249,7 +249,8 @@ TEST_F(ApartRun, OverridesTakeOtherVariantsCasesAndResolutions) {
   EXPECT_THROW(run(look), Error);
   look.overrides = {{}, {"bricks"}, {}};
   EXPECT_THROW(run(look), Error);
-  look.overrides = {.parameters = {{"seed", "2"}}};  // those of measurements alone
+  look.overrides = {};
+  look.overrides.parameters = {{"seed", "2"}};  // those of measurements alone
   EXPECT_THROW(run(look), Error);
 }
 
