@@ -174,6 +174,8 @@ int run_program(int argc, char** argv) {
     std::string sentence = unknown_word(app, {argv + 1, argv + argc});
     if (sentence.empty() && dynamic_cast<const CLI::RequiredError*>(&error)) sentence = missing_output(app, session);
     return fail(kUsage, (sentence.empty() ? error.what() : sentence) + "; see hermesh --help");
+  } catch (const UsageError& error) {  // what a command sees while it reads its options
+    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
   }
   if (const std::string option = option_without_value(app); !option.empty())
     return fail(kUsage, option + " was given an empty value; see hermesh --help");
