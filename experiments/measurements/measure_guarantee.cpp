@@ -180,6 +180,16 @@ struct Overview {
 bool is_octree(const MeasurementInput& input) { return input.parameters.is("extractor", kOctree); }
 const char* judged_name(const MeasurementInput& input) { return is_octree(input) ? kOctree : kGuaranteed; }
 
+/// What the labels of rows end with, so that rows of other parameters can stand side by side.
+std::string label_end(const MeasurementInput& input) {
+  std::string end;
+  if (is_octree(input)) end += ", octree";
+  if (input.parameters.is("placement", "average")) end += ", means";
+  if (!input.parameters.is("largest_cube", "8")) end += ", cubes of " + input.parameters.text("largest_cube");
+  if (input.parameters.is("representation", "sparse")) end += ", packed";
+  return end;
+}
+
 /// The meshes of one subject after another.
 class SubjectMeasurement {
  public:
@@ -235,12 +245,7 @@ class SubjectMeasurement {
 
  private:
   void measure_all(Subject subject) {
-    // Rows of the two extractors stand side by side.
-    if (is_octree(input_)) subject.label += ", octree";
-    if (input_.parameters.is("placement", "average")) subject.label += ", means";
-    if (!input_.parameters.is("largest_cube", "8"))
-      subject.label += ", cubes of " + input_.parameters.text("largest_cube");
-    if (input_.parameters.is("representation", "sparse")) subject.label += ", packed";
+    subject.label += label_end(input_);
     source_.reset();
     if (judged_ && subject.source) {
       RunContext child = child_context(input_.context, false);
@@ -436,7 +441,7 @@ class Guarantee {
 
   void list_models() {
     for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) {
-      if (!input_.wants("models", name)) continue;
+      if (!input_.wants("models", name + label_end(input_))) continue;
       std::vector<double> resolutions = numbers_in(input_.parameters.text("resolutions"));
       if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
       for (const double resolution : resolutions)
@@ -451,7 +456,7 @@ class Guarantee {
     for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) {
       const std::string label = (i % 2 == 0 ? "uniform " : "whole ") + three_digits(i);
       const int n = int(sizes[std::size_t(i / 2) % sizes.size()]);
-      if (input_.wants("noise", label))
+      if (input_.wants("noise", label + label_end(input_)))
         work_.push_back(
             {"noise " + label, [=](SubjectMeasurement& subject) { subject.measure_noise(i, n, label); }});
     }
@@ -460,7 +465,7 @@ class Guarantee {
   void list_patterns() {
     for (int i = 0; i < int(input_.parameters.number("pattern_fields")); ++i) {
       const std::string label = (i == 0 ? "cells " : "random ") + three_digits(i);
-      if (input_.wants("patterns", label))
+      if (input_.wants("patterns", label + label_end(input_)))
         work_.push_back(
             {"patterns " + label, [=](SubjectMeasurement& subject) { subject.measure_patterns(i, label); }});
     }

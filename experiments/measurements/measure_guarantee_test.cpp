@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <map>
@@ -74,6 +75,17 @@ TEST(GuaranteeMeasurement, DigestsAreThoseOfTheMeshesThatAreJudged) {
   }
   for (const auto& [name, values] : made)
     EXPECT_FALSE(values.contains("violations")) << "nobody looked: " << name;
+}
+
+TEST(GuaranteeMeasurement, ARowIsMadeWhenItsWholeLabelIsAskedFor) {
+  std::map<std::string, std::string> parameters = kSmall;
+  parameters["extractor"] = "certified-octree";
+  parameters["judge"] = "no";
+  const std::vector<Json> rows = rows_of(parameters, "patterns/cells 000, octree");
+  const bool made = std::ranges::any_of(rows, [](const Json& row) {
+    return text_at(row, "/case/name") == "patterns" && text_at(row, "/variant/name") == "cells 000, octree";
+  });
+  EXPECT_TRUE(made);
 }
 
 /// A run of hours that is cut short has kept what it had.
