@@ -36,8 +36,8 @@ class PlaceTree {
       : places_(places), order_(places.size()), slot_(places.size()), chosen_(places.size(), 0) {
     std::iota(order_.begin(), order_.end(), 0u);
     // Node i has the children 2i and 2i + 1. So many levels of halves leave at most kLeaf places to each of the last.
-    nodes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
-    build(1, 0, places.size());
+    boxes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
+    build(0, places.size());
     for (std::uint32_t i = 0; i < order_.size(); ++i) slot_[order_[i]] = i;
   }
 
@@ -46,34 +46,33 @@ class PlaceTree {
     if (bool(chosen_[corner]) == is_chosen) return;
     chosen_[corner] = is_chosen;
     std::size_t node = 1, begin = 0, end = order_.size();
-    while (true) {
-      // Every node counts the chosen places below it, so that any_in() leaves branches without any.
-      nodes_[node].chosen += is_chosen ? 1 : -1;
-      if (end - begin <= kLeaf) return;
+    while (end - begin > kLeaf) {
       const std::size_t middle = begin + (end - begin) / 2;
       const bool upper = slot_[corner] >= middle;
       (upper ? begin : end) = middle;
       node = 2 * node + upper;
     }
+    // The boxes are those of the chosen places only, so that any_in() leaves branches whose others are in its way.
+    boxes_[node].setEmpty();
+    for (std::size_t i = begin; i < end; ++i)
+      if (chosen_[order_[i]]) boxes_[node].extend(places_[order_[i]]);
+    while (node /= 2) boxes_[node] = boxes_[2 * node].merged(boxes_[2 * node + 1]);
   }
 
   /// Whether f(corner) holds for one of the chosen corners in the counter-clockwise triangle abc, border included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
-    return any_in(1, 0, order_.size(), a, b, c, f);
+    Eigen::AlignedBox2d box(a, a);
+    return any_in(1, 0, order_.size(), box.extend(b).extend(c), a, b, c, f);
   }
 
  private:
   static constexpr std::size_t kLeaf = 8;
-  struct Node {
-    Eigen::AlignedBox2d box;
-    std::int64_t chosen = 0;
-  };
 
-  void build(std::size_t node, std::size_t begin, std::size_t end) {
-    Eigen::AlignedBox2d& box = nodes_[node].box;
-    for (std::size_t i = begin; i < end; ++i) box.extend(places_[order_[i]]);
+  void build(std::size_t begin, std::size_t end) {
     if (end - begin <= kLeaf) return;
+    Eigen::AlignedBox2d box;
+    for (std::size_t i = begin; i < end; ++i) box.extend(places_[order_[i]]);
     const int axis = box.sizes().x() >= box.sizes().y() ? 0 : 1;
     const std::size_t middle = begin + (end - begin) / 2;
     // Ties go by number: which places lie in a half then depends on nothing but the polygon.
@@ -81,16 +80,15 @@ class PlaceTree {
                      order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i, std::uint32_t j) {
                        return std::pair(places_[i][axis], i) < std::pair(places_[j][axis], j);
                      });
-    build(2 * node, begin, middle);
-    build(2 * node + 1, middle, end);
+    build(begin, middle);
+    build(middle, end);
   }
 
   template <class F>
-  bool any_in(std::size_t node, std::size_t begin, std::size_t end, const Vector2d& a, const Vector2d& b,
-              const Vector2d& c, F&& f) const {
-    const Node& here = nodes_[node];
-    if (here.chosen == 0 || is_right_of(a, b, here.box) || is_right_of(b, c, here.box) ||
-        is_right_of(c, a, here.box))
+  bool any_in(std::size_t node, std::size_t begin, std::size_t end, const Eigen::AlignedBox2d& box, const Vector2d& a,
+              const Vector2d& b, const Vector2d& c, F&& f) const {
+    const Eigen::AlignedBox2d& here = boxes_[node];
+    if (!here.intersects(box) || is_right_of(a, b, here) || is_right_of(b, c, here) || is_right_of(c, a, here))
       return false;
     if (end - begin <= kLeaf)
       return std::any_of(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end),
@@ -100,7 +98,7 @@ class PlaceTree {
                                   area(c, a, p) >= 0 && f(i);
                          });
     const std::size_t middle = begin + (end - begin) / 2;
-    return any_in(2 * node, begin, middle, a, b, c, f) || any_in(2 * node + 1, middle, end, a, b, c, f);
+    return any_in(2 * node, begin, middle, box, a, b, c, f) || any_in(2 * node + 1, middle, end, box, a, b, c, f);
   }
 
   /// Whether all of a box lies to the right of a line: its corner farthest to the left does. Rounding keeps order, so
@@ -114,31 +112,50 @@ class PlaceTree {
   const std::vector<Vector2d>& places_;
   std::vector<std::uint32_t> order_, slot_;  ///< corners as the leaves have them, and where each is
   std::vector<char> chosen_;
-  std::vector<Node> nodes_;  ///< children of i: 2i and 2i + 1
+  std::vector<Eigen::AlignedBox2d> boxes_;  ///< of the chosen places of each node; children of i: 2i and 2i + 1
 };
 
-/// Set of corners that are still to be looked at, as bits in the order of the ring.
+/// Set of corners that are still to be looked at, as bits in the order of the ring. Bits of a further level mark the words
+/// that are not 0 and so on, so that the next member is found in a few steps however far away it is.
 class Candidates {
  public:
-  explicit Candidates(std::size_t corners) : words_((corners + 63) / 64, 0) {}
+  explicit Candidates(std::size_t corners) {
+    do levels_.emplace_back(corners = (corners + 63) / 64, 0);
+    while (corners > 1);
+  }
 
-  void add(std::uint32_t i) { words_[i / 64] |= std::uint64_t(1) << i % 64; }
-  void remove(std::uint32_t i) { words_[i / 64] &= ~(std::uint64_t(1) << i % 64); }
-  /// The first member from i on, around the ring; nothing if the set is empty.
+  void add(std::uint32_t i) {
+    for (auto& words : levels_) words[i / 64] |= std::uint64_t(1) << i % 64, i /= 64;
+  }
+  void remove(std::uint32_t i) {
+    for (auto& words : levels_) {
+      words[i / 64] &= ~(std::uint64_t(1) << i % 64);
+      if (words[i / 64]) return;
+      i /= 64;
+    }
+  }
+  /// Returns the first member from i on, around the ring, or nothing if the set is empty.
   std::optional<std::uint32_t> from(std::uint32_t i) const {
-    const std::size_t start = i / 64;
-    const std::uint64_t upper = ~std::uint64_t(0) << i % 64;
-    for (std::size_t k = 0; k <= words_.size(); ++k) {
-      // The word of i is looked at twice: at first from i on, and at last before i.
-      const std::size_t w = (start + k) % words_.size();
-      const std::uint64_t bits = words_[w] & (k == 0 ? upper : k == words_.size() ? ~upper : ~std::uint64_t(0));
-      if (bits) return std::uint32_t(64 * w + std::size_t(std::countr_zero(bits)));
+    const std::optional<std::uint32_t> found = not_before(i);
+    return found || i == 0 ? found : not_before(0);
+  }
+
+ private:
+  /// Returns the first member from i on up to the end of the ring.
+  std::optional<std::uint32_t> not_before(std::size_t i) const {
+    // Up to a level with a member from i on in the same word, and down to the first corner below that.
+    for (std::size_t level = 0; level < levels_.size(); ++level, i = i / 64 + 1) {
+      if (i / 64 >= levels_[level].size()) return std::nullopt;
+      const std::uint64_t bits = levels_[level][i / 64] & (~std::uint64_t(0) << i % 64);
+      if (!bits) continue;
+      i = i / 64 * 64 + std::size_t(std::countr_zero(bits));
+      while (level-- > 0) i = 64 * i + std::size_t(std::countr_zero(levels_[level][i]));
+      return std::uint32_t(i);
     }
     return std::nullopt;
   }
 
- private:
-  std::vector<std::uint64_t> words_;
+  std::vector<std::vector<std::uint64_t>> levels_;
 };
 
 // Ears are cut off a ring of corners that shrinks. Invariant: a corner outside a set of candidates has kept its
