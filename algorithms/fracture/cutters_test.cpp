@@ -10,6 +10,7 @@
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/piece_attributes.h"
+#include "algorithms/fracture/growing_tree.h"
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/hermite/test_lattice.h"
 
@@ -26,6 +27,36 @@ PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
             .cast<float>());
   mesh.quads = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   return mesh;
+}
+
+TEST(GrowingTree, GivesWhatALoopOverAllPlacesGives) {
+  Random random(7);
+  // Many places are equal in some coordinates, or in all.
+  const auto place = [&] {
+    Vector3d p;
+    for (double& x : p) x = std::floor(16.0 * random.uniform()) / 4.0 + (random.uniform() < 0.3 ? random.uniform() : 0.0);
+    return p;
+  };
+  GrowingTree tree;
+  std::vector<Vector3d> places;
+  EXPECT_EQ(tree.nearest(Vector3d::Zero()), std::numeric_limits<double>::infinity());
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d p = place();
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Vector3d& other : places) nearest = std::min(nearest, (other - p).squaredNorm());
+    ASSERT_EQ(tree.nearest(p), nearest);
+    if (i % 10 == 0) {
+      const double reach = 2.0 * random.uniform();
+      std::vector<std::uint32_t> expected, found;
+      for (std::uint32_t k = 0; k < places.size(); ++k)
+        if ((places[k] - p).squaredNorm() <= reach) expected.push_back(k);
+      tree.for_each_within(p, reach, [&](std::uint32_t k) { found.push_back(k); });
+      std::sort(found.begin(), found.end());
+      ASSERT_EQ(found, expected);
+    }
+    places.push_back(p);
+    tree.add(p);
+  }
 }
 
 TEST(PlaneCutters, CrossWhereThePlaneDoes) {

@@ -89,20 +89,26 @@ bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t
   return false;
 }
 
-/// Whether slivers are all that the cutter took. A plane then has no edge left, and some sliver
+/// Marks the cutters that took nothing but slivers. A plane then has no edge left, and some sliver
 /// lay on its other side than the piece that it joined; any other cutter has no piece of its code left.
-bool was_merged(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
-                const CutterRecord& record, const std::vector<MergedPiece>& merged) {
-  if (cutters.plane_sides())
-    return record.edges == 0 && std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) {
-             return ((m.code ^ m.into_code) >> cutter & 1) != 0;
-           });
+std::vector<char> merged_cutters(const LabelledSolid& solid, const Cutters& cutters,
+                                 const std::vector<CutterRecord>& records, const std::vector<MergedPiece>& merged) {
+  std::vector<char> result(records.size(), 0);
+  if (cutters.plane_sides()) {
+    for (std::size_t k = 0; k < records.size(); ++k)
+      result[k] = records[k].edges == 0 && std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) {
+                    return ((m.code ^ m.into_code) >> k & 1) != 0;
+                  });
+    return result;
+  }
+  for (const MergedPiece& m : merged)
+    if (m.code < result.size()) result[m.code] = 1;
   for (std::uint32_t piece = 1; piece <= solid.piece_count(); ++piece)
-    if (solid.code_values[solid.code_of[piece] - 1] == cutter) return false;
-  return std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) { return m.code == cutter; });
+    if (const CutCode code = solid.code_values[solid.code_of[piece] - 1]; code < result.size()) result[code] = 0;
+  return result;
 }
 
-/// The state of a cutter to which was_merged() does not apply: the first that fits.
+/// The state of a cutter that merged_cutters() does not mark: the first that fits.
 CutterRecord::State state_of(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter,
                              const CutterRecord& record) {
   using State = CutterRecord::State;
@@ -127,11 +133,12 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
   if (codes_are_cutters)
     for (std::size_t i = 0; i < solid.code_values.size(); ++i)
       if (solid.code_values[i] < records.size()) records[solid.code_values[i]].samples = taken[i + 1];
+  const std::vector<char> was_merged = merged_cutters(solid, cutters, records, merged);
   for (std::size_t k = 0; k < records.size(); ++k) {
     records[k].name = cutters.name(k);
     // A wall between two cells carries the lower one's number, so a cell may cut without an edge of its own.
     const bool cell = codes_are_cutters && !cutters.signs(k, {});
-    if (was_merged(solid, cutters, k, records[k], merged))
+    if (was_merged[k])
       records[k].state = CutterRecord::State::merged;
     else if (cell && records[k].samples > 0 && records[k].samples < solid.samples)
       records[k].state = CutterRecord::State::cuts;

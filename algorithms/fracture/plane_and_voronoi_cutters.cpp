@@ -8,6 +8,7 @@
 #include "algorithms/core/error.h"
 #include "algorithms/fracture/cutters.h"
 #include "algorithms/fracture/noise.h"
+#include "algorithms/fracture/growing_tree.h"
 
 namespace hermesh {
 namespace {
@@ -142,6 +143,7 @@ class VoronoiCutters : public Cutters {
   VoronoiCutters(std::vector<Vector3d> seeds, const Displacement& displacement, const IndexToWorld& placement)
       : places_(placement), seeds_(std::move(seeds)), displacement_(displacement), noise_(displacement.seed) {
     if (seeds_.empty()) throw Error("there are no seeds to make cells of");
+    for (const Vector3d& seed : seeds_) tree_.add(seed);
   }
 
   void codes(const At& lower, std::span<CutCode, 512> codes) const override {
@@ -236,8 +238,8 @@ class VoronoiCutters : public Cutters {
     const Vector3d middle = places_(lower, Vector3d::Constant(3.5));
     const double reach = squared_reach(middle);
     std::vector<std::uint32_t> near;
-    for (std::uint32_t i = 0; i < seeds_.size(); ++i)
-      if ((seeds_[i] - middle).squaredNorm() <= reach) near.push_back(i);
+    tree_.for_each_within(middle, reach, [&](std::uint32_t seed) { near.push_back(seed); });
+    std::sort(near.begin(), near.end());
     return near;
   }
 
@@ -248,14 +250,13 @@ class VoronoiCutters : public Cutters {
     // nearest to the middle, hence no farther from the middle than that one by more than 2r; 1.001 covers
     // rounding.
     const double slack = 2.0 * 1.001 * (places_.block_radius() + std::sqrt(3.0) * displacement_.amplitude);
-    double least = std::numeric_limits<double>::infinity();
-    for (const Vector3d& seed : seeds_) least = std::min(least, (seed - middle).squaredNorm());
-    const double farthest = std::sqrt(least) + slack;
+    const double farthest = std::sqrt(tree_.nearest(middle)) + slack;
     return farthest * farthest;
   }
 
   Places places_;
   std::vector<Vector3d> seeds_;
+  GrowingTree tree_;
   Displacement displacement_;
   VectorNoise noise_;
 };

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "algorithms/fracture/noise.h"
+#include "algorithms/fracture/growing_tree.h"
 
 namespace hermesh {
 namespace {
@@ -59,9 +59,14 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
   if (samples.size() == 0)
     throw Error("the solid has no sample inside, so nothing can be scattered in it: use smaller voxels");
   Random random(options.seed);
+  if (count > samples.size())
+    throw Error(std::to_string(count) + " places are to be scattered in a solid of " + std::to_string(samples.size()) +
+                " samples: ask for no more places than samples, or use smaller voxels");
   std::vector<Vector3d> places;
+  GrowingTree tree;
   while (places.size() < count) {
     context.check();
+    if (places.size() % 1024 == 0) context.progress("scatter", double(places.size()) / double(count));
     double farthest = -1.0;
     Vector3d best = Vector3d::Zero();
     int tries = 0;
@@ -73,11 +78,9 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
       // thread alone, so the seed decides everything.
       if (!(density > 0) || random.uniform() >= density) continue;
       ++candidate;
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const Vector3d& other : places) nearest = std::min(nearest, (other - place).squaredNorm());
       // Where places are to be n times as dense, their spacing is smaller by the cube root of n; scaled by
       // it, distances compare between dense parts and sparse ones.
-      nearest = std::sqrt(nearest) * std::cbrt(density);
+      const double nearest = std::sqrt(tree.nearest(place)) * std::cbrt(density);
       if (nearest > farthest) farthest = nearest, best = place;
     }
     // Nothing was accepted, or only places that are taken already: so all places differ.
@@ -85,6 +88,7 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
       throw Error("only " + std::to_string(places.size()) + " of " + std::to_string(count) +
                   " places could be scattered: the density is nowhere above 0 inside the solid, or too low");
     places.push_back(best);
+    tree.add(best);
   }
   return places;
 }

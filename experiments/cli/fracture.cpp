@@ -91,10 +91,15 @@ void summarise(const FractureSummary& summary, Session& session) {
 }
 
 void note_idle_cutters(const FractureSummary& summary, Session& session) {
+  constexpr std::size_t kMostNotes = 100;
+  std::vector<std::string> idle;
   for (const CutterRecord& record : summary.cutters)
-    if (record.state != CutterRecord::State::cuts)
-      session.context.note(record.name + " " + in_words(record.state));
-  for (const std::string& name : summary.empty) session.context.note(name + ": nothing");
+    if (record.state != CutterRecord::State::cuts) idle.push_back(record.name + " " + in_words(record.state));
+  for (const std::string& name : summary.empty) idle.push_back(name + ": nothing");
+  for (std::size_t i = 0; i < std::min(idle.size(), kMostNotes); ++i) session.context.note(idle[i]);
+  if (idle.size() > kMostNotes)
+    session.context.note(std::to_string(idle.size() - kMostNotes) +
+                         " more cutters cut nothing; pieces.json has the state of each");
 }
 
 /// Whether the pieces are right by themselves; a loss of volume is said in a note, as it is of surfaces.
