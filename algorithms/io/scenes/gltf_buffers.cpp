@@ -132,10 +132,15 @@ std::string bytes_of_uri(std::string_view uri, const MeshBuilder& builder) {
   if (!stays_below(relative))
     builder.fail("its buffer " + name + " is not in the folder of the file or beneath it; move it there");
   // Beside the mesh file, wherever the program runs.
-  const std::filesystem::path path = std::filesystem::path(builder.file()).parent_path() / relative;
+  const std::filesystem::path folder = std::filesystem::path(builder.file()).parent_path() / ".";
+  const std::filesystem::path path = folder / relative;
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
     builder.fail("its buffer " + name + " is not there: the two files belong into one folder");
+  const std::filesystem::path root = std::filesystem::canonical(folder, error);
+  const std::filesystem::path inside = std::filesystem::canonical(path, error).lexically_relative(root);
+  if (!stays_below(inside))
+    builder.fail("its buffer " + name + " is a symbolic link that leads out of the folder of the file; copy it there");
   try {
     return read_whole(path);
   } catch (const Error&) {

@@ -174,6 +174,25 @@ TEST_F(GltfFileTest, BuffersAreWithinTheFileOrBesideIt) {
             (Points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}}));
 }
 
+TEST_F(GltfFileTest, LinksOutOfTheFolderAreRefused) {
+  Gltf gltf;
+  std::filesystem::create_directories(folder / "inside/deep");
+  write("outside.bin", gltf.binary);
+  write("inside/deep/a.bin", gltf.binary);
+  std::filesystem::create_symlink("../outside.bin", folder / "inside/out.bin");
+  std::filesystem::create_directory_symlink("..", folder / "inside/up");
+  std::filesystem::create_symlink("deep/a.bin", folder / "inside/in.bin");
+  std::filesystem::create_directory_symlink("inside", folder / "other");
+  const auto error = [&](const std::string& uri) {
+    gltf.buffers = R"([{"byteLength":44,"uri":")" + uri + R"("}])";
+    write("inside/a.gltf", gltf.json());
+    return error_of_path(folder / "inside/a.gltf") + error_of_path(folder / "other/a.gltf");
+  };
+  for (const char* uri : {"out.bin", "up/outside.bin"})
+    EXPECT_NE(error(uri).find("leads out of the folder"), std::string::npos) << uri;
+  for (const char* uri : {"in.bin", "deep/a.bin", "up/inside/deep/a.bin"}) EXPECT_EQ(error(uri), "") << uri;
+}
+
 TEST_F(GltfFileTest, BuffersElsewhereAreRefused) {
   Gltf gltf;
   const auto sentence = [&](const std::string& uri) {
