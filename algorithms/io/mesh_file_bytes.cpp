@@ -40,11 +40,20 @@ std::size_t memory_limit() {
          static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
+void check_unpacked(std::uint64_t packed, std::uint64_t unpacked, const std::string& what) {
+  if (unpacked > memory_limit()) throw Error(what + " unpacks to more than half of the memory there is");
+  if (unpacked > std::max(kMostUnpackedAnyway, kMostUnpackedRatio * packed))
+    throw Error(what + " unpacks to more than " + std::to_string(kMostUnpackedRatio) + " times its length and " +
+                std::to_string(kMostUnpackedAnyway >> 20) +
+                " MiB, which is the limit; if it is meant so, unpack it before");
+}
+
 namespace {
 
 class Inflater {
  public:
-  Inflater(std::string_view packed, const fs::path& path) : name_(in_quotes(path.string())), rest_(packed) {
+  Inflater(std::string_view packed, const fs::path& path)
+      : name_(in_quotes(path.string())), packed_(packed.size()), rest_(packed) {
     if (inflateInit2(&stream_, 15 + 16) != Z_OK) throw std::bad_alloc();  // 16: gzip header and checksum
   }
   ~Inflater() { inflateEnd(&stream_); }
@@ -72,8 +81,7 @@ class Inflater {
     // Room doubles when it is used up, so that the bytes are moved but a few times; before each doubling the limit is
     // asked.
     if (used_ == bytes.size()) {
-      if (bytes.size() > memory_limit())
-        throw Error(name_ + " unpacks to more than half of the memory there is");
+      check_unpacked(packed_, bytes.size(), name_);
       bytes.resize(std::max<std::size_t>(2 * bytes.size(), 4 * rest_.size() + 4096));
     }
     // Both pointers are set anew for each step, because the bytes move when their room grows.
@@ -96,6 +104,7 @@ class Inflater {
   }
 
   std::string name_;
+  std::uint64_t packed_;
   std::string_view rest_;
   z_stream stream_ = {};
   std::size_t used_ = 0;

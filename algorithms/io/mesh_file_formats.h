@@ -35,6 +35,13 @@ std::string read_whole(const std::filesystem::path& path);
 /// unpack to terabytes.
 std::size_t memory_limit();
 
+/// How many times its own length, or this many bytes, a packed file may unpack to. Text of meshes packs to a tenth, and
+/// only what was made to do harm to less than a 200th.
+constexpr std::uint64_t kMostUnpackedRatio = 200, kMostUnpackedAnyway = std::uint64_t(1) << 28;
+/// Checks the length that `packed` bytes unpack to, so far or in all. @throws Error that begins with `what` if it is
+/// beyond those limits or memory_limit().
+void check_unpacked(std::uint64_t packed, std::uint64_t unpacked, const std::string& what);
+
 /// Gives points that are equal in all three coordinates (−0 is 0) one number, in the order in which they are first
 /// seen.
 class PointMerger {

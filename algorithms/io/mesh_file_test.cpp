@@ -1,6 +1,7 @@
 #include "algorithms/io/mesh_file.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <Eigen/Geometry>
 #include <atomic>
@@ -239,6 +240,21 @@ TEST_F(MeshFileTest, GzipMayHaveSeveralMembers) {
   damaged[damaged.size() - 6] ^= 1;  // in the checksum
   EXPECT_EQ(error_of("e.obj.gz", damaged), "'e.obj.gz' is damaged: its gzip data does not unpack");
   EXPECT_EQ(error_of("f.obj.gz", obj), "'f.obj.gz' is named .gz but is not compressed by gzip");
+}
+
+/// Members of a megabyte of zeros each, 300 MB from less than half a megabyte.
+TEST_F(MeshFileTest, GzipMadeToDoHarmIsRefused) {
+  const std::string zeros(std::size_t(1) << 20, '\0');
+  const gzFile file = gzopen((folder / "member").c_str(), "wb9");
+  gzwrite(file, zeros.data(), unsigned(zeros.size()));
+  gzclose(file);
+  const std::string member = bytes_of(folder / "member");
+  std::string all;
+  for (int i = 0; i < 300; ++i) all += member;
+  EXPECT_LT(all.size(), 500000u);
+  EXPECT_NE(error_of("a.off.gz", all).find("which is the limit"), std::string::npos);
+  // What packs as well and is short is read, and is no mesh.
+  EXPECT_EQ(error_of("b.off.gz", member + member).find("which is the limit"), std::string::npos);
 }
 
 TEST_F(MeshFileTest, RefusesWhatIsNoMeshFile) {

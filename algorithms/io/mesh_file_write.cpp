@@ -7,6 +7,7 @@
 
 #include "algorithms/io/atomic_file.h"
 #include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/io/mesh_units.h"
 #include "algorithms/io/scenes/scene_files.h"
 
 namespace hermesh {
@@ -349,9 +350,9 @@ void check_mesh(const std::string& name, const MeshFile& mesh) {
       throw Error("cannot write " + in_quotes(name) + ": point " + std::to_string(i) + " is not finite");
 }
 
-}  // namespace
-
-void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
+/// Writes a mesh whose coordinates are in a unit of 3MF's.
+void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, std::string_view unit,
+                   RunContext& context) {
   const Stage stage(context, "write");
   const std::optional<MeshPath> named = parse_mesh_path(path);
   if (!named) throw_unknown_extension(path);
@@ -381,12 +382,22 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
       write_gltf(sink, mesh, named->format == Format::glb, path.string());
       break;
     case Format::three_mf:
-      write_three_mf(sink, mesh, path.string(), context);
+      write_three_mf(sink, mesh, unit, path.string(), context);
       break;
   }
   // A rename only after the last byte was taken without complaint.
   out.close();
   aside.commit();
+}
+
+}  // namespace
+
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
+  write_in_unit(path, mesh, "millimeter", context);
+}
+
+void write_mesh_in_metres(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
+  write_in_unit(path, mesh, "meter", context);
 }
 
 }  // namespace hermesh

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdlib>
 
+#include "algorithms/io/mesh_units.h"
 #include "algorithms/io/scenes/scene_files_for_tests.h"
 #include "algorithms/io/test_mesh_files.h"
 
@@ -260,6 +261,28 @@ TEST_F(ThreeMfFileTest, WritingCanBeCancelled) {
   context.cancel = &cancel;
   EXPECT_THROW(write_mesh(folder / "a.3mf", random_mesh(1, {0, 0, 0}), context), Cancelled);
   EXPECT_TRUE(files().empty());
+}
+
+/// A directory that declares 400 MB: what is packed could hold them, but no text of a mesh packs to a thousandth.
+TEST_F(ThreeMfFileTest, ArchivesMadeToDoHarmAreRefused) {
+  std::string noise;
+  std::mt19937 random(1);
+  for (int i = 0; i < 500000; ++i) noise += char(random());
+  std::string archive = three_mf_of(noise);
+  const std::size_t entry = archive.rfind("PK\1\2");
+  const std::uint32_t length = 400'000'000;
+  for (int i = 0; i < 4; ++i) archive[entry + 24 + std::size_t(i)] = char(length >> 8 * i);
+  EXPECT_NE(MeshFileTest::error_of("a.3mf", archive).find("which is the limit"), std::string::npos);
+}
+
+TEST_F(ThreeMfFileTest, TheUnitIsTheMillimetreUnlessItIsKnown) {
+  const PolygonMesh mesh = random_mesh(1, {1, 2, 3});
+  write_mesh(folder / "a.3mf", mesh, context);
+  const PolygonMesh read_back = read_mesh(folder / "a.3mf", context);
+  EXPECT_TRUE(std::ranges::none_of(context.notes, [](const auto& note) { return note.find("unit") != note.npos; }));
+  write_mesh_in_metres(folder / "b.3mf", mesh, context);
+  EXPECT_EQ(read_mesh(folder / "b.3mf", context), read_back);
+  EXPECT_NE(context.notes.back().find("'meter'"), std::string::npos);
 }
 
 /// Ten objects of ten components each would be ten thousand million triangles.

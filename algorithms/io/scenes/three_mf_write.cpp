@@ -15,9 +15,11 @@ constexpr std::string_view kRelationships =
 <Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/3dmodel.model"/></Relationships>
 )";
 // The format has one unit for all; its own default is what slicers take the numbers of other formats for.
-constexpr std::string_view kHead =
+constexpr std::string_view kHeadToUnit =
     R"(<?xml version="1.0" encoding="UTF-8"?>
-<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+<model unit=")";
+constexpr std::string_view kHeadBehindUnit =
+    R"(" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <metadata name="Application">hermesh</metadata>
 )";
 constexpr std::string_view kObject = "<resources>\n<object id=\"1\" type=\"model\"><mesh><vertices>\n";
@@ -27,12 +29,13 @@ constexpr std::size_t kModelPiece = std::size_t(1) << 16;
 /// more than once. It must stay where it is.
 class ModelText {
  public:
-  explicit ModelText(const PolygonMesh& mesh) : mesh_(mesh) {
+  ModelText(const PolygonMesh& mesh, std::string_view unit)
+      : mesh_(mesh), head_(std::string(kHeadToUnit) + std::string(unit) + std::string(kHeadBehindUnit)) {
     if (mesh.empty()) {
-      parts_ = {{1, [this](std::size_t) { text(kHead).text("<resources/>\n<build/>\n</model>\n"); }}};
+      parts_ = {{1, [this](std::size_t) { text(head_).text("<resources/>\n<build/>\n</model>\n"); }}};
       return;
     }
-    parts_ = {{1, [this](std::size_t) { text(kHead).text(kObject); }},
+    parts_ = {{1, [this](std::size_t) { text(head_).text(kObject); }},
               {mesh.points.size(), [this](std::size_t i) { add_point(mesh_.points[i]); }},
               {1, [this](std::size_t) { text("</vertices><triangles>\n"); }},
               {mesh.triangles.size(), [this](std::size_t i) { add_triangle(mesh_.triangles[i]); }},
@@ -97,6 +100,7 @@ class ModelText {
   }
 
   const PolygonMesh& mesh_;
+  std::string head_;
   std::vector<Part> parts_;
   std::string piece_;
   std::size_t part_ = 0, element_ = 0, left_out_ = 0;
@@ -104,9 +108,9 @@ class ModelText {
 
 }  // namespace
 
-void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, const std::string& file,
+void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit, const std::string& file,
                     RunContext& context) {
-  ModelText model(mesh);
+  ModelText model(mesh, unit);
   const auto next = [&] {
     context.check();
     return model.next();

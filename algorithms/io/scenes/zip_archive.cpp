@@ -74,7 +74,7 @@ zip_int64_t ZipArchive::find(std::string name) const {
   return -1;
 }
 
-void ZipArchive::check(const zip_stat_t& entry, const std::string& shown) const {
+void ZipArchive::check(const zip_stat_t& entry, const std::string& shown) {
   if (entry.encryption_method != ZIP_EM_NONE)
     builder_.fail("its member " + shown + " is encrypted, which is not read");
   if (entry.comp_method != ZIP_CM_STORE && entry.comp_method != ZIP_CM_DEFLATE)
@@ -86,11 +86,12 @@ void ZipArchive::check(const zip_stat_t& entry, const std::string& shown) const 
   // Deflate packs 1032 bytes into one at best, and a stored member is as long as it is.
   if (entry.comp_method == ZIP_CM_STORE ? entry.size != entry.comp_size : entry.size / 1032 > entry.comp_size)
     builder_.fail("its member " + shown + " declares a length that it cannot have; the file is damaged");
-  if (entry.size > memory_limit())
-    builder_.fail("its member " + shown + " unpacks to more than half of the memory there is");
+  // Of all members that are read, since many may share their packed bytes.
+  opened_ += entry.size;
+  check_unpacked(bytes_, opened_, in_quotes(builder_.file()));
 }
 
-ZipMember ZipArchive::open(const std::string& name) const {
+ZipMember ZipArchive::open(const std::string& name) {
   ZipMember member;
   member.builder_ = &builder_;
   member.shown_ = quoted_word(name);

@@ -56,14 +56,15 @@ class ZipArchive {
   /// Whether there is a member of this name, in letters of either case, with or without a slash in front.
   bool has(const std::string& name) const { return find(name) >= 0; }
   /// Begins to unpack a member. @throws Error if there is none, if it is encrypted or packed by another
-  /// method than deflate, or if its length cannot be right or is more than half of the machine's memory.
-  ZipMember open(const std::string& name) const;
+  /// method than deflate, or if its length cannot be right or check_unpacked() refuses all that were opened.
+  ZipMember open(const std::string& name);
 
  private:
   zip_int64_t find(std::string name) const;
-  void check(const zip_stat_t& entry, const std::string& shown) const;
+  void check(const zip_stat_t& entry, const std::string& shown);
 
-  std::uint64_t bytes_;  ///< of the whole file
+  std::uint64_t bytes_;        ///< of the whole file
+  std::uint64_t opened_ = 0;   ///< unpacked length of the members that were opened
   const MeshBuilder& builder_;
   Zip archive_;
 };
