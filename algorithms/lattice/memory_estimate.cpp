@@ -209,8 +209,8 @@ void check_arguments(double voxel_size, double exterior_band, double interior_ba
   if (voxel_size < kSmallestVoxel || voxel_size > double(std::numeric_limits<float>::max()))
     throw Error(
         "A voxel size of " + format("%g", voxel_size) +
-        " is outside of what OpenVDB's transforms take (1.45e-05 to 3.4e+38 world units): choose a larger "
-        "--voxel-size, or scale the mesh.");
+        " is outside of what OpenVDB's transforms take (1.45e-05 to 3.4e+38 world units): use larger "
+        "voxels, or scale the mesh.");
   for (const double band : {exterior_band, interior_band})
     if (!std::isfinite(band) || band < 1.0)
       throw Error("A narrow band must be a finite number of voxels, at least 1, not " + format("%g", band) +
@@ -224,8 +224,8 @@ void check_coordinates(const PolygonMesh& mesh, const Bounds& box, double voxel_
   if (largest / voxel_size + band > kLargestIndex)
     throw Error("A voxel size of " + format("%g", voxel_size) + " puts the mesh at voxel coordinates up to " +
                 format("%.3g", largest / voxel_size) +
-                ", beyond the range of a grid (1.07e+09): choose a larger "
-                "--voxel-size.");
+                ", beyond the range of a grid (1.07e+09): use larger "
+                "voxels.");
 }
 
 BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size,
@@ -294,7 +294,7 @@ void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double 
     throw Error("A voxel size of " + format("%g", voxel_size) + " would need about " +
                 gibibytes(estimated.peak_bytes) + " for " + format("%.3g", estimated.active_voxels) +
                 " active voxels, and " + gibibytes(double(*available)) +
-                " are available: choose a larger --voxel-size or narrower bands.");
+                " are available: use larger voxels or narrower bands.");
 }
 
 }  // namespace hermesh

@@ -111,6 +111,7 @@ int run_combine(const CombineArguments& given, Session& session) {
   const PolygonMesh first = read_polygons(arguments.first, session);
   const PolygonMesh second = read_polygons(arguments.second, session);
   arguments.voxelizing.voxel_size = voxel_size(first, second, arguments, voxelizer);
+  arguments.voxelizing.any_size = true;  // the larger solid is not smaller than a voxel
   const SharedLattice lattice = shared_lattice(first, second, *arguments.voxelizing.voxel_size);
 
   const SampledSolid a = sampled(first, arguments.first, lattice, arguments, voxelizer, session);
@@ -126,7 +127,7 @@ int run_combine(const CombineArguments& given, Session& session) {
   made(session, "crossings", result.hermite.crossings.size());
   print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
                              " edge crossings, " + seconds_text(watch.seconds()));
-  write_mesh(arguments.out, contour(result, extractor, arguments, session), session.context);
+  write_output(arguments.out, contour(result, extractor, arguments, session), session);
   const bool kept = !arguments.judge || keeps_promises(arguments.out, extractor.extractor.promises, session);
   work_is_finished();
   return kept ? kDone : kNotMet;

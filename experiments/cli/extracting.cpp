@@ -1,6 +1,7 @@
 #include "experiments/cli/extracting.h"
 
 #include "algorithms/core/disjoint_sets.h"
+#include "algorithms/io/mesh_units.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/help/suggestions.h"
@@ -69,8 +70,12 @@ void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Sessi
       ": gaps and walls that are about as thin as a voxel came apart; smaller voxels mostly leave fewer");
 }
 
+void write_output(const std::string& path, const PolygonMesh& mesh, Session& session) {
+  (session.units.empty() ? write_mesh : write_mesh_in_metres)(path, mesh, session.context);
+}
+
 void save(const std::string& path, const PolygonMesh& mesh, Session& session) {
-  write_mesh(path, mesh, session.context);
+  write_output(path, mesh, session);
   work_is_finished();
 }
 

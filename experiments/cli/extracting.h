@@ -28,7 +28,9 @@ void print_extracted(Session& session, const PolygonMesh& mesh, const std::strin
 /// both. A few more are nothing that a note is worth: polygons that cross are one solid, or several.
 void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Session& session);
 
-/// Writes the mesh; from then on a signal is too late.
+/// Writes the mesh, with the unit of its coordinates if --units says it and the format has a place for it.
+void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);
+/// Writes the mesh as write_output() does; from then on a signal is too late.
 void save(const std::string& path, const PolygonMesh& mesh, Session& session);
 
 }  // namespace hermesh::cli

@@ -9,6 +9,7 @@
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/report_text.h"
 #include "experiments/cli/session.h"
+#include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
 #include "validation/mesh_report.h"
 
@@ -138,7 +139,7 @@ void add_validate(CLI::App& app, Session& session) {
       ->add_option(
           "--samples", arguments->samples,
           "Samples on each surface for the distances (default: " + std::to_string(arguments->samples) + ")")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
+      ->transform(whole_number(1, 1'000'000'000));
   command->add_option(
       "--require", arguments->require,
       "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "

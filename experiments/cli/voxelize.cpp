@@ -108,6 +108,7 @@ void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, cons
   if (voxelizing.like) {
     frame = read_grid_frame(*voxelizing.like);
     voxelizing.voxel_size = frame.voxel_size;
+    voxelizing.any_size = true;
     FramedMesh framed = into_frame(mesh, frame);
     mesh = std::move(framed.mesh);
     first = framed.first;

@@ -14,6 +14,7 @@
 #include "experiments/cli/help/suggestions.h"
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/terminal_progress.h"
+#include "experiments/cli/validators.h"
 #include "experiments/harness/harness.h"
 
 namespace hermesh::cli {
@@ -30,8 +31,12 @@ CLI::Validator at_least(double minimum, const std::string& words) {
 }
 
 double voxel_size_for(const PolygonMesh& mesh, const VoxelizeArguments& arguments, const std::string& file) {
-  if (arguments.voxel_size) return *arguments.voxel_size;
   const double longest_side = bounds(mesh).size().maxCoeff();
+  if (arguments.voxel_size && *arguments.voxel_size > longest_side && !arguments.any_size)
+    throw Error("'" + file + "' is smaller than a voxel: its longest side is " + text(longest_side) +
+                " and --voxel-size is " + text(*arguments.voxel_size) +
+                " (world units, metres if --units is given); use smaller voxels");
+  if (arguments.voxel_size) return *arguments.voxel_size;
   if (!(longest_side > 0.0))
     throw Error("'" + file + "' has no extent, so that --resolution gives no voxel size: use --voxel-size");
   return longest_side / static_cast<double>(*arguments.resolution);
@@ -54,7 +59,7 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
   size->add_option("--voxel-size", arguments.voxel_size, "Edge of a voxel in world units")
       ->check(at_least(std::numeric_limits<double>::min(), "a finite number above 0"));
   size->add_option("--resolution", arguments.resolution, "Voxels along the longest side of the mesh")
-      ->check(at_least(1.0, "a whole number of at least 1"));
+      ->transform(whole_number(1, std::int64_t(1) << 40));
   if (with_like)
     size->add_option(
         "--like", arguments.like,

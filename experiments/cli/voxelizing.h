@@ -21,6 +21,7 @@ struct VoxelizeArguments {
   std::optional<double> voxel_size;  ///< world units
   std::optional<std::int64_t> resolution;
   std::optional<std::string> like;                  ///< file of a volume whose lattice is taken
+  bool any_size = false;  ///< whether the mesh may be smaller than a voxel
   double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
   std::string voxelizer = "hermesh";
   std::optional<std::string> signs;  ///< value of the voxelizer's option `signs`, which it is a shorthand for
@@ -49,7 +50,7 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
 void scale_points(MeshFile& file, double factor);
 
 /// What the chosen voxelizer gets, with the voxel size in world units that the arguments ask for.
-/// @throws Error where a resolution is asked of a mesh without extent.
+/// @throws Error if a resolution is asked of a mesh without extent, or if the mesh is smaller than a voxel.
 VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                          const ChosenVoxelizer& chosen);
 

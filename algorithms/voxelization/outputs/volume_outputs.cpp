@@ -163,8 +163,8 @@ void check_fits(const PolygonMesh& mesh, const VoxelizeOptions& options, const V
   char text[200];
   std::snprintf(
       text, sizeof text,
-      "These grids would need about %.3g GiB, and %.3g GiB are available: ask for fewer grids, a larger "
-      "--voxel-size or narrower bands.",
+      "These grids would need about %.3g GiB, and %.3g GiB are available: ask for fewer grids, larger "
+      "voxels or narrower bands.",
       needed / kGiB, double(*available) / kGiB);
   throw Error(text);
 }
