@@ -113,7 +113,8 @@ class BoundedRemesher {
     }
     result_.error = options_.error;
     result_.over_holes = options_.over_holes;
-    result_.voxel_size = std::min(kFirstVoxel * options_.error, longest_ / kFewestVoxels);
+    result_.voxel_size =
+        std::min(std::max(kFirstVoxel * options_.error, smallest_voxel()), longest_ / kFewestVoxels);
     if (try_larger(result_.voxel_size)) return std::move(result_);
     while (!try_at(result_.voxel_size) && result_.unmet.empty()) ++result_.rounds;
     if (!result_.unmet.empty()) result_.mesh = {};

@@ -233,6 +233,60 @@ TEST(BoundedRemesh, ABudgetIsKept) {
   }
 }
 
+/// A prism over a star of so many points, turned: plane parts only, and no edge along the lattice.
+PolygonMesh turned_star(int points) {
+  PolygonMesh mesh;
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
+  const auto add = [&](double x, double y, double z) {
+    mesh.points.push_back((turn * Vector3d(x, y, z)).cast<float>());
+    return std::uint32_t(mesh.points.size() - 1);
+  };
+  const std::uint32_t bottom = add(0, 0, 0), top = add(0, 0, 0.4), n = std::uint32_t(2 * points);
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (const double z : {0.0, 0.4}) add((1 + i % 2) * std::cos(2 * M_PI * i / n), (1 + i % 2) * std::sin(2 * M_PI * i / n), z);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % n);
+    for (const Triangle& t : {Triangle{bottom, b, a}, {top, a + 1, b + 1}, {a, b, b + 1}, {a, b + 1, a + 1}})
+      mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+TEST(BoundedRemesh, ABudgetEndsAtOnceWhereFewerTrianglesAreExact) {
+  PolygonMesh turned = box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9));
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
+  for (Eigen::Vector3f& p : turned.points) p = (turn * p.cast<double>()).cast<float>();
+  for (const PolygonMesh& polygons :
+       {box(Vector3d(-1, -1, -1), Vector3d(1, 1, 1)), box(Vector3d(0, 0, 0), Vector3d(2, 3, 4)), turned})
+    for (const std::size_t budget : {12u, 24u, 100u, 500u, 5000u}) {
+      RunContext context;
+      const BoundedMesh made = remesh_to_budget(polygons, budget, {.most_points = 1e6}, context);
+      ASSERT_TRUE(made.unmet.empty());
+      EXPECT_EQ(made.mesh.triangle_count(), 12u);
+      EXPECT_LE(std::max(made.to_surface, made.from_surface), 1e-4 * bounds(polygons).size().norm());
+    }
+}
+
+TEST(BoundedRemesh, ATryThatFailsLosesNothing) {
+  // Voxels that would show more of such a small object are smaller than the smallest that there are.
+  for (const double scale : {1.0, 1e-2, 1e-3, 3e-4}) {
+    SCOPED_TRACE(scale);
+    PolygonMesh polygons = turned_star(9);
+    for (Eigen::Vector3f& p : polygons.points) p *= float(scale);
+    RunContext context;
+    const BoundedMesh made = remesh_to_budget(polygons, 500, {.most_points = 3e5}, context);
+    ASSERT_TRUE(made.unmet.empty());
+    EXPECT_LE(made.mesh.triangle_count(), 500u);
+    EXPECT_LE(std::max(made.to_surface, made.from_surface), made.error);
+    EXPECT_LE(made.error, 0.05 * bounds(polygons).size().norm());
+  }
+  // An object for which no voxel is small enough is an error.
+  PolygonMesh polygons = turned_star(9);
+  for (Eigen::Vector3f& p : polygons.points) p *= 1e-7f;
+  RunContext context;
+  EXPECT_THROW(remesh_to_budget(polygons, 500, {}, context), Error);
+}
+
 TEST(BoundedRemesh, RefusesWhatHasNoBound) {
   RunContext context;
   const PolygonMesh cube = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));

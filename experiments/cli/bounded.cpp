@@ -10,6 +10,7 @@
 #include "experiments/cli/format.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/pipeline/command_files.h"
+#include "experiments/cli/validators.h"
 
 namespace hermesh::cli {
 namespace {
@@ -37,7 +38,7 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
                   "Instead of a size the number of triangles at most: the mesh with the smallest proved "
                   "distance that was "
                   "found for them")
-      ->check(CLI::Range(std::int64_t(4), std::int64_t(1) << 31));
+      ->transform(whole_number(4, std::int64_t(1) << 31));
   CLI::Option_group* group = command.add_option_group("With --error or --triangles");
   group->add_flag(
       "--over-holes", arguments.over_holes,
@@ -45,8 +46,8 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
       "there is to the surface on which the winding number is 1/2");
   group
       ->add_option("--limit-points", arguments.most_points,
-                   "Points of the finest mesh at most (default: 3e7, some 9 GiB); the bound is refused where "
-                   "it needs more")
+                   "Points of the finest mesh at most (default: 3e7, some 9 GiB, with --error, and 1e6 in each "
+                   "try with --triangles); the bound is refused where it needs more")
       ->check(CLI::Range(1e3, 1e9));
   group
       ->add_option("--smallest-voxel", arguments.smallest_voxel,
@@ -94,7 +95,7 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   const double diagonal = bounds(mesh).size().norm();
   BoundedRemeshOptions options{.signs = sign_rule(voxelizing),
                                .over_holes = arguments.over_holes,
-                               .most_points = arguments.most_points,
+                               .most_points = arguments.most_points.value_or(arguments.triangles ? 1e6 : 3e7),
                                .smallest_voxel = arguments.smallest_voxel,
                                .written_in_single = is_written_in_single(paths.out)};
   if (!arguments.triangles) options.error = error_in_world_units(arguments.error, session.units, diagonal);
@@ -106,7 +107,9 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
                : bounded_remesh(mesh, options, session.context);
   });
   session.context.check();
-  if (!made.unmet.empty()) throw Error("'" + paths.in + "': " + explanation(made) + "; nothing was written");
+  const std::string budget =
+      arguments.triangles ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: " : "";
+  if (!made.unmet.empty()) throw Error("'" + paths.in + "': " + budget + explanation(made) + "; nothing was written");
   session.context.figure("error_asked", made.error);
   session.context.figure("certified_to_polygons", made.to_surface);
   session.context.figure("certified_from_polygons", made.from_surface);

@@ -15,7 +15,7 @@ struct BoundArguments {
   std::string error;                      ///< as given: a number, with % or a unit behind it
   std::optional<std::int64_t> triangles;  ///< budget
   bool over_holes = false;
-  double most_points = 3e7;
+  std::optional<double> most_points;
   double smallest_voxel = 0.0;  ///< world units; 0: nobody said
 
   bool asked() const { return !error.empty() || triangles; }
