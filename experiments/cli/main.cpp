@@ -49,12 +49,19 @@ int run_on_files(Session& session, CommandFiles* files) {
   return exit_code;
 }
 
+/// The command by the name that plan_of() knows it by. How many tries a budget takes is unknown, so it has no plan.
+std::string planned_command(const Session& session) {
+  for (const std::string option : {" --error", " --triangles"})
+    if (session.command_line.find(option) != std::string::npos) return session.command_name + option;
+  return session.command_name;
+}
+
 /// Runs the command, shows and logs how it gets on, and tells in JSON what came of it, if asked.
 int run_command(Session& session, CommandFiles* files) {
   // A batch counts its files, which is all of its progress.
   const bool batch = session.writes_json_itself;
   const TerminalProgress progress(session.context, !session.quiet,
-                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(session.command_name + (session.command_line.find(" --error") == std::string::npos ? "" : " --error")));
+                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(planned_command(session)));
   std::optional<LogFile> log;
   if (!session.log_file.empty()) log.emplace(session, session.log_file, session.command_line);
   int exit_code = kFailed;
@@ -188,6 +195,7 @@ int run_program(int argc, char** argv) {
   CommandFiles* files = nullptr;
   try {
     files = files_of_command(app, session);
+    check_written_files(app, files, session);
   } catch (const UsageError& error) {
     return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
   }
@@ -210,6 +218,7 @@ int main(int argc, char** argv) {
     return hermesh::cli::fail(hermesh::cli::kFailed,
                               "this processor lacks SSE4.2 or POPCNT (x86-64-v2), which the program needs; if this is a "
                               "virtual machine, let it show the host's processor");
+  hermesh::cli::occupy_closed_streams();
   try {
     return hermesh::cli::run_program(argc, argv);
   } catch (const std::exception& error) {

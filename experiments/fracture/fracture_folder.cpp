@@ -157,7 +157,7 @@ void FractureFolder::commit(Json head, const FractureSummary& summary, bool pict
     cutters.push_back({{"name", name}, {"state", "nothing"}, {"sentence", name + ": nothing"}});
   head["cutters"] = std::move(cutters);
   head["pieces"] = std::move(pieces_);
-  write_text(folder_.path() / "pieces.json", head.dump(1) + "\n");
+  write_text(folder_.path() / "pieces.json", head.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   if (picture) draw(std::to_string(summary.pieces) + " pieces", context);
   context.check();
   folder_.commit();

@@ -54,13 +54,6 @@ std::string without_ending(fs::path name) {
   return name.stem().string();
 }
 
-/// Where the file is, or would be, whatever way its name takes there.
-std::string place_of(const std::string& file) {
-  std::error_code error;
-  const fs::path place = fs::weakly_canonical(fs::absolute(file), error);
-  return error ? file : place.string();
-}
-
 std::uint64_t size_of(const std::string& file) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(file, error);
@@ -250,6 +243,12 @@ void check_output(const std::string& output, FileKind kind) {
 
 }  // namespace
 
+std::string place_of(const std::string& file) {
+  std::error_code error;
+  const fs::path place = fs::weakly_canonical(fs::absolute(file), error);
+  return error ? file : place.string();
+}
+
 std::string output_name(const std::string& pattern, const std::string& input, std::size_t number,
                         std::size_t count) {
   const fs::path name = fs::path(input).filename();
@@ -331,6 +330,7 @@ int run_batch(const CLI::App& command, CommandFiles& files, Session& session) {
     throw UsageError(
         "--format is about standard streams; the format of many outputs is told by --pattern, such as "
         "{stem}.obj");
+  refuse_idle(command, {"--overwrite-input"}, "a batch never writes over its inputs");
   std::string pattern = files.batch.pattern;
   if (pattern.empty()) pattern = files.out == FileKind::volume ? "{stem}.vdb" : "{stem}.ply";
   const std::vector<BatchItem> items = batch_items(inputs, files.batch.out_dir, pattern);

@@ -36,6 +36,15 @@ std::string missing_output(const CLI::App& app, const Session& session);
 /// @throws UsageError for words that are neither one file nor many.
 CommandFiles* files_of_command(const CLI::App& app, Session& session);
 
+/// The absolute path of a file, which need not exist, without links and dots.
+std::string place_of(const std::string& file);
+
+/// Checks that nothing the command writes would replace or damage a file that it reads: the log and the JSON
+/// never, the output only with --overwrite-input. `files` are those of files_of_command(); a batch checks its
+/// outputs itself.
+/// @throws UsageError
+void check_written_files(const CLI::App& app, const CommandFiles* files, const Session& session);
+
 /// Runs the command on each of its inputs with the options that were given, --jobs at a time, and goes on
 /// after a failure, of which it prints the sentence. Each gives a line of JSON (pipeline/json_report.h) where
 /// --json asks for it, when it is done. What the files hold does not depend on --jobs, for each process is

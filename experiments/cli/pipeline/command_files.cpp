@@ -1,5 +1,8 @@
 #include "experiments/cli/pipeline/command_files.h"
 
+#include <filesystem>
+
+#include "algorithms/fracture/cutter_words.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/pipeline/batch.h"
 #include "experiments/cli/validators.h"
@@ -56,6 +59,9 @@ void add_files(CLI::App& command, Session& session, CommandFiles given) {
                      "Format of the standard input, where --format is that of the standard output");
   if (files.output && (files.in == FileKind::mesh || files.in == FileKind::mesh_or_volume))
     add_scale_options(command, session);
+  if (files.output && files.out != FileKind::folder)
+    command.add_flag("--overwrite-input", files.overwrite_input,
+                     "Allow OUT to be a file that the command reads; it is replaced once the work has succeeded");
   if (!files.takes_many) return;
   if (files.output) {
     command.add_option("MORE", files.batch.more, "With --out-dir: more inputs (OUT is one, too)");
@@ -75,6 +81,58 @@ void add_files(CLI::App& command, Session& session, CommandFiles given) {
       .add_option("--jobs", files.batch.jobs,
                   "How many inputs at a time (default: 1); threads are shared among them")
       ->check(CLI::Range(1, 256));
+}
+
+namespace {
+
+/// A value of an option or of a positional argument, which may be the name of a file.
+struct GivenValue {
+  std::string option, value;
+};
+
+/// Appends the values of all options of the command and of its groups, and the files that --cutters names.
+void append_values(const CLI::App& command, std::vector<GivenValue>& values) {
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& value : option->results()) {
+      values.push_back({option->get_name(), value});
+      if (option->get_name() == "--cutters" && value.starts_with("mesh:"))
+        for (const CutterSpec::File& file : as_usage([&] { return parse_cutters(value); }).files)
+          values.push_back({"--cutters", file.path});
+    }
+  for (const CLI::App* group : command.get_subcommands([](const CLI::App*) { return true; }))
+    append_values(*group, values);
+}
+
+/// Returns whether two names are those of one file, which need not exist.
+bool is_same_file(const std::string& first, const std::string& second) {
+  std::error_code error;
+  return std::filesystem::equivalent(first, second, error) || place_of(first) == place_of(second);
+}
+
+}  // namespace
+
+void check_written_files(const CLI::App& app, const CommandFiles* files, const Session& session) {
+  std::vector<GivenValue> values;
+  append_values(*app.get_subcommands().at(0), values);
+  const auto names_file = [](const GivenValue& given) {
+    std::error_code error;
+    return given.option != "--log" && given.option != "--json" &&
+           (given.option == "OUT" || std::filesystem::is_regular_file(given.value, error));
+  };
+  std::erase_if(values, [&](const GivenValue& given) { return !names_file(given); });
+  const std::string json = session.json_file == "true" ? "" : session.json_file;
+  if (!json.empty()) values.push_back({"--json", json});
+  for (const auto& [option, file] : {std::pair("--log", session.log_file), std::pair("--json", json)})
+    for (const GivenValue& given : values)
+      if (!file.empty() && given.option != option && is_same_file(given.value, file))
+        throw UsageError(std::string(option) + " '" + file + "' would be written into the file of " + given.option +
+                         "; name another file");
+  const bool is_written = files && files->output && *files->output != "-" && files->out != FileKind::folder;
+  if (!is_written || files->overwrite_input) return;
+  for (const GivenValue& given : values)
+    if (given.option != "OUT" && is_same_file(given.value, *files->output))
+      throw UsageError("OUT '" + *files->output + "' is also read, as " + given.option +
+                       ", and would be overwritten; name another output, or pass --overwrite-input");
 }
 
 std::string missing_output(const CLI::App& app, const Session& session) {

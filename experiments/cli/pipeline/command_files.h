@@ -29,6 +29,7 @@ struct CommandFiles {
   bool takes_many = false;   ///< whether the command can be run on many inputs, as BatchArguments say
   BatchArguments batch = {};
   std::string format = {}, input_format = {};  ///< of standard streams; empty: not given
+  bool overwrite_input = false;                ///< whether the output may be one of the inputs
 };
 
 /// Metres in a unit that --units takes; none for another word.

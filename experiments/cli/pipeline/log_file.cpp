@@ -39,7 +39,7 @@ LogFile::LogFile(Session& session, const std::string& path, const std::string& c
                                                                                    double fraction) {
     if (shown_before) shown_before(stage, fraction);
     if (fraction >= 1.0 && !session_.context.stage_seconds.empty() &&
-        session_.context.stage_seconds.back().first == stage) {
+        stage.ends_with(session_.context.stage_seconds.back().first)) {
       line("end of stage '" + std::string(stage) + "', " +
            seconds_text(session_.context.stage_seconds.back().second));
       stage_.clear();

@@ -58,6 +58,12 @@ std::uint64_t copy_in(int from, const std::filesystem::path& file) {
   return bytes;
 }
 
+/// Returns whether a standard stream was closed when the program started (occupy_closed_streams()).
+bool is_closed(int stream) {
+  const int flags = fcntl(stream, F_GETFL);
+  return flags < 0 || (flags & O_ACCMODE) == (stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
+
 std::string first_bytes_of(const std::filesystem::path& file) {
   std::string bytes(512, '\0');
   // It reads what is not gzipped as it is.
@@ -70,6 +76,12 @@ std::string first_bytes_of(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+void occupy_closed_streams() noexcept {
+  // In ascending order: open() returns the smallest number that is free.
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
 
 std::string ending_of(std::string_view bytes) {
   // Byte order marks and blanks may stand before a keyword.
@@ -123,6 +135,8 @@ void Streams::take_input(std::string& input) {
   if (isatty(STDIN_FILENO))
     throw UsageError(std::string(kInputName) +
                      " is a terminal: write '< FILE' behind the command, or a program and '|' before it");
+  if (is_closed(STDIN_FILENO))
+    throw Error(std::string(kInputName) + " is closed: write '< FILE' behind the command, or name a file instead of -");
   // Where the output is a mesh, too, --format is about that.
   const bool about_output = session_.writes_stream && files_.out == FileKind::mesh;
   const std::string option = files_.input_format.empty() ? "--format" : "--input-format";
@@ -152,7 +166,7 @@ void Streams::take_output() {
   const bool about_output = files_.out == FileKind::mesh;
   if (about_output && !files_.format.empty()) format = files_.format;
   check_format("--format", format, files_.out);
-  standard_output_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+  standard_output_ = is_closed(STDOUT_FILENO) ? -1 : fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
   if (standard_output_ < 0) throw Error(std::string(kOutputName) + " is closed");
   // Whoever prints must not get between the bytes of the file, libraries included.
   std::cout.flush();
