@@ -330,7 +330,8 @@ int run_batch(const CLI::App& command, CommandFiles& files, Session& session) {
     throw UsageError(
         "--format is about standard streams; the format of many outputs is told by --pattern, such as "
         "{stem}.obj");
-  refuse_idle(command, {"--overwrite-input"}, "a batch never writes over its inputs");
+  if (files.overwrite_input)
+    throw UsageError("--overwrite-input has no effect: a batch never writes over its inputs");
   std::string pattern = files.batch.pattern;
   if (pattern.empty()) pattern = files.out == FileKind::volume ? "{stem}.vdb" : "{stem}.ply";
   const std::vector<BatchItem> items = batch_items(inputs, files.batch.out_dir, pattern);
