@@ -109,9 +109,9 @@ PromiseCheck check_promises(const Promises& promises, const MeshReport& report, 
                            counted(vertices, "vertices are not)"));
   if (promises.oriented && !report.oriented())
     check.broken.push_back("oriented (" + counted(report.inconsistent_edges, "inconsistent edges)"));
-  // Every polygon turned round leaves no inconsistent edge, but a closed surface then has a negative volume.
-  if (promises.oriented && report.oriented() && report.closed() && report.volume < 0.0 &&
-      !circumstances.encloses_the_outside)
+  // A component all of whose polygons are flipped has no inconsistent edge, but its volume is then negative.
+  const bool inside_out = !report.faces_outwards() || (report.closed() && report.volume < 0.0);
+  if (promises.oriented && report.oriented() && inside_out && !circumstances.encloses_the_outside)
     check.broken.push_back("oriented (inside out, the volume is negative)");
   if (promises.no_self_intersection) {
     if (!report.self_intersections)

@@ -20,6 +20,8 @@ TEST(PromiseCheck, AMeshThatIsInsideOutIsNotOriented) {
   EXPECT_TRUE(check_promises({.closed = true}, report).broken.empty());
   report.volume = 1.0;
   EXPECT_TRUE(check_promises({.oriented = true}, report).broken.empty());
+  report.inside_out_components = 1;  // of several
+  EXPECT_EQ(check_promises({.oriented = true}, report).broken.size(), 1u);
 }
 
 TEST(PromiseCheck, NamesWhatIsBrokenAndWhatNobodyLookedAt) {

@@ -101,11 +101,14 @@ struct MeshReport {
   std::int64_t degenerate_polygons = 0, duplicate_polygons = 0, isolated_points = 0;
   std::int64_t components = 0, euler_characteristic = 0;
   std::optional<double> genus;  ///< sum over components; only of a closed, manifold, oriented mesh
+  /// Components with negative volume that are no cavities of others (inside_out.h); only of a closed,
+  /// oriented mesh with polygons.
+  std::optional<std::int64_t> inside_out_components;
   double volume = 0.0, area = 0.0;
   double smallest_angle = 0.0;  ///< degrees; the least of all triangles
   double worst_aspect = 0.0;  ///< longest edge over twice the inradius·√3: 1 for the equilateral triangle
   Places boundary_places, non_manifold_edge_places, non_manifold_vertex_places, inconsistent_places,
-      degenerate_places, duplicate_places;
+      degenerate_places, duplicate_places, inside_out_places;
 
   std::vector<LibraryCounts> libraries;
   std::optional<SelfIntersections> self_intersections;  ///< absent when not asked for
@@ -118,10 +121,13 @@ struct MeshReport {
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
-  /// Whether the mesh is closed, manifold, oriented and free of self-intersections. False when these were not
-  /// asked for.
+  /// Whether no component is inside out; true if it is not known.
+  bool faces_outwards() const { return inside_out_components.value_or(0) == 0; }
+  /// Whether the mesh is closed, manifold, oriented, free of self-intersections and nowhere inside out. False
+  /// when self-intersections were not asked for.
   bool watertight() const {
-    return closed() && manifold() && oriented() && self_intersections && self_intersections->pairs == 0;
+    return closed() && manifold() && oriented() && faces_outwards() && self_intersections &&
+           self_intersections->pairs == 0;
   }
   bool libraries_agree() const {
     for (const LibraryCounts& l : libraries)

@@ -3,9 +3,10 @@
 #include <cmath>
 #include <sstream>
 
-#include "validation/geometry/distance.h"
 #include "validation/features.h"
+#include "validation/geometry/distance.h"
 #include "validation/hausdorff.h"
+#include "validation/inside_out.h"
 #include "validation/library_counts.h"
 #include "validation/measures.h"
 #include "validation/mesh_report.h"
@@ -68,6 +69,7 @@ void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const
 void judge_surface(const MeshFile& mesh, const TriangleSoup& soup, const JudgeOptions& options,
                    MeshReport& report, RunContext& context) {
   const TriangleTree tree(soup);
+  count_inside_out(soup, tree, report, context);
   if (options.self_intersections) {
     const Stage stage(context, "self-intersections");
     report.self_intersections = find_self_intersections(soup, tree, context);
@@ -151,6 +153,8 @@ class Verdict {
            "vertices with more than one fan of polygons", r_.non_manifold_vertex_places);
     defect(r_.inconsistent_edges, "edge between polygons of opposite orientation",
            "edges between polygons of opposite orientation", r_.inconsistent_places);
+    defect(r_.inside_out_components.value_or(0), "component is inside out", "components are inside out",
+           r_.inside_out_places);
     if (r_.self_intersections) intersections(*r_.self_intersections);
     defect(r_.degenerate_polygons, "degenerate polygon", "degenerate polygons", r_.degenerate_places);
     defect(r_.duplicate_polygons, "duplicate polygon", "duplicate polygons", r_.duplicate_places);

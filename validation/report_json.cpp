@@ -38,6 +38,7 @@ Json all_places(const MeshReport& r) {
   add("non_manifold_edges", r.non_manifold_edge_places);
   add("non_manifold_vertices", r.non_manifold_vertex_places);
   add("inconsistent_edges", r.inconsistent_places);
+  add("inside_out_components", r.inside_out_places);
   add("degenerate_polygons", r.degenerate_places);
   add("duplicate_polygons", r.duplicate_places);
   if (r.self_intersections) add("self_intersecting_pairs", r.self_intersections->places);
@@ -91,6 +92,7 @@ Json counts(const MeshReport& r) {
     json["genus"] = std::int64_t(*r.genus);
   else if (r.genus)
     json["genus"] = *r.genus;
+  json["inside_out_components"] = r.inside_out_components ? Json(*r.inside_out_components) : Json(nullptr);
   json["self_intersecting_pairs"] = r.self_intersections ? Json(r.self_intersections->pairs) : Json(nullptr);
   json["volume"] = finite_or_null(r.volume);
   json["area"] = finite_or_null(r.area);

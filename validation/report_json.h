@@ -9,9 +9,10 @@ namespace hermesh::validation {
 
 /// The report as one flat object with a key for each count and measure: `points triangles quads
 /// boundary_edges non_manifold_edges non_manifold_vertices inconsistent_edges degenerate_polygons
-/// duplicate_polygons isolated_points components euler_characteristic genus self_intersecting_pairs volume
-/// area smallest_angle worst_aspect`. Null stands for what was not asked for (self_intersecting_pairs), is
-/// not defined (genus) or infinite (worst_aspect). Beside them, where they were asked for:
+/// duplicate_polygons isolated_points components euler_characteristic genus inside_out_components
+/// self_intersecting_pairs volume area smallest_angle worst_aspect`. Null stands for what was not asked for
+/// (self_intersecting_pairs), is not defined (genus, inside_out_components) or infinite (worst_aspect).
+/// Beside them, where they were asked for:
 ///  - to_reference, from_reference: {max, mean, rms, worst, samples};
 ///  - certified_to_reference, certified_from_reference: {lower, upper};
 ///  - features: {edges, corners, edges_excluded, edge_length, edge_to_mesh, corner_to_mesh}, the last two as

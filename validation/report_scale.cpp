@@ -87,7 +87,7 @@ void unscale(MeshReport& r, double scale) {
   const Unscaler to(1.0 / scale);
   to.area_or_none(r.area), to.volume_or_none(r.volume);
   for (Places* p : {&r.boundary_places, &r.non_manifold_edge_places, &r.non_manifold_vertex_places,
-                    &r.inconsistent_places, &r.degenerate_places, &r.duplicate_places})
+                    &r.inconsistent_places, &r.degenerate_places, &r.duplicate_places, &r.inside_out_places})
     to.places(*p);
   for (LibraryCounts& l : r.libraries) to.area(l.area), to.volume(l.volume);
   if (r.self_intersections) to.places(r.self_intersections->places);

@@ -42,6 +42,35 @@ TEST(Report, CleanMesh) {
   EXPECT_TRUE(says(r, "The counts of CGAL are the same."));
 }
 
+TEST(Report, OutermostComponentsThatAreInsideOutAreCounted) {
+  const auto flipped = [](MeshFile mesh) {
+    for (Quad& q : mesh.quads) std::swap(q[1], q[3]);
+    return mesh;
+  };
+  const MeshFile large = cube_of_quads({0, 0, 0}, 8.0), small = cube_of_quads({10, 0, 0}, 1.0),
+                 within = cube_of_quads({3, 3, 3}, 1.0), core = cube_of_quads({3.25, 3.25, 3.25}, 0.5);
+  const auto count = [](const MeshFile& mesh) {
+    return judged(mesh, {.libraries = false}).inside_out_components;
+  };
+  EXPECT_EQ(count(large), 0);
+  EXPECT_EQ(count(flipped(large)), 1);
+  // The total volume is positive.
+  const MeshReport report = judged(together(large, flipped(small)), {.libraries = false});
+  EXPECT_EQ(report.inside_out_components, 1);
+  EXPECT_GT(report.volume, 0.0);
+  EXPECT_FALSE(report.watertight());
+  ASSERT_EQ(report.inside_out_places.points.size(), 1u);
+  EXPECT_GE(report.inside_out_places.points[0].x(), 10.0);
+  EXPECT_EQ(to_json(report).at("inside_out_components"), 1);
+  // A cavity, and a body in it.
+  EXPECT_EQ(count(together(large, flipped(within))), 0);
+  EXPECT_EQ(count(together(together(large, flipped(within)), core)), 0);
+  EXPECT_EQ(count(together(together(large, flipped(within)), flipped(core))), 1);
+  MeshFile open = large;
+  open.quads.pop_back();
+  EXPECT_FALSE(count(open).has_value());
+}
+
 TEST(Report, NothingIsWatertightUnlessItWasSearched) {
   JudgeOptions options;
   options.self_intersections = false;

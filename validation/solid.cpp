@@ -20,21 +20,6 @@ bool comes_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
-// On Fibonacci's spiral, turned out of the axes and planes that models like.
-std::vector<Eigen::Vector3d> spread_directions(double length) {
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(0.7391, Eigen::Vector3d(0.3113, 0.5417, 0.7807).normalized()).toRotationMatrix();
-  std::vector<Eigen::Vector3d> directions;
-  for (int i = 0; i < kRays; ++i) {
-    // Every fifth point after another, so that the first few are spread, too.
-    const int k = 5 * i % kRays;
-    const double z = 1.0 - (2.0 * k + 1.0) / kRays, r = std::sqrt(1.0 - z * z);
-    const double angle = std::numbers::pi * (3.0 - std::sqrt(5.0)) * k;
-    directions.push_back(length * (turn * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
-  }
-  return directions;
-}
-
 struct Side3 {
   std::uint32_t low, high;
   int way;
@@ -53,6 +38,34 @@ double hit_along(const Corners& t, const Eigen::Vector3d& from, const Eigen::Vec
 }
 
 }  // namespace
+
+// On Fibonacci's spiral.
+std::vector<Eigen::Vector3d> ray_directions(double length) {
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.7391, Eigen::Vector3d(0.3113, 0.5417, 0.7807).normalized()).toRotationMatrix();
+  std::vector<Eigen::Vector3d> directions;
+  for (int i = 0; i < kRays; ++i) {
+    // Every fifth point after another, so that the first few are spread, too.
+    const int k = 5 * i % kRays;
+    const double z = 1.0 - (2.0 * k + 1.0) / kRays, r = std::sqrt(1.0 - z * z);
+    const double angle = std::numbers::pi * (3.0 - std::sqrt(5.0)) * k;
+    directions.push_back(length * (turn * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
+  }
+  return directions;
+}
+
+std::optional<int> crossing_of(const Corners& t, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const int start = orientation(t[0], t[1], t[2], from), end = orientation(t[0], t[1], t[2], to);
+  if (start == end && start != 0) return 0;
+  bool positive = false, negative = false, zero = false;
+  for (int k = 0; k < 3; ++k) {
+    const int turn = orientation(from, to, t[k], t[(k + 1) % 3]);
+    positive |= turn > 0, negative |= turn < 0, zero |= turn == 0;
+  }
+  if (positive && negative) return 0;
+  if (zero || start == 0 || end == 0) return std::nullopt;
+  return -start;
+}
 
 MeshFile welded_triangles(const MeshFile& mesh, QuadRule rule) {
   const TriangleSoup soup(mesh, rule);
@@ -78,7 +91,7 @@ MeshFile welded_triangles(const MeshFile& mesh, QuadRule rule) {
 
 Solid::Solid(const TriangleSoup& soup, const TriangleTree& tree, Reading reading, const RunContext& context)
     : soup_(soup), tree_(tree), reading_(reading) {
-  directions_ = spread_directions(2.0 * tree.bounds().diagonal());
+  directions_ = ray_directions(2.0 * tree.bounds().diagonal());
   look_at_edges();
   context.check();
   if (balanced_ || oriented_) turn_outwards();
@@ -130,20 +143,10 @@ Solid::Crossings Solid::crossings(const Eigen::Vector3d& from, int direction) co
   Crossings result;
   tree_.for_each_on_segment(from, to, [&](std::uint32_t slot) {
     if (!result.sure) return;
-    const Corners& t = tree_.corners(slot);
-    const int start = orientation(t[0], t[1], t[2], from), end = orientation(t[0], t[1], t[2], to);
-    if (start == end && start != 0) return;
-    bool positive = false, negative = false, zero = false;
-    for (int k = 0; k < 3; ++k) {
-      const int turn = orientation(from, to, t[k], t[(k + 1) % 3]);
-      positive |= turn > 0, negative |= turn < 0, zero |= turn == 0;
-    }
-    if (positive && negative) return;
-    if (zero || start == 0 || end == 0) {
-      result.sure = false;
-      return;
-    }
-    result.sum -= start;
+    const std::optional<int> crossing = crossing_of(tree_.corners(slot), from, to);
+    result.sure = crossing.has_value();
+    if (crossing.value_or(0) == 0) return;
+    result.sum += *crossing;
     ++result.count;
   });
   result.sum *= turn_;

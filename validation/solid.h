@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "algorithms/core/run_context.h"
@@ -10,6 +11,15 @@
 #include "validation/geometry/triangle_tree.h"
 
 namespace hermesh::validation {
+
+/// Returns vectors of that length, spread over the sphere and turned out of the axes and planes that models
+/// like: the first few of them are spread, too.
+std::vector<Eigen::Vector3d> ray_directions(double length);
+
+/// Returns how a segment crosses a triangle: 1 if it leaves through the front, −1 if it enters through it, 0
+/// if it misses, and nothing if it meets an edge or ends in the triangle's plane. Exact.
+std::optional<int> crossing_of(const Corners& triangle, const Eigen::Vector3d& from,
+                               const Eigen::Vector3d& to);
 
 enum class Side { outside, inside, unknown };
 

@@ -59,6 +59,8 @@ void add_counts(Lines& lines, const MeshReport& report) {
   lines.offenders("non-manifold edges", report.non_manifold_edges, report.non_manifold_edge_places);
   lines.offenders("non-manifold vertices", report.non_manifold_vertices, report.non_manifold_vertex_places);
   lines.offenders("inconsistent edges", report.inconsistent_edges, report.inconsistent_places);
+  if (report.inside_out_components)
+    lines.offenders("components inside out", *report.inside_out_components, report.inside_out_places);
   lines.offenders("degenerate polygons", report.degenerate_polygons, report.degenerate_places);
   lines.offenders("duplicate polygons", report.duplicate_polygons, report.duplicate_places);
   lines.count("isolated points", report.isolated_points);

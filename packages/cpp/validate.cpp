@@ -57,6 +57,7 @@ Report report_of(const validation::MeshReport& r) {
   add_defect(report, "non_manifold_edges", r.non_manifold_edges, r.non_manifold_edge_places);
   add_defect(report, "non_manifold_vertices", r.non_manifold_vertices, r.non_manifold_vertex_places);
   add_defect(report, "inconsistent_edges", r.inconsistent_edges, r.inconsistent_places);
+  add_defect(report, "inside_out_components", r.inside_out_components.value_or(0), r.inside_out_places);
   add_defect(report, "degenerate_polygons", r.degenerate_polygons, r.degenerate_places);
   add_defect(report, "duplicate_polygons", r.duplicate_polygons, r.duplicate_places);
   if (r.self_intersections) {

@@ -74,8 +74,17 @@ struct Report {
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
-  /// Whether the mesh is all of these and free of self-intersections; false where nobody looked for them.
-  bool watertight() const { return closed() && manifold() && oriented() && self_intersecting_pairs == 0; }
+  /// Whether an outermost component is inside out; false for a mesh that is not closed or not oriented.
+  bool inside_out() const {
+    for (const Defect& defect : defects)
+      if (defect.name == "inside_out_components") return true;
+    return false;
+  }
+  /// Whether the mesh is closed, manifold, oriented, nowhere inside out and free of self-intersections; false
+  /// if these were not searched for.
+  bool watertight() const {
+    return closed() && manifold() && oriented() && !inside_out() && self_intersecting_pairs == 0;
+  }
 };
 
 /// Judges a mesh. The report depends on the input alone, at any number of threads.
