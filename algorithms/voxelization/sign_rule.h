@@ -5,7 +5,8 @@ namespace hermesh {
 
 /// How a voxel's side is found.
 enum class SignRule {
-  automatic,   ///< flood fill, and winding numbers where the flood leaks in through a hole; says so in a note
+  automatic,  ///< flood fill, without the cavities that closed shells facing inwards bound, and winding
+              ///< numbers where the flood leaks in through a hole; a note reports that
   flood_fill,  ///< inside is what cannot be reached from infinity: any orientation, cavities filled (Aldén
                ///< §5.3)
   winding_number,  ///< inside is where the generalised winding number is above ½: keeps cavities, closes

@@ -27,6 +27,49 @@ TEST(VoxelizeSigns, NestedShellsAreFilledOrKept) {
   EXPECT_GT(at(kept, 8, 0, 0), 0.0);
 }
 
+TEST(VoxelizeSigns, AutomaticSignsKeepCavitiesThatFaceInwards) {
+  PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
+  append(mesh, sphere({0, 0, 0}, 12.0), true);
+  append(mesh, sphere({0, 0, 0}, 6.0));  // a body in the cavity
+  append(mesh, sphere({50, 0, 0}, 8.0));
+  for (const bool inside_out : {false, true}) {
+    if (inside_out)
+      for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+    RunContext context;
+    const Voxelization v = voxelize(mesh, {}, context);
+    EXPECT_TRUE(context.notes.empty()) << context.notes[0];
+    EXPECT_LT(at(v, 0, 0, 0), 0.0);
+    EXPECT_GT(at(v, 9, 0, 0), 0.0);
+    EXPECT_LT(at(v, 16, 0, 0), 0.0);
+    EXPECT_LT(at(v, 50, 0, 0), 0.0);
+    EXPECT_GT(at(v, 30, 0, 0), 0.0);
+  }
+}
+
+TEST(VoxelizeSigns, AShellThatFacesOutwardsWithinASolidIsFilled) {
+  PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
+  append(mesh, sphere({0, 0, 0}, 12.0));
+  EXPECT_LT(at(run(mesh), 0, 0, 0), 0.0);
+  // What boxes enclose between them has no shell of its own.
+  PolygonMesh room = box({-10, -10, -10}, {10, 10, -7});
+  append(room, box({-10, -10, 7}, {10, 10, 10}));
+  append(room, box({-10, -10, -8}, {10, -7, 8}));
+  append(room, box({-10, 7, -8}, {10, 10, 8}));
+  append(room, box({-10, -8, -8}, {-7, 8, 8}));
+  append(room, box({7, -8, -8}, {10, 8, 8}));
+  EXPECT_LT(at(run(room), 0, 0, 0), 0.0);
+}
+
+TEST(VoxelizeSigns, ANoteNamesACavityWithAWallThinnerThanAVoxel) {
+  PolygonMesh mesh = sphere({100, 0, 0}, 20.0);
+  append(mesh, sphere({100, 0, 0}, 19.7), true);
+  RunContext context;
+  const Voxelization v = voxelize(mesh, {}, context);
+  EXPECT_LT(at(v, 100, 0, 0), 0.0);
+  ASSERT_EQ(context.notes.size(), 1u);
+  EXPECT_NE(context.notes[0].find("avity"), std::string::npos) << context.notes[0];
+}
+
 TEST(VoxelizeSigns, AutomaticSignsCloseAHole) {
   const PolygonMesh mesh = opened(20.0, 15.0);
   RunContext context;

@@ -207,6 +207,11 @@ class Orienter {
     result_.patches = patches.size();
     leave_out_walls(patches, turns);
     for (const std::uint32_t face : queue_) result_.turns[face] = turns[face];
+    for (const Patch& patch : patches) {
+      if (!patch.closed || !patch.consistent || !patch.orientable || patch.volume >= 0) continue;
+      result_.inward.resize(triangles_.size());
+      for (std::size_t i = patch.begin; i < patch.end; ++i) result_.inward[queue_[i]] = turns[queue_[i]];
+    }
   }
 
   /// How often the faces of one patch, or all, run along an edge of more than two faces from its low point to its high

@@ -22,6 +22,9 @@ struct Orientation {
   };
 
   std::vector<std::int8_t> turns;  ///< for each face 1 as given, −1 turned over, 0 left out
+  /// `turns` of the faces of closed patches that agreed from the start and have negative volume, 0 for all
+  /// others; empty if there are none.
+  std::vector<std::int8_t> inward;
   std::size_t flipped = 0;         ///< faces turned over
   std::size_t duplicates = 0;      ///< faces left out because others stand for them
   std::size_t patches = 0;         ///< sets of faces connected over edges that have exactly two

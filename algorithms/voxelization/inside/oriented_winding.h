@@ -1,6 +1,8 @@
 // The winding numbers of a mesh whose faces are first made to agree.
 #pragma once
 
+#include <optional>
+
 #include "algorithms/voxelization/distance/index_soup.h"
 #include "algorithms/voxelization/inside/orientation.h"
 #include "algorithms/voxelization/inside/winding_number.h"
@@ -20,6 +22,12 @@ class OrientedWinding {
   bool usable() const { return orientation_.verdict == Orientation::Verdict::usable; }
   /// The winding number at points in voxels relative to the mesh's origin.
   const WindingNumber& number() const { return number_; }
+  /// The winding number of the closed shells that face inwards (Orientation::inward); none if there are no
+  /// such shells.
+  std::optional<WindingNumber> inward() const {
+    if (orientation_.inward.empty()) return std::nullopt;
+    return WindingNumber(tree_, orientation_.inward);
+  }
 
  private:
   OrientedWinding(const PolygonMesh& mesh, double scale)

@@ -4,6 +4,7 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/sample_side.h"
+#include "algorithms/voxelization/inside/cavities.h"
 #include "algorithms/voxelization/inside/oriented_winding.h"
 #include "algorithms/voxelization/inside/pockets.h"
 #include "algorithms/voxelization/inside/winding_signs.h"
@@ -122,6 +123,7 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
     // Pockets only make the outside larger: what leaks without them leaks with them, and there may be thousands.
     if (!leaks) {
       open_pockets(soup, bins, band.blocks, regions, context);
+      if (rule == SignRule::automatic) open_cavities(soup, bins, band, wound, regions, context);
       flood_from_infinity();
     }
     if (rule == SignRule::flood_fill) return signs;
