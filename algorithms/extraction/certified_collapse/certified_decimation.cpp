@@ -18,7 +18,8 @@ constexpr int kMostPasses = 3;
 
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
-                                 RunContext& context, const Nearness& nearness) {
+                                 RunContext& context, const Nearness& nearness,
+                                 std::span<const TrianglePieces> pieces) {
   // Where no distance is allowed nothing may move, whatever the caller has pinned.
   pinned.resize(tolerance.size());
   for (std::size_t p = 0; p < tolerance.size(); ++p)
@@ -32,7 +33,7 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
   // with care, too.
   MergeForest forest =
       timed("decimate", [&] { return block_forest(fine, tolerance, pinned, nearness.moment, file, context); });
-  MergeProof proof(forest, fine, tolerance, context);
+  MergeProof proof(forest, fine, tolerance, context, pieces);
   const auto collapse = [&](std::span<const std::uint8_t> where, Collapses kind) {
     timed("decimate", [&] {
       collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, nearness.moment, file, context);

@@ -10,12 +10,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/certified_collapse/fine_mesh.h"
+#include "algorithms/extraction/certified_collapse/shell_volumes.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
 
 namespace hermesh {
 
@@ -35,22 +37,24 @@ struct Nearness {
   int relaxation = 0;
 };
 
-/// Merges points of a fine mesh where the outcome is proved: the same topology, no two triangles that meet, and the
-/// distance both ways. A triangle's tolerance is the least of its corners. Each place of the fine mesh is within its
-/// triangle's tolerance and kDistanceSlack of the coarse one, and for each place of the coarse one there is a fine
-/// triangle within its own tolerance and that slack, which where tolerances differ need not be the nearest. The same
-/// bytes for every number of threads.
+/// Merges points of a fine mesh where the outcome is proved: the same topology, no two triangles that meet,
+/// each shell facing the way it did, and the distance both ways. A triangle's tolerance is the least of its
+/// corners. Each place of the fine mesh is within its triangle's tolerance and kDistanceSlack of the coarse
+/// one, and for each place of the coarse one there is a fine triangle within its own tolerance and that
+/// slack, which where tolerances differ need not be the nearest. The same bytes for every number of threads.
 /// @param fine closed and oriented, or a complex of patches; index space
-/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into another;
-///   others may go into them.
-/// @param pinned by point of `fine`, or empty: further points that stay. Where more than two triangles meet in an edge
-///   its ends must be pinned; so a complex of patches keeps their rims.
+/// @param tolerance by point of `fine`, voxels. Points with none stay where they are, and none goes into
+///   another; others may go into them.
+/// @param pinned by point of `fine`, or empty: further points that stay. Where more than two triangles meet
+///   in an edge its ends must be pinned; so a complex of patches keeps their rims.
 /// @param file rounds places to the file's precision
 /// @param context told of progress, and asked whether to stop
 /// @param nearness for the root mean square distance
+/// @param pieces of each triangle of a complex (shell_volumes.h); empty for a closed mesh
 /// @throws Cancelled
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
-                                 std::vector<std::uint8_t> pinned, const FilePoints& file, RunContext& context,
-                                 const Nearness& nearness = {});
+                                 std::vector<std::uint8_t> pinned, const FilePoints& file,
+                                 RunContext& context, const Nearness& nearness = {},
+                                 std::span<const TrianglePieces> pieces = {});
 
 }  // namespace hermesh

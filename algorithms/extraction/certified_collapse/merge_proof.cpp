@@ -28,11 +28,12 @@ constexpr int kPatience = 3;
 }  // namespace
 
 MergeProof::MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance,
-                       RunContext& context)
+                       RunContext& context, std::span<const TrianglePieces> pieces)
     : forest_(forest),
       fine_(fine),
       tolerance_(tolerance),
       context_(context),
+      shells_(fine, pieces),
       proofs_(fine.triangles().size()),
       brought_back_(fine.points().size()),
       overlays_([&fine] { return TriangleOverlay(fine.triangles().size()); }) {
@@ -69,6 +70,7 @@ void MergeProof::run(bool geometry) {
     if (geometry) look_at_merged();
     if (geometry && few_are_unproven()) look_at_fine();
     if (geometry && few_are_unproven()) look_at_contacts();
+    if (geometry && few_are_unproven()) look_at_signs();
   } while (split());
 }
 
@@ -347,6 +349,15 @@ void MergeProof::look_at_contacts() {
   });
   // Those that did meet have an unproven set, and lose the mark when it is split.
   for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
+}
+
+/// Calls sets unproven in shells that are inside out.
+void MergeProof::look_at_signs() {
+  const std::vector<std::uint8_t> reversed =
+      shells_.changed(merged_.mesh->points(), merged_.mesh->triangles(), merged_.origin);
+  if (std::ranges::find(reversed, 1) == reversed.end()) return;
+  for (const std::uint32_t t : merged_.origin)
+    if (shells_.is_in(reversed, t)) call_unproven(t);
 }
 
 /// Whether so few sets are to be split that the other tests can be had in the same round, and not one after a

@@ -11,6 +11,7 @@
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/certified_collapse/fine_mesh.h"
 #include "algorithms/extraction/certified_collapse/merge_forest.h"
+#include "algorithms/extraction/certified_collapse/shell_volumes.h"
 #include "algorithms/extraction/contact/triangle_overlay.h"
 
 namespace hermesh {
@@ -31,22 +32,25 @@ struct MergedMesh {
 /// and one thread splits these sets: so the outcome does not depend on threads.
 class MergeProof {
  public:
-  /// @param forest whose sets are split; between calls others may join some, and settle() it; must outlive this
+  /// @param forest whose sets are split; between calls others may join some, and settle() it; must outlive
+  ///   this
   /// @param fine the fine mesh; must outlive this
   /// @param tolerance by point of `fine`, voxels; not copied, and empty only if prove() is never called
   /// @param context asked whether to stop
-  MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance,
-             RunContext& context);
+  /// @param pieces of each triangle of `fine`, as ShellVolumes takes them; read by the constructor only
+  MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context,
+             std::span<const TrianglePieces> pieces = {});
 
   /// Splits sets until no edge leads from one point to another twice, and returns the mesh. As sets are discs, it has the
   /// topology of the fine one, but for parts of which no triangle is left, which only prove() brings back. Nothing is
   /// promised of distances and contacts. @throws Cancelled
   const MergedMesh& sort_out();
-  /// Splits sets until the merged mesh keeps its promises, and returns it: the topology of the fine one, no two triangles that
-  /// meet but in shared corners and edges, and each mesh within the tolerance and kDistanceSlack of the other
-  /// (certified_decimation.h). Of the sets at a triangle that fails, the one that was joined last is split, and moves before
-  /// any other; after three rounds of splits all that may be to blame are split at once. sort_out() need not have been
-  /// called. @throws Cancelled
+  /// Splits sets until the merged mesh keeps its promises, and returns it: the topology of the fine one, no
+  /// two triangles that meet but in shared corners and edges, each mesh within the tolerance and
+  /// kDistanceSlack of the other (certified_decimation.h), and each shell facing outwards or inwards as in
+  /// the fine mesh (shell_volumes.h). Of the sets at a triangle that fails, the one that was joined last is
+  /// split, and moves before any other; after three rounds of splits all that may be to blame are split at
+  /// once. sort_out() need not have been called. @throws Cancelled
   const MergedMesh& prove();
 
   const MergedMesh& merged() const { return merged_; }
@@ -83,6 +87,7 @@ class MergeProof {
   void look_at_merged();
   void look_at_fine();
   void look_at_contacts();
+  void look_at_signs();
   bool few_are_unproven() const;
   std::vector<std::uint32_t> unproven_sets() const;
   bool split();
@@ -95,6 +100,7 @@ class MergeProof {
   const FineMesh& fine_;
   const std::span<const float> tolerance_;
   RunContext& context_;
+  const ShellVolumes shells_;
   std::vector<std::uint8_t> proofs_;    ///< of each fine triangle
   std::vector<std::uint8_t> unproven_;  ///< by node of the forest: 1 for sets to be split
   std::vector<std::uint32_t> open_;     ///< fine triangles that are not proved to be covered

@@ -53,6 +53,65 @@ MergeForest pairs(const FineMesh& fine, const std::vector<std::array<std::uint32
   return MergeForest(std::move(nodes), std::move(node_of));
 }
 
+/// An octahedron as wide as two voxels.
+FineMesh octahedron() {
+  std::vector<Vector3d> points;
+  for (int a = 0; a < 3; ++a)
+    for (const double side : {-1.0, 1.0}) points.push_back(side * Vector3d::Unit(a));
+  std::vector<Triangle> triangles;
+  for (std::uint32_t octant = 0; octant < 8; ++octant) {
+    const std::uint32_t x = octant & 1, y = 2 + (octant >> 1 & 1), z = 4 + (octant >> 2);
+    triangles.push_back((x + y + z) % 2 ? Triangle{x, y, z} : Triangle{x, z, y});
+  }
+  return FineMesh(std::move(points), std::move(triangles));
+}
+
+double volume(const FineMesh& mesh) {
+  double six = 0;
+  for (std::uint32_t t = 0; t < mesh.triangles().size(); ++t) {
+    const Corners c = mesh.corners(t);
+    six += c[0].dot(c[1].cross(c[2]));
+  }
+  return six / 6;
+}
+
+TEST(MergeProof, ABodyIsNotMovedIntoItsMirrorImage) {
+  const FineMesh fine = octahedron();
+  ASSERT_NEAR(volume(fine), 4.0 / 3.0, 1e-12);
+  MergeForest forest({}, std::vector<std::uint32_t>(6, MergeForest::kNone));
+  for (std::uint32_t p = 0; p < 6; ++p) {
+    MergeForest::Node node = set(p, -fine.points()[p]);
+    node.moves = true;
+    forest.join(p, node);
+  }
+  forest.settle();
+  RunContext context;
+  const std::vector<float> tolerance(6, 4.0f);
+  MergeProof proof(forest, fine, tolerance, context);
+  EXPECT_GT(volume(*proof.prove().mesh), 0.0);
+}
+
+TEST(ShellVolumes, AreThoseOfThePiecesOfAComplex) {
+  // Two tetrahedra that share a triangle, which faces the second one.
+  const FineMesh fine({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 2}},
+                      {{0, 1, 2}, {1, 0, 3}, {2, 1, 3}, {0, 2, 3}, {0, 1, 4}, {1, 2, 4}, {2, 0, 4}});
+  const std::vector<TrianglePieces> pieces = {{1, 2}, {1, 0}, {1, 0}, {1, 0}, {2, 0}, {2, 0}, {2, 0}};
+  const std::vector<std::uint32_t> origin = {0, 1, 2, 3, 4, 5, 6};
+  const ShellVolumes shells(fine, pieces);
+  std::vector<Vector3d> points = fine.points();
+  const auto changed = [&](double most) { return shells.changed(points, fine.triangles(), origin, most); };
+  using Flags = std::vector<std::uint8_t>;
+  EXPECT_EQ(changed(0.0), (Flags{0, 0}));
+  points[3].z() = -1.02;  // the first is larger by a fiftieth
+  EXPECT_EQ(changed(0.01), (Flags{1, 0}));
+  EXPECT_EQ(changed(0.03), (Flags{0, 0}));
+  EXPECT_TRUE(shells.is_in({1, 0}, 0));
+  EXPECT_TRUE(shells.is_in({0, 1}, 0));
+  EXPECT_FALSE(shells.is_in({1, 0}, 5));
+  points[4].z() = -0.5;  // the second is inside out
+  EXPECT_EQ(changed(10.0), (Flags{0, 1}));
+}
+
 TEST(FineMesh, ItsMakingEndsWhenTheWorkIsCancelled) {
   const std::atomic<bool> cancel = true;
   RunContext context;

@@ -65,10 +65,92 @@ class Contourer {
     }
     Stage stage(context, "connect");
     parallel_blocks(blocks, context, [&](std::size_t b) { connect(static_cast<std::int32_t>(b), mesh); });
+    turn_lone_samples(mesh, context);
     return mesh;
   }
 
  private:
+  /// A sample all of whose neighbours are on the other side, with the points and quads around it.
+  struct LoneSample {
+    Eigen::Vector3d place;                ///< voxels, relative to the placement's base
+    double sign;                          ///< 1 inside, −1 outside
+    std::array<std::uint32_t, 8> points;  ///< by octant, a bit an axis
+    std::array<std::uint32_t, 6> quads;
+    std::array<std::array<double, 2>, 3> hits;  ///< distances of the crossings below and above, by axis
+  };
+
+  /// Finds the block's samples whose six edges are all crossed.
+  void find_lone_samples(std::int32_t b, std::vector<LoneSample>& found) const {
+    const HermiteView::Block& block = grid_.blocks()[b];
+    BlockMask candidates;
+    for (std::size_t word = 0; word < candidates.size(); ++word)
+      candidates[word] = block.crossing[0][word] & block.crossing[1][word] & block.crossing[2][word];
+    for_each_bit(candidates, [&](int sample) {
+      const int at[3] = {sample >> 6, (sample >> 3) & 7, sample & 7};
+      LoneSample lone;
+      for (int axis = 0; axis < 3; ++axis) {
+        lone.place[axis] = block.lower[axis] - grid_.placement().base[axis] + at[axis];
+        int below[3] = {at[0], at[1], at[2]};
+        --below[axis];
+        const LatticePlace first[2] = {locate(block.neighbours, below[0], below[1], below[2]), {b, sample}};
+        if (first[0].block < 0 || !test(grid_.blocks()[first[0].block].crossing[axis], first[0].sample))
+          return;
+        for (int side = 0; side < 2; ++side) {
+          const auto& [there, start] = first[side];
+          const double offset = grid_.crossing(there, start, axis).offset;
+          lone.hits[axis][side] = side ? offset : 1.0 - offset;
+          lone.quads[2 * axis + side] = outputs_[there].first_quad + grid_.blocks()[there].rank(axis, start);
+        }
+      }
+      for (int octant = 0; octant < 8; ++octant) {
+        const LatticePlace cell = locate(block.neighbours, at[0] - 1 + (octant & 1),
+                                         at[1] - 1 + (octant >> 1 & 1), at[2] - 1 + (octant >> 2));
+        lone.points[octant] = outputs_[cell.block].point_in(cell.sample);
+      }
+      lone.sign = test(block.inside, sample) ? 1.0 : -1.0;
+      found.push_back(lone);
+    });
+  }
+
+  /// Keeps the surface around a lone sample from being inside out. Around other samples points that leave
+  /// their cells do not go as far as the opposite side. Around a lone one they can pass one another in the
+  /// middle: if its volume has the wrong sign, or none, the eight points go to the means of the crossings
+  /// beside the sample, a box around it.
+  void turn_lone_samples(PolygonMesh& mesh, RunContext& context) const {
+    std::vector<std::vector<LoneSample>> found(outputs_.size());
+    parallel_blocks(found.size(), context,
+                    [&](std::size_t b) { find_lone_samples(static_cast<std::int32_t>(b), found[b]); });
+    constexpr double kLeastVolume = 1e-6, kLeastHit = 1.0 / 16;  // voxels
+    const double least = kLeastVolume * std::abs(grid_.placement().linear.determinant());
+    const auto volume = [&](const LoneSample& lone) {
+      const Eigen::Vector3d apex = mesh.points[lone.points[0]].cast<double>();
+      const auto at = [&](std::uint32_t p) { return Eigen::Vector3d(mesh.points[p].cast<double>() - apex); };
+      double six = 0;
+      for (const std::uint32_t number : lone.quads) {
+        const Quad& q = mesh.quads[number];
+        six += at(q[0]).dot(at(q[1]).cross(at(q[2])) + at(q[2]).cross(at(q[3])));
+      }
+      return six / 6;
+    };
+    const auto turned = [&](const LoneSample& lone) {
+      if (lone.sign * volume(lone) >= least) return false;
+      for (int octant = 0; octant < 8; ++octant) {
+        Eigen::Vector3d place = lone.place;
+        for (int axis = 0; axis < 3; ++axis) {
+          const int side = octant >> axis & 1;
+          place[axis] += (side ? 1.0 : -1.0) * std::max(lone.hits[axis][side], kLeastHit) / 3.0;
+        }
+        mesh.points[lone.points[octant]] = grid_.placement().local(place).cast<float>();
+      }
+      return true;
+    };
+    // Two lone samples, diagonally apart, may share points, so all are looked at again after one was turned.
+    // None is turned twice: a point within its cell is on the right side of both.
+    const auto turn = [&](std::vector<LoneSample>& list) { return std::erase_if(list, turned) > 0; };
+    while (std::ranges::count_if(found, turn) > 0) {
+    }
+  }
+
   Qef gather(std::int32_t b, const int (&cell)[3], const Eigen::Vector3d& corner) const {
     // About the cell's centre, from which no crossing is farther than the corners are.
     Qef qef(corner + Eigen::Vector3d::Constant(0.5));

@@ -48,6 +48,10 @@ class CellGrid {
   /// Whether the two inside corners of an ambiguous face, none of whose edges is a cut, are of one piece. Where they are
   /// not, each of them is cut off on the face, and they are never joined across it.
   virtual bool is_of_one_piece(std::int32_t /*block*/, int /*cell*/, int /*face*/) const { return true; }
+  /// The pieces behind and in front of the polygons of an edge that is crossed; 0 is the outside.
+  virtual std::array<std::uint32_t, 2> pieces(std::int32_t /*block*/, int /*sample*/, int /*axis*/) const {
+    return {1, 0};
+  }
 };
 
 /// Signs, sheets, points and edges of all active cells of a CellGrid. Lengths are in voxels, places in index space
