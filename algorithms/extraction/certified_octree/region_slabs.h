@@ -15,14 +15,16 @@
 
 namespace hermesh {
 
-/// Proves for tolerances beyond kLeast, as long as there are larger cubes, that the merged mesh T and the uniform
-/// mesh S are near each other. Nothing of S need be made for it but the points that T has in common with it.
+/// Proves for tolerances beyond kLeast, as long as there are larger cubes, that the merged mesh T and the
+/// uniform mesh S are near each other. Nothing of S need be made for it but the points that T has in common
+/// with it.
 ///
 /// A cube X has a *slab*: its places between two planes at right angles to the mean of its crossings'
 /// normals. They are as far apart as it takes for the slab to contain
-/// - S ∩ X: a polygon of S is in the hull of its cells' points and its crossing, and in mean placement these
-/// are in the hull of the crossings. So all crossings of X and of the cells around it count, and in other
-/// placements their points as well;
+/// - S ∩ X: a polygon of S is in the hull of its cells' points and its crossing (or, where a fan's point had
+/// to move, 1/2048 voxel from that: uniform_mesh.h), and in mean placement these are in the hull of the
+/// crossings. So all crossings of X and of the cells around it count, and in other placements their points as
+/// well;
 /// - T ∩ X: a polygon that keeps to its envelope passes from region to region through their faces, so what it
 /// has in X is in the hull of X's point and of where its sides and its diagonal pass the faces. A loose
 /// polygon counts as a whole, in every cube that its box touches.

@@ -26,6 +26,7 @@ bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     : grid_(grid),
       source_(grid.blocks()),
+      rounding_(rounding_in_file()),
       margin_(margin_for_rounding()),
       cuts_(grid.cuts()),
       told_(grid.joint_sheets()),
@@ -217,7 +218,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   return signs;
 }
 
-double CellBlocks::margin_for_rounding() const {
+Eigen::Vector3d CellBlocks::rounding_in_file() const {
   const IndexToWorld& placement = grid_.placement();
   Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
   // The farthest corner along each axis of the world, for rounding grows with the coordinate.
@@ -244,8 +245,11 @@ double CellBlocks::margin_for_rounding() const {
   // Of single precision about the origin, and of double precision where the file's coordinates lie (FilePoints).
   const Eigen::Vector3d in_world = farthest * 0x1p-24 + (placement.origin.cwiseAbs() + farthest) * 0x1p-53;
   // Back to voxels: no place moves farther along an axis of the lattice than its row of magnitudes allows.
-  const Eigen::Vector3d rounding = placement.linear.inverse().cwiseAbs() * in_world;
-  const double margin = std::max(1.0 / 1024.0, 8.0 * rounding.maxCoeff());
+  return placement.linear.inverse().cwiseAbs() * in_world;
+}
+
+double CellBlocks::margin_for_rounding() const {
+  const double margin = std::max(1.0 / 1024.0, 8.0 * rounding_.maxCoeff());
   static_assert(kLargestMargin == 0.25);  // eight times what the error names
   if (!(margin <= kLargestMargin))
     throw Error("the coordinates of a mesh file cannot hold a mesh of this volume to a thirty-second of a voxel, so "

@@ -97,6 +97,8 @@ class CellBlocks {
   /// may do at the lattice's farthest corner, and at least 1/1024: along axes of the world, eight times what it does 2048
   /// voxels from the meshes' origin (IndexToWorld::origin).
   double margin() const { return margin_; }
+  /// How far rounding to the file's precision may move a point along each axis of the lattice, in voxels.
+  const Eigen::Vector3d& rounding() const { return rounding_; }
 
   std::size_t size() const { return blocks_.size(); }
   const Block& operator[](std::int32_t block) const { return blocks_[block]; }
@@ -251,10 +253,12 @@ class CellBlocks {
   BlockMask cells_with_cuts(std::int32_t block) const;
 
   static constexpr double kLargestMargin = 0.25;
+  Eigen::Vector3d rounding_in_file() const;
   double margin_for_rounding() const;
 
   const CellGrid& grid_;
   const HermiteView::Blocks& source_;  ///< the blocks of `grid_`
+  const Eigen::Vector3d rounding_;
   const double margin_;
   const std::span<const std::array<BlockMask, 3>> cuts_;
   const std::span<const SheetsOfBlock> told_;

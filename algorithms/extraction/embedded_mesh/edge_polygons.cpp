@@ -8,13 +8,23 @@ namespace {
 
 using Eigen::Vector3d;
 
-void set(BlockMask& mask, int sample) { mask[sample >> 6] |= std::uint64_t{1} << (sample & 63); }
+void set(BlockMask& mask, int sample, bool value = true) {
+  const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
+  mask[sample >> 6] = value ? mask[sample >> 6] | bit : mask[sample >> 6] & ~bit;
+}
+
+std::vector<CellBlocks::Cell> listed(const ByBlock<BlockMask>& masks) {
+  std::vector<CellBlocks::Cell> cells;
+  for (std::size_t b = 0; b < masks.size(); ++b)
+    for_each_bit(masks[b], [&](int cell) { cells.push_back({static_cast<std::int32_t>(b), cell}); });
+  return cells;
+}
 
 }  // namespace
 
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                            RunContext& context)
-    : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()) {
+    : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()), centred_(cells.size()) {
   // Each block decides for its own edges and writes nothing else, by points of cells that are all there: so the result
   // does not depend on threads.
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -52,6 +62,11 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const Unifor
   // All are marked before any edge decides: an edge looks at all four cells around it. Edges of one cell may be in
   // several blocks, so this runs in one thread; there are few such cells.
   for (const CellBlocks::Cell& cell : cells) set(held_.at(static_cast<std::size_t>(cell.block)), cell.cell);
+  decide_again(cells, points, context);
+}
+
+void EdgePolygons::decide_again(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
+                                RunContext& context) {
   for (const CellBlocks::Cell& cell : cells)
     for (int edge = 0; edge < 12; ++edge)
       if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
@@ -59,11 +74,19 @@ void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const Unifor
   number_all(context);
 }
 
-std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const {
-  std::vector<CellBlocks::Cell> cells;
-  for (std::size_t b = 0; b < held_.size(); ++b)
-    for_each_bit(held_[b], [&](int cell) { cells.push_back({static_cast<std::int32_t>(b), cell}); });
-  return cells;
+std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const { return listed(held_); }
+
+void EdgePolygons::centre(const std::vector<CellBlocks::Cell>& cells) {
+  for (const auto& [block, cell] : cells) set(centred_.at(static_cast<std::size_t>(block)), cell);
+}
+
+std::vector<CellBlocks::Cell> EdgePolygons::centred_cells() const { return listed(centred_); }
+
+Vector3d EdgePolygons::crossing_position(const CellBlocks::Edge& edge) const {
+  for (int i = 0; i < 4; ++i)
+    if (is_centred(cells_.cell_around(edge, i)))
+      return cells_.corner(edge.block, edge.sample) + 0.5 * Vector3d::Unit(edge.axis);
+  return cells_.crossing_point(edge);
 }
 
 void EdgePolygons::number_all(RunContext& context) {
@@ -123,12 +146,9 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const Unifor
     corners = around.points;
   }
   const int diagonal = any_explicit ? -1 : safe_diagonal(edge, hit, corners, points);
-  // Bits are set and never taken back: a cell that is held later turns quads into fans, no fan into a quad, and leaves
-  // all other answers as they were.
-  if (diagonal < 0)
-    set(edges.fanned[edge.axis], edge.sample);
-  else if (diagonal == 1)
-    set(edges.second_diagonal[edge.axis], edge.sample);
+  // Both bits are written, so that the answer depends on points and held cells only, not on earlier answers.
+  set(edges.fanned[edge.axis], edge.sample, diagonal < 0);
+  set(edges.second_diagonal[edge.axis], edge.sample, diagonal == 1);
 }
 
 /// The diagonal to cut a quad along, 0 or 1; −1 if neither keeps the triangles in the envelope.

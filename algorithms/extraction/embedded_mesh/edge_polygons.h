@@ -47,6 +47,20 @@ class EdgePolygons {
   void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
 
+  bool is_centred(const CellBlocks::Cell& cell) const {
+    return test(centred_[static_cast<std::size_t>(cell.block)], cell.cell);
+  }
+  /// Moves the crossings of cells to the middles of their edges (crossing_position()). The edges around all
+  /// cells whose points move with them must then be decided again.
+  void centre(const std::vector<CellBlocks::Cell>& cells);
+  std::vector<CellBlocks::Cell> centred_cells() const;
+  /// Decides again for the edges around cells. Throws as the constructor does.
+  void decide_again(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
+                    RunContext& context);
+  /// Returns the position of a crossing before rounding: the middle of its edge if any of the four cells is
+  /// centred.
+  Eigen::Vector3d crossing_position(const CellBlocks::Edge& edge) const;
+
   std::uint64_t point_count() const { return points_; }  ///< points of cells and points on fanned edges
   std::uint64_t fanned_edges() const { return fanned_edges_; }
   std::uint64_t quad_count() const { return quads_; }
@@ -121,6 +135,7 @@ class EdgePolygons {
   ByBlock<BlockEdges> edges_;
   ByBlock<BlockMask> held_;  ///< held cells; apart from `edges_`, for this is read across blocks while those are made
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
+  ByBlock<BlockMask> centred_;  ///< centred cells
 };
 
 }  // namespace hermesh

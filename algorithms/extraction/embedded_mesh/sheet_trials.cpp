@@ -1,5 +1,6 @@
 #include "algorithms/extraction/embedded_mesh/sheet_trials.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -16,6 +17,10 @@ namespace {
 using Eigen::Vector3d;
 using Cells = std::vector<CellBlocks::Cell>;
 
+/// Six times the volume, in cubic voxels, that a tetrahedron of a fan must exceed: far above rounding of
+/// doubles.
+constexpr double kLeastOfFan = 1e-9;
+
 bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
   return std::tie(a.block, a.axis, a.sample) < std::tie(b.block, b.axis, b.sample);
 }
@@ -24,10 +29,11 @@ bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
 /// and each step writes only what belongs to its own block.
 class Trials {
  public:
-  Trials(const CellBlocks& cells, EdgePolygons& polygons, UniformPoints& points, double farthest,
-         RunContext& context)
+  Trials(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file, UniformPoints& points,
+         double farthest, RunContext& context)
       : cells_(cells),
         polygons_(polygons),
+        file_(file),
         mesh_(cells, polygons, points, farthest),
         points_(points),
         untested_(cells.size()) {
@@ -56,15 +62,18 @@ class Trials {
     return found;
   }
 
-  /// Holds cells; the polygons of their edges are to be tested anew.
-  void hold(const Cells& held, RunContext& context) {
+  /// Holds cells, and centres those that are held already; their edges are then to be tested again.
+  void hold(const Cells& cells, RunContext& context) {
+    Cells held, centred;
+    for (const CellBlocks::Cell& cell : cells) (polygons_.is_held(cell) ? centred : held).push_back(cell);
     polygons_.hold(held, points_, context);
+    if (!centred.empty()) centre(centred, context);
     mesh_.forget();
     for (const CellBlocks::Cell& cell : held) mark_edges(cell);
   }
 
-  /// The tried cells near polygons that meet, some more than once. Those polygons are to be tested again next time, the
-  /// others are not.
+  /// Returns the cells to be held or centred near polygons that meet, some more than once. Those polygons are
+  /// to be tested again next time, the others are not.
   Cells that_meet(RunContext& context) {
     std::vector<Cells> found(cells_.size());
     std::vector<std::vector<CellBlocks::Edge>> meeting(cells_.size());
@@ -100,6 +109,34 @@ class Trials {
         mark(at);
   }
 
+  /// Moves the crossings of cells to the middles of their edges, and the points of all sheets there with
+  /// them.
+  void centre(const Cells& centred, RunContext& context) {
+    polygons_.centre(centred);
+    Cells touched;
+    for (const CellBlocks::Cell& cell : centred)
+      cells_.for_each_about(cell, 1, [&](const CellBlocks::Cell& at) {
+        if (!cells_.is_plain(at.block, at.cell)) touched.push_back(at);
+      });
+    for (const CellBlocks::Cell& cell : touched)
+      if (const int sheets = cells_.point_count(cell.block, cell.cell); sheets > 1)
+        for (int sheet = 0; sheet < sheets; ++sheet)
+          points_[cells_.point(cell.block, cell.cell, sheet)] = file_.rounded(mean_of_crossings(cell, sheet));
+    polygons_.decide_again(touched, points_, context);
+    for (const CellBlocks::Cell& cell : touched) mark_edges(cell);
+  }
+  Vector3d mean_of_crossings(const CellBlocks::Cell& cell, int sheet) const {
+    const CellSheets& sheets = cells_.sheets(cell.block, cell.cell);
+    Vector3d sum = Vector3d::Zero();
+    int crossings = 0;
+    for (int edge = 0; edge < 12; ++edge)
+      if (sheets.sheet_of[edge] == sheet) {
+        sum += polygons_.crossing_position(cells_.edge_of_cell(cell.block, cell.cell, edge));
+        ++crossings;
+      }
+    return sum / crossings;
+  }
+
   bool is_joint_of_several(const CellBlocks::Cell& cell) const {
     return cells_.is_joint(cell.block, cell.cell) && cells_.point_count(cell.block, cell.cell) > 1;
   }
@@ -107,12 +144,22 @@ class Trials {
   bool is_tried(const CellBlocks::Cell& cell) const {
     return is_joint_of_several(cell) || (polygons_.can_be_held(cell) && !polygons_.is_held(cell));
   }
-  /// Adds the tried cells around both edges; if there are none those around one, around the other, or the nearest ones.
+  /// Adds the tried cells near two edges, or if there are none the held cells that are not centred yet.
   void add_tried(const CellBlocks::Edge& edge, const CellBlocks::Edge& other, Cells& found) const {
+    if (!add_near(edge, other, found, [&](const CellBlocks::Cell& cell) { return is_tried(cell); }))
+      add_near(edge, other, found, [&](const CellBlocks::Cell& cell) {
+        return polygons_.is_held(cell) && !polygons_.is_centred(cell);
+      });
+  }
+  /// Adds the wanted cells around both edges; if there are none those around one, around the other, or the
+  /// nearest ones. Returns whether there are any.
+  template <class Wanted>
+  bool add_near(const CellBlocks::Edge& edge, const CellBlocks::Edge& other, Cells& found,
+                Wanted&& is_wanted) const {
     const std::size_t before = found.size();
     const auto at_edge = cells_.around(edge).cells, at_other = cells_.around(other).cells;
     const auto add = [&](const CellBlocks::Cell& cell) {
-      if (is_tried(cell)) found.push_back(cell);
+      if (is_wanted(cell)) found.push_back(cell);
     };
     for (const CellBlocks::Cell& cell : at_edge)
       if (std::ranges::any_of(at_other, [&](const CellBlocks::Cell& c) { return c.block == cell.block && c.cell == cell.cell; }))
@@ -121,6 +168,7 @@ class Trials {
       if (found.size() == before) std::ranges::for_each(*cells, add);
     for (int steps = 1; found.size() == before && steps <= 2; ++steps)
       for (const CellBlocks::Edge& at : {edge, other}) cells_.for_each_about({at.block, at.sample}, steps, add);
+    return found.size() > before;
   }
 
   /// Whether a polygon of the edge meets another one; adds the tried cells near the first that does. Of two edges that
@@ -146,6 +194,7 @@ class Trials {
 
   const CellBlocks& cells_;
   EdgePolygons& polygons_;
+  const FilePoints& file_;
   PolygonNeighbourhood mesh_;
   UniformPoints& points_;
   Cells tried_;         ///< all that were when this began
@@ -161,6 +210,31 @@ Cells without_repeats(Cells cells) {
   return cells;
 }
 
+/// Returns the position of the point on a fanned edge: its crossing, or for a fan that is not tested, the
+/// position as near to that as the eight tetrahedra of the fan allow.
+Vector3d fan_point(const CellBlocks& cells, const EdgePolygons& polygons, const CellBlocks::Edge& edge,
+                   const FilePoints& file, const UniformPoints& points) {
+  const Vector3d crossing = polygons.crossing_position(edge), first = file.rounded(crossing);
+  const CellBlocks::Around around = cells.around(edge);
+  for (const CellBlocks::Cell& cell : around.cells)
+    if (cells.point_count(cell.block, cell.cell) > 1 || polygons.can_be_held(cell)) return first;
+  const Vector3d start = cells.corner(edge.block, edge.sample), along = Vector3d::Unit(edge.axis);
+  const auto fits = [&](const Vector3d& point) {
+    const Vector3d x = point - start;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vector3d p = points[around.points[i]] - start, q = points[around.points[(i + 1) % 4]] - start;
+      const double lower = p.cross(q).dot(x), upper = (q - along).cross(p - along).dot(x - along);
+      if (!(lower > kLeastOfFan && upper > kLeastOfFan)) return false;
+    }
+    return true;
+  };
+  if (fits(first)) return first;
+  const Vector3d to_middle = start + 0.5 * along - crossing;
+  for (double part = 1.0 / 1024.0; part <= 1.0; part *= 2.0)
+    if (const Vector3d moved = file.rounded(crossing + part * to_middle); fits(moved)) return moved;
+  return first;
+}
+
 }  // namespace
 
 void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
@@ -170,7 +244,7 @@ void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, cons
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(polygons.fanned(static_cast<std::int32_t>(b), axis), [&](int sample) {
         const CellBlocks::Edge edge{static_cast<std::int32_t>(b), sample, axis};
-        points[polygons.crossing_point(edge)] = file.rounded(cells.crossing_point(edge));
+        points[polygons.crossing_point(edge)] = fan_point(cells, polygons, edge, file, points);
       });
   });
 }
@@ -178,11 +252,11 @@ void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, cons
 Cells hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file,
                            UniformPoints& points, double farthest, RunContext& context) {
   Stage stage(context, "try sheets");
-  Trials trials(cells, polygons, points, farthest, context);
+  Trials trials(cells, polygons, file, points, farthest, context);
   // Four polygons at an edge are no contact that the test would find.
   Cells held = trials.pinched();
-  // Each round holds one cell more at least, and no cell twice (is_tried()), so this ends. What is held makes other
-  // polygons, with points on other edges: crossings are placed anew before they are tested.
+  // Each round holds or centres one cell more at least, and none twice (add_tried()), so this ends. What is
+  // held makes other polygons, with points on other edges: crossings are placed again before they are tested.
   for (;;) {
     if (!held.empty()) trials.hold(held, context);
     place_crossings(cells, polygons, file, points, context);

@@ -154,6 +154,7 @@ class UniformContourer {
     // A later call is for more edges of the same cells: to hold others than the first time would make other polygons
     // where there are some already.
     if (held_) {
+      polygons.centre(centred_);
       if (!held_->empty()) polygons.hold(*held_, points_, context);
       place_crossings(cells_, polygons, file_, points_, context);
     } else {
@@ -164,6 +165,7 @@ class UniformContourer {
            hold_cells_that_meet(cells_, polygons, file_, points_, farthest, context))
         counts_.meeting_joints.emplace_back(cell.block, cell.cell);
       held_ = polygons.held_cells();
+      centred_ = polygons.centred_cells();
     }
     counts_.held = held_->size();
     counts_.fanned_edges = polygons.fanned_edges();
@@ -345,10 +347,13 @@ class UniformContourer {
       if (!there) return;
       beside[face] = *there;
     }
+    unsigned crossed = 0;  // a bit an edge
+    for (int edge = 0; edge < 12; ++edge)
+      crossed |= unsigned(cells_.is_crossed(cells_.edge_of_cell(block, target.cell, edge))) << edge;
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
       // Tested as the file will hold it. Shares of the way, because the target may be just out of reach.
       const Vector3d candidate = file_.rounded(point + share * (target.place - point));
-      if (!tetrahedra_are_positive(corner, candidate, beside)) continue;
+      if (!tetrahedra_are_positive(corner, candidate, beside, crossed, cells_.rounding())) continue;
       point = candidate;
       return;
     }
@@ -370,12 +375,14 @@ class UniformContourer {
     return points_[cells_.point(there.block, there.cell, 0)];
   }
 
-  /// Whether all tetrahedra of a lattice edge of the cell, its point and that of a cell beside it are positively
-  /// oriented.
+  /// Whether all tetrahedra of a lattice edge of the cell, its point and that of a cell beside it are
+  /// positively oriented, and those of crossed edges stay so if a point up to `aside` from the edge's middle
+  /// cuts them in two.
   static bool tetrahedra_are_positive(const Vector3d& corner, const Vector3d& point,
-                                      const std::array<Vector3d, 6>& beside) {
+                                      const std::array<Vector3d, 6>& beside, unsigned crossed,
+                                      const Vector3d& aside) {
     for (int face = 0; face < 6; ++face) {
-      const std::array<int, 4> corners = face_corners(face);
+      const std::array<int, 4> corners = face_corners(face), edges = face_edges(face);
       for (int i = 0; i < 4; ++i) {
         const auto at = [&](int c) {
           const std::array<int, 3> offset = corner_offset(c);
@@ -384,6 +391,12 @@ class UniformContourer {
         // Corners run counter-clockwise for a viewer whom the face's axis points at.
         const double v = volume(at(corners[i]), at(corners[(i + 1) % 4]), point, beside[face]);
         if ((face & 1 ? v : -v) < kLeastVolume) return false;
+        // Either part has half of the volume, of which the move leaves a tenth at least (fan_point()).
+        if (!(crossed >> edges[i] & 1)) continue;
+        for (const int end : {i, (i + 1) % 4}) {
+          const Vector3d to_point = point - at(corners[end]), to_beside = beside[face] - at(corners[end]);
+          if (std::abs(v) < 2.5 * aside.dot(to_point.cross(to_beside).cwiseAbs())) return false;
+        }
       }
     }
     return true;
@@ -441,6 +454,7 @@ class UniformContourer {
   /// The cells held, found when polygons are made first: all edges that the answer depends on are among those asked for
   /// then, and ever after.
   std::optional<std::vector<CellBlocks::Cell>> held_;
+  std::vector<CellBlocks::Cell> centred_;  ///< likewise
 };
 
 /// The lattice of Hermite data, which have no cuts.
