@@ -17,6 +17,9 @@ struct BoundsOf {
 
   Vector lower = Vector::Constant(kFarthest), upper = Vector::Constant(kLeast);
 
+  /// Returns the box that every point lies in.
+  static BoundsOf unbounded() { return {Vector::Constant(kLeast), Vector::Constant(kFarthest)}; }
+
   void add(const Vector& point) {
     lower = lower.cwiseMin(point);
     upper = upper.cwiseMax(point);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/core/bounds.h"
 #include "algorithms/core/level_set.h"
 #include "algorithms/core/options.h"
 #include "algorithms/core/polygon_mesh.h"
@@ -44,6 +45,9 @@ struct ExtractionInput {
   /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a variant which
   /// proves something of its mesh proves it of the points as they will be written.
   bool written_in_single = false;
+  /// The box of index coordinates that a variant keeps its vertices in if it guarantees that nothing
+  /// intersects (extraction/volume_ends.h). Up to rounding, all crossings lie in the box.
+  Bounds caps = Bounds::unbounded();
 };
 
 /// Entry of a table: a method that turns a volume into a mesh.

@@ -129,8 +129,24 @@ class EndFinder {
   const EndRule& rule_;
 };
 
+/// Returns whether an edge along the axis changes sign that starts at `first` to `last` along the axis.
+bool any_crossing(const LeafTable& table, int axis, int first, int last) {
+  for (std::size_t leaf = 0; leaf < table.size(); ++leaf) {
+    const int lower = table.lower(leaf)[static_cast<std::size_t>(axis)];
+    if (lower > last || lower + 7 < first) continue;
+    bool found = false;
+    for_each_bit(table.crossing_edges(leaf)[static_cast<std::size_t>(axis)], [&](int sample) {
+      const int at = lower + (sample >> (6 - 3 * axis) & 7);
+      found = found || (at >= first && at <= last);
+    });
+    if (found) return true;
+  }
+  return false;
+}
+
 /// The ends that the edges cross. They are in a box if each lies at the side of the active box.
-DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& active) {
+DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& active,
+                 const LeafTable& table) {
   DataEnds ends;
   for (const EndEdge& edge : edges) {
     const int last = edge.beyond[edge.axis] - (edge.side ? 1 : -1);
@@ -138,6 +154,16 @@ DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& ac
     ends.last[edge.axis][edge.side] = last;
     reached = true;
     if (last != (edge.side ? active.max() : active.min())[edge.axis]) ends.in_a_box = false;
+  }
+  if (!ends.in_a_box) return ends;
+  constexpr int kFarthest = std::numeric_limits<int>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    // The edges of an end cross its cap. A sample inside beyond the data has another edge farther on.
+    const int below = active.min()[axis] - 1 - ends.reached[axis][0],
+              above = active.max()[axis] + ends.reached[axis][1];
+    // A sample stands for the voxel around it, which ends half a voxel farther on.
+    if (!any_crossing(table, axis, -kFarthest, below)) ends.caps.lower[axis] = active.min()[axis] - 0.5;
+    if (!any_crossing(table, axis, above, kFarthest)) ends.caps.upper[axis] = active.max()[axis] + 0.5;
   }
   return ends;
 }
@@ -197,21 +223,19 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   const InsideRule inside = inside_rule(grid, isovalue);
   EndRule rule;
   if (!find_rule(grid, isovalue, rule)) return {level_set, {}};
-  const auto edges_of = [&](const LevelSet& volume) {
-    return EndFinder(LeafTable(volume, isovalue, context), rule).find(context);
-  };
-  const std::vector<EndEdge> edges = edges_of(level_set);
+  const LeafTable table(level_set, isovalue, context);
+  const std::vector<EndEdge> edges = EndFinder(table, rule).find(context);
   if (edges.empty()) return {level_set, {}};
   // Without a sample in a leaf there is no band to flood from: OpenVDB would take the sign of a node's first tile for all.
   if (rule.level_set && grid.background() > 0.0f && grid.tree().leafCount() > 0) {
     const LevelSet flooded = with_flooded_signs(grid);
-    if (edges_of(flooded).empty()) {
+    if (EndFinder(LeafTable(flooded, isovalue, context), rule).find(context).empty()) {
       context.note("the level set's inactive samples had no signs (its inside was not flooded): they got those of the band");
       return {flooded, {}};
     }
   }
   const openvdb::CoordBBox active = rule.level_set ? active_box(grid.tree()) : rule.box;
-  return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active)};
+  return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active, table)};
 }
 
 EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends) {
@@ -223,7 +247,8 @@ EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& i
                                       .context = input.context,
                                       .field = input.field,
                                       .hermite = input.hermite,
-                                      .written_in_single = input.written_in_single}),
+                                      .written_in_single = input.written_in_single,
+                                      .caps = closed.ends.caps}),
                    closed.ends};
   if (!closed.ends.any()) return result;
   if (ends == Ends::open)

@@ -37,6 +37,10 @@ struct DataEnds {
   /// False where the ends of a level set lie in no box (it was clipped by a mask): those caps are closed, but only flat
   /// where one sample beyond has one neighbour inside, and they cannot be opened.
   bool in_a_box = true;
+  /// The box of index coordinates that ends half a voxel beyond the last samples, at the caps. It is
+  /// unbounded if the ends lie in no box, and on each side on which the surface continues beyond the active
+  /// samples.
+  Bounds caps = Bounds::unbounded();
 
   bool any() const;
   std::string text() const;  ///< names of the ends, such as "-x, +z"
@@ -57,9 +61,11 @@ struct ClosedVolume {
 /// @throws Error for values that are not finite; Cancelled
 ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& context);
 
-/// Moves the points of an extractor's mesh that lie beyond the last samples onto the plane half a voxel beyond, along the
-/// grid's axis: extractors that place points inside cells round the cap's rim. For meshes of close_ends()' volume. May make
-/// polygons intersect, so that extractors that promise otherwise are left with their rims.
+/// Moves the points of an extractor's mesh that lie beyond the last samples of an end onto the plane half a
+/// voxel beyond, along the grid's axis: extractors that place points inside cells round the cap's rim. On
+/// other sides it moves only points beyond that plane. For meshes of close_ends()' volume. May make polygons
+/// intersect, so extractors that guarantee otherwise keep their points within the caps themselves
+/// (ExtractionInput::caps): their rims may be round, but do not pass the plane.
 void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends);
 
 /// Cuts the mesh of close_ends()' volume off in the planes of the last samples. Polygons that straddle a plane are cut at

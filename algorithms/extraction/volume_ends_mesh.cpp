@@ -135,16 +135,17 @@ class PlaneCut {
 }  // namespace
 
 void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends) {
-  if (!ends.in_a_box) return;
   const IndexSpace space(mesh, closed);
-  for_each_end(ends, [&](int axis, int side, int last) {
-    // A sample stands for the voxel around it, which ends half a voxel further on.
-    const double plane = last + (side ? 0.5 : -0.5);
-    for (Eigen::Vector3f& point : mesh.points) {
-      const double at = space.coordinate(point, axis);
-      if ((side ? at - last : last - at) > kInPlane) point = space.moved(point, axis, plane - at);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const double plane = (side ? ends.caps.upper : ends.caps.lower)[axis];
+      if (!std::isfinite(plane)) continue;
+      const double least = ends.reached[axis][side] ? kInPlane - 0.5 : 0.0;
+      for (Eigen::Vector3f& point : mesh.points) {
+        const double at = space.coordinate(point, axis);
+        if ((side ? at - plane : plane - at) > least) point = space.moved(point, axis, plane - at);
+      }
     }
-  });
 }
 
 PolygonMesh open_ends(const PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends) {

@@ -30,7 +30,7 @@ CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, 
 
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context) {
-  const FilePoints file(grid.placement());
+  const FilePoints file(grid.placement(), options.uniform.caps);
   const FieldAtPoints at_points(field, grid.placement());
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
   report(uniform.counts, context);

@@ -27,7 +27,10 @@ CertifiedPolygons by_regions(const HermiteView& grid, const CertifiedOctreeOptio
   UniformCells uniform(grid, options.uniform, file, context);
   const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context), options.flatness,
                             options.largest_cube};
-  const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average;
+  // Caps may hold a mean off the hull of crossings whose samples were mirrored and rounded (volume_ends.h).
+  const Bounds& caps = options.uniform.caps;
+  const bool has_caps = caps.lower.array().isFinite().any() || caps.upper.array().isFinite().any();
+  const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average && !has_caps;
   RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
   report(uniform.counts(), context);
   CertifiedPolygons result{std::move(merged.points), std::move(merged.triangles), std::move(merged.quads), {}};
@@ -43,7 +46,7 @@ PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptio
                              RunContext& context) {
   CertifiedOctreeOptions options = given;
   options.uniform.reach = 0;
-  const FilePoints file(grid.placement());
+  const FilePoints file(grid.placement(), options.uniform.caps);
   const FieldAtPoints at_points(field, grid.placement());
   if (options.tolerance > 0 || at_points.simplifies())
     return finished(by_regions(grid, options, at_points, file, context), at_points, file, context);

@@ -304,6 +304,7 @@ const OptionTable<DualContouringOptions>& contouring_option_table() {
 DualContouringOptions read(const OptionTable<DualContouringOptions>& table, const ExtractionInput& input) {
   DualContouringOptions options = table.read(input.options);
   options.linear_crossings = !wants_polygons(input);
+  options.caps = input.caps;
   return options;
 }
 

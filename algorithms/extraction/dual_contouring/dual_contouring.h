@@ -22,6 +22,8 @@ struct DualContouringOptions {
   /// How far a point may leave its cell, in voxels, to meet a feature that passes outside: only where no place within
   /// the cell comes near the planes. Larger keeps more of features; 0 holds every point in its cell.
   double reach = 1.0;
+  /// ExtractionInput::caps, for certified extractors.
+  Bounds caps = Bounds::unbounded();
 
   bool needs_normals() const { return placement != Placement::average; }
   /// How far points go from the mass point to the minimiser on smooth surfaces (qef.h).

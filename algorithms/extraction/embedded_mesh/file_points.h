@@ -6,23 +6,35 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "algorithms/core/bounds.h"
 #include "algorithms/lattice/placement.h"
 
 namespace hermesh {
 
-/// Rounds places of index space to what the mesh file will hold. Every test of geometry in this folder looks at
-/// rounded() points, so that what it proves holds for the mesh as written. (An affine map changes no orientation; its
-/// own rounding, some 1e-13 voxels, is far below the margins.)
+/// Rounds places of index space to what the mesh file will hold. Every test of geometry in this folder looks
+/// at rounded() points, so that what it proves holds for the mesh as written. (An affine map changes no
+/// orientation; its own rounding is 2^-29 of the file's, which is an eighth of a margin or less:
+/// CellBlocks::margin().)
 class FilePoints {
  public:
-  explicit FilePoints(const IndexToWorld& placement)
-      : placement_(placement), to_index_(placement.linear.inverse()) {}
+  /// @param placement of the volume
+  /// @param caps box of index coordinates that all points are moved into before they are rounded
+  explicit FilePoints(const IndexToWorld& placement, const Bounds& caps = Bounds::unbounded())
+      : placement_(placement), to_index_(placement.linear.inverse()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      lower_[axis] = caps.lower[axis] - placement.base[axis];
+      upper_[axis] = caps.upper[axis] - placement.base[axis];
+    }
+  }
 
   /// The coordinates that the file holds for a place of index space: world units, relative to the placement's origin.
   Eigen::Vector3f in_file(const Eigen::Vector3d& index) const { return placement_.local(index).cast<float>(); }
-  /// The index coordinates, relative to the placement's base, of the nearest point that the file can hold.
+  /// Returns the index coordinates, relative to the placement's base, of the point nearest to the place that
+  /// the file can hold, after the place was moved into the caps. A place in a cell stays in the cell: each
+  /// cell of the surface has a part within the caps.
   Eigen::Vector3d rounded(const Eigen::Vector3d& index) const {
-    const Eigen::Vector3d written = placement_.origin + in_file(index).cast<double>();
+    const Eigen::Vector3d within = index.cwiseMax(lower_).cwiseMin(upper_);
+    const Eigen::Vector3d written = placement_.origin + in_file(within).cast<double>();
     // The difference is exact, for the origin is zero or several times as far from zero as points are from it.
     return to_index_ * ((written - placement_.origin) - placement_.offset);
   }
@@ -31,6 +43,7 @@ class FilePoints {
  private:
   IndexToWorld placement_;
   Eigen::Matrix3d to_index_;
+  Eigen::Vector3d lower_, upper_;  ///< caps, relative to the placement's base
 };
 
 }  // namespace hermesh
