@@ -26,7 +26,7 @@ double uniform(std::mt19937& random, double low, double high) {
 /// mirror.
 openvdb::math::Transform::Ptr random_map(std::mt19937& random) {
   Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();
-  const double steepest = std::pow(10.0, uniform(random, -1.0, 1.5));
+  const double steepest = std::pow(10.0, uniform(random, 0.0, 3.0));
   const bool is_turned = random() % 2, is_sheared = random() % 4, is_scaled = random() % 2,
              is_shifted = random() % 2;
   if (is_sheared)
@@ -102,7 +102,7 @@ void expect_guarantees(std::uint32_t first, std::uint32_t count, std::uint32_t e
           << promise_verdict(chosen.extractor.promises, judgement.promises);
     }
   }
-  EXPECT_LT(refused, (refused + meshes) / 10);
+  EXPECT_LT(refused, (refused + meshes) / 5);
 }
 
 TEST(AffineVolumes, MeshesDoNotIntersectThemselves) { expect_guarantees(0, 40, 1); }
