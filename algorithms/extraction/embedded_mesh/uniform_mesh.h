@@ -38,8 +38,10 @@
 //                  edge, let p be at (p₁, p₂) and q at (−q₁, q₂), all four at least 7/8 of the margin. Before
 //                  rounding, six times the volume of either part is (p₁q₂ + p₂q₁)/2 ≥ 7/16 margin · s, where
 //                  s = max(p₁ + q₁, p₂ + q₂). An eighth of the margin off the edge along both axes, x changes
-//                  it by 1/4 margin · s at most. A point leaves its cell only if enough room remains. The
-//                  step is at most twice as long as necessary, or 1/2048 voxel; therefore x is in the hull of
+//                  it by 1/4 margin · s at most. In mean placement a point may be at 5/24 of the margin; there
+//                  rounding must be below a nineteenth of the margin, which is not checked. A point leaves its
+//                  cell only if enough room remains. The step is at most twice as long as necessary, or 1/2048
+//                  voxel; therefore x is in the hull of
 //                  the crossing and the four points, or as near to it as that. Fans around cells of several
 //                  sheets or with ambiguous faces are tested instead.
 //   explicit face  The polygons of held cells are tested, too. A held cell whose polygons still meet others
