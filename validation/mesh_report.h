@@ -94,6 +94,15 @@ inline std::string verdict_word(const SolidComparison& solid) {
   return solid.verdict == Verdict::same ? "same" : solid.verdict == Verdict::differs ? "differs" : "unknown";
 }
 
+/// How much of the visible surface of a model a mesh does not show (visible_loss.h). Shares with their 95 % intervals.
+struct VisibleLoss {
+  Estimate lost, vanished, filled;  ///< shares of the visible area of the model; lost is the sum of the other two
+  Estimate invented;                ///< share of the mesh's area
+  double visible_area = 0.0, invented_area = 0.0;  ///< world units²
+  std::optional<Eigen::Vector3d> place, invented_place;  ///< the first sample that vanished, that is invented
+  std::int64_t samples = 0;                              ///< on each surface
+};
+
 struct MeshReport {
   // Counts over the polygons as they stand.
   std::int64_t points = 0, triangles = 0, quads = 0;
@@ -117,6 +126,7 @@ struct MeshReport {
   std::optional<HausdorffBound> certified_to_reference, certified_from_reference;
   std::optional<FeatureDistances> features;
   std::optional<SolidComparison> solid;  ///< compared with the reference's
+  std::optional<VisibleLoss> visible;    ///< compared with the reference; absent where no voxel size is known
 
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
@@ -147,6 +157,7 @@ struct JudgeOptions {
   std::int64_t samples = 200'000;       ///< on each surface, by area, besides every point of it
   bool certify = false;                 ///< certified Hausdorff bound, both ways
   std::int64_t solid_samples = 100'000;  ///< to compare the solid with the reference's; 0 = not at all
+  std::int64_t visible_samples = 20'000;  ///< to measure the visible loss if `voxel_size` is known; 0 = not at all
   double voxel_size = 0.0;              ///< world units, of the volume that the mesh was made from; 0 = unknown
   double certify_gap = 0.0;             ///< world units; 0 = 1e-4 of the reference's diagonal
   const MeshFile* features = nullptr;   ///< reference for the sharp features

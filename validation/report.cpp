@@ -15,6 +15,7 @@
 #include "validation/self_intersection.h"
 #include "validation/solid_comparison.h"
 #include "validation/topology.h"
+#include "validation/visible_loss.h"
 
 namespace hermesh::validation {
 namespace {
@@ -78,6 +79,9 @@ void judge_surface(const MeshFile& mesh, const TriangleSoup& soup, const JudgeOp
   if (options.reference && options.solid_samples > 0)
     report.solid =
         compare_solids(mesh, *options.reference, {options.solid_samples, options.voxel_size}, context);
+  if (options.reference && options.voxel_size > 0.0 && options.visible_samples > 0)
+    report.visible = measure_visible_loss(TriangleSoup(*options.reference, options.reference_quads), soup,
+                                          options.voxel_size, options.visible_samples, context);
   if (options.features) {
     const Stage stage(context, "features");
     report.features = feature_distances(TriangleSoup(*options.features, QuadRule::better), tree,
@@ -118,6 +122,7 @@ class Verdict {
     if (r_.from_reference)
       distance("the reference to the mesh", *r_.from_reference, r_.certified_from_reference);
     if (r_.solid) solid(*r_.solid);
+    if (r_.visible) visible(*r_.visible);
     if (r_.features) features(*r_.features);
     return std::move(out_);
   }
@@ -195,6 +200,23 @@ class Verdict {
     if (bound)
       text += "; the true maximum is between " + number(bound->lower) + " and " + number(bound->upper);
     say(text);
+  }
+
+  void visible(const VisibleLoss& v) {
+    if (v.lost.value == 0.0 && v.invented.value == 0.0)
+      return say("All of the visible surface of the reference is shown, and none was added (" +
+                 std::to_string(v.samples) + " samples on each)");
+    std::string text = percent(v.lost) + " of the visible surface of the reference is not shown within half a voxel";
+    if (v.filled.value > 0.0) text += ", of it " + percent(v.filled) + " where gaps are filled";
+    if (v.place) text += "; the first at " + describe_point(*v.place);
+    if (v.invented.value > 0.0)
+      text += ". " + percent(v.invented) + " of the mesh, an area of " + number(v.invented_area) +
+              ", is farther than a voxel from the reference";
+    say(text);
+  }
+  static std::string percent(const Estimate& share) {
+    return number(100.0 * share.value) + " % (" + number(100.0 * share.lower) + " to " + number(100.0 * share.upper) +
+           ")";
   }
 
   void solid(const SolidComparison& s) {

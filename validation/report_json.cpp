@@ -74,6 +74,13 @@ Json estimate(const Estimate& e) {
   return {{"value", finite_or_null(e.value)}, {"lower", finite_or_null(e.lower)}, {"upper", finite_or_null(e.upper)}};
 }
 
+Json visible_loss(const VisibleLoss& v) {
+  return {{"lost_share", estimate(v.lost)},         {"vanished_share", estimate(v.vanished)},
+          {"filled_share", estimate(v.filled)},     {"invented_share", estimate(v.invented)},
+          {"visible_area", finite_or_null(v.visible_area)}, {"invented_area", finite_or_null(v.invented_area)},
+          {"samples", v.samples}};
+}
+
 Json counts(const MeshReport& r) {
   Json json = {{"points", r.points},
                {"triangles", r.triangles},
@@ -146,6 +153,7 @@ nlohmann::json to_json(const MeshReport& r) {
   if (r.certified_from_reference) json["certified_from_reference"] = bound(*r.certified_from_reference);
   if (r.features) json["features"] = features(*r.features);
   if (r.solid) json["solid"] = to_json(*r.solid);
+  if (r.visible) json["visible_loss"] = visible_loss(*r.visible);
   if (r.self_intersections)
     json["self_intersections"] = {{"disjoint", r.self_intersections->disjoint},
                                   {"vertex_sharing", r.self_intersections->vertex_sharing},

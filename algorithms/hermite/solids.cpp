@@ -54,8 +54,7 @@ SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double 
   return {voxel_size, choose_origin(both)};
 }
 
-SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
-                          RunContext& context) {
+SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const SampleMesh& sample) {
   // The frame is a lattice without rotation; the mesh is voxelized near its zero, and what comes of it is moved back
   // by whole blocks.
   const GridFrame frame{lattice.voxel_size, Eigen::Matrix3d::Identity(), lattice.origin};
@@ -63,19 +62,16 @@ SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice,
   // The lattice stays where it is, and what is said of places is said of the world's.
   framed.mesh.origin = lattice.origin + lattice.voxel_size * Eigen::Vector3d(framed.first[0], framed.first[1],
                                                                              framed.first[2]);
-  const LevelSet about_itself = voxelize(framed.mesh);
-  SampledSolid solid;
-  // Before the grid is moved: crossings are relative to their leaves and move along with these.
-  solid.hermite = sample_polygons(about_itself, 0.0, framed.mesh, context, &solid.sampling);
+  SampledSolid solid = sample(framed.mesh);
   if (solid.hermite.leaves.empty())
     throw Error(
         "it has no inside at this size of voxel: its polygons enclose nothing, or only what is thinner than "
         "a "
         "voxel, so that it cannot be combined");
-  const openvdb::FloatGrid::Ptr grid = about_itself.grid().grid->deepCopy();
+  const openvdb::FloatGrid::Ptr grid = solid.level_set.grid().grid->deepCopy();
   out_of_frame({grid}, frame, framed.first);
   solid.level_set = make_level_set(grid);
-  // Blocks lie at multiples of 8, and `first` is a multiple of more.
+  // Crossings are relative to their leaves. Blocks lie at multiples of 8, and `first` is a multiple of more.
   for (SignLeaf& leaf : solid.hermite.leaves)
     for (std::size_t axis = 0; axis < 3; ++axis) leaf.lower[axis] += framed.first[axis];
   solid.hermite.placement = placement_of(*grid);

@@ -28,14 +28,13 @@ struct SampledSolid {
   PolygonSampling sampling;
 };
 
-/// Makes a level set of polygons with samples at multiples of the voxel size from the mesh's origin.
-using VoxelizeMesh = std::function<LevelSet(const PolygonMesh&)>;
+/// Samples polygons at multiples of the voxel size from the mesh's origin.
+using SampleMesh = std::function<SampledSolid(const PolygonMesh&)>;
 
-/// Voxelizes a mesh where it lies near the lattice's origin as it is, and elsewhere about a sample nearby, so
+/// Samples a mesh where it lies near the lattice's origin as it is, and elsewhere about a sample nearby, so
 /// that single precision is lost by no more than 2⁻¹³ voxels.
 /// @throws Error for a mesh of more than 2³⁰ voxels' distance; if the level set has no sample inside.
-SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const VoxelizeMesh& voxelize,
-                          RunContext& context);
+SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const SampleMesh& sample);
 
 /// A sentence on the crossing edges of a solid that hit no polygon; empty where all hit one.
 std::string missed_edges_note(const PolygonSampling& sampling);

@@ -215,13 +215,17 @@ class BoundedRemesher {
   std::optional<Attempt> attempt(double voxel_size) {
     Voxelization volume =
         voxelize(mesh_, {.voxel_size = voxel_size, .signs = options_.signs, .boundary = true}, context_);
-    if (!volume.is_signed)
+    const bool keeps_thin = options_.thin == ThinRule::keep;
+    if (!volume.is_signed && !keeps_thin)
       throw Error(
           "the polygons give no inside that a distance could be measured to (a note says why); give a sheet "
           "a thickness with hermesh voxelize --signs unsigned and hermesh extract --isovalue");
     const LevelSet level_set = make_level_set(volume.distance);
-    FloatHermite hermite = sample_polygons(level_set, 0.0, mesh_, context_);
+    PolygonSolid made = solid_of(mesh_, level_set, options_.thin, context_);
+    FloatHermite& hermite = made.solid.hermite;
+    result_.thin = made.thin;
     if (hermite.crossings.empty()) return std::nullopt;
+    if (!volume.is_signed) volume.boundary = all_polygons();
     // Points in single precision are then those that such a file holds.
     if (options_.written_in_single) {
       hermite.placement.offset += hermite.placement.origin;
@@ -232,7 +236,8 @@ class BoundedRemesher {
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
     Attempt result{
         voxel_size,
-        std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), turns_, options_.over_holes)),
+        std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), keeps_thin ? std::span<const std::int8_t>() : turns_,
+                                                    options_.over_holes)),
         file,
         FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads), context_),
         {},
@@ -240,6 +245,13 @@ class BoundedRemesher {
     if (result.surface->triangles.empty()) return std::nullopt;
     result.file_points = result.in_file(result.fine.points());
     return result;
+  }
+
+  BoundaryTriangles all_polygons() const {
+    BoundaryTriangles all{mesh_.points, triangulated(mesh_), {}};
+    all.ids.resize(all.triangles.size());
+    std::iota(all.ids.begin(), all.ids.end(), 0);
+    return all;
   }
 
   /// How far the points of a mesh are from the surface, or every `step`-th of them; world units, kFarthest errors where it
@@ -482,7 +494,9 @@ class BoundedRemesher {
     if (!normal.allFinite() || normal.isZero()) return true;  // it has no area
     const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0,
                           step = kOffSurface * extent_ * normal;
-    return (winding_->number().at(middle + step) > 0.5) == (winding_->number().at(middle - step) > 0.5);
+    const bool before = winding_->number().at(middle + step) > 0.5, behind = winding_->number().at(middle - step) > 0.5;
+    // A sheet with nothing on either side is thickened where thin parts are kept.
+    return before == behind && (before || options_.thin != ThinRule::keep);
   }
   /// Whether a triangle of the surface bounds nothing beside one of its corners.
   bool bounds_nothing(const SolidSurface& surface, const Far& at) const {
@@ -595,7 +609,16 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
   if (!(options.error > 0.0) || !std::isfinite(options.error))
     throw Error("the error must be a finite number above 0");
   if (mesh.empty()) throw Error("there are no polygons to remesh");
-  return BoundedRemesher(mesh, options, context).run();
+  const std::size_t notes = context.notes.size();
+  BoundedMesh made = BoundedRemesher(mesh, options, context).run();
+  const bool has_hole = std::ranges::any_of(made.unmet, [](const UnmetPlace& p) { return p.why == Unmet::hole; });
+  if (!has_hole || options.thin != ThinRule::keep || options.signs != SignRule::winding_number) return made;
+  // What is open encloses nothing, then, and becomes a shell.
+  BoundedRemeshOptions open = options;
+  open.signs = SignRule::flood_fill;
+  context.notes.resize(notes);
+  BoundedMesh shell = BoundedRemesher(mesh, open, context).run();
+  return shell.unmet.empty() ? shell : made;
 }
 
 }  // namespace hermesh

@@ -26,6 +26,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/voxelization/sign_rule.h"
 
 namespace hermesh {
@@ -41,6 +42,9 @@ struct BoundedRemeshOptions {
   double most_points = 3e7;
   double smallest_voxel = 0.0;     ///< world units: none is smaller; 0: an eighth of the error
   bool written_in_single = false;  ///< as in ExtractionInput
+  /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin parts and sheets are thickened
+  /// within the error. Holes that may not be closed then make the polygons around them sheets.
+  ThinRule thin = ThinRule::drop;
 };
 
 /// Why a place keeps the bound from being reached.
@@ -68,6 +72,7 @@ struct BoundedMesh {
   bool over_holes = false;        ///< as it was asked for
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
+  std::optional<ThinParts> thin;  ///< what was thickened; none: nothing
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first
 };
 

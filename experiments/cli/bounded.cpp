@@ -61,7 +61,7 @@ void check_bound_options(const CLI::App& command, const BoundArguments& argument
                          const VoxelizeArguments& voxelizing, const std::string& units) {
   refuse_idle(command,
               {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
-               "--isovalue", "--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid"},
+               "--isovalue", "--max-loss", "--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid"},
               "with --error and --triangles the method is chosen for the bound");
   sign_rule(voxelizing);
   if (!arguments.error.empty()) error_in_world_units(arguments.error, units, 1.0);
@@ -97,7 +97,8 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
                                .over_holes = arguments.over_holes,
                                .most_points = arguments.most_points.value_or(arguments.triangles ? 1e6 : 3e7),
                                .smallest_voxel = arguments.smallest_voxel,
-                               .written_in_single = is_written_in_single(paths.out)};
+                               .written_in_single = is_written_in_single(paths.out),
+                               .thin = voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
   if (!arguments.triangles) options.error = error_in_world_units(arguments.error, session.units, diagonal);
   const Stopwatch watch;
   const BoundedMesh made = about_file(paths.in, [&] {
@@ -119,6 +120,7 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
   if (made.hole_area > 0.0) session.context.figure("hole_area", made.hole_area);
   for (const std::string& note : notes(made)) session.context.note(note);
+  note_thin_parts(made.thin, made.voxel_size, session);
   print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "proved: the mesh is within " + text(made.to_surface) +

@@ -50,11 +50,10 @@ double voxel_size(const PolygonMesh& first, const PolygonMesh& second, const Com
 
 SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const SharedLattice& lattice,
                      const CombineArguments& arguments, const ChosenVoxelizer& chosen, Session& session) {
-  const auto voxelized = [&](const PolygonMesh& framed) {
-    return voxelize(framed, file, arguments.voxelizing, chosen, session);
+  const auto sample = [&](const PolygonMesh& framed) {
+    return sample_polygons(framed, file, arguments.voxelizing, chosen, session).solid;
   };
-  SampledSolid solid =
-      about_file(file, [&] { return sample_solid(mesh, lattice, voxelized, session.context); });
+  SampledSolid solid = about_file(file, [&] { return sample_solid(mesh, lattice, sample); });
   if (const std::string note = missed_edges_note(solid.sampling); !note.empty())
     session.context.note("'" + file + "': " + note);
   return solid;

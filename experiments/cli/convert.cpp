@@ -1,5 +1,6 @@
 // hermesh extract, remesh: level set to mesh, and polygons to level set and back to a mesh in one.
 #include <algorithm>
+#include <charconv>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -28,6 +29,7 @@ struct ExtractArguments {
   std::string ends = "closed";
   std::string attributes;  ///< names of grids to sample, or "all"; empty: none
   AdaptivityArguments adaptivity;
+  std::string max_loss;  ///< a share with %; empty: not given
 };
 
 void add_extract_options(CLI::App& command, ExtractArguments& arguments, const std::string& fallback) {
@@ -51,18 +53,22 @@ std::vector<std::string> attribute_names(const std::string& list) {
 
 /// The volume's mesh by the chosen extractor; messages name `paths.in`.
 PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
-                    const ChosenExtractor& chosen, const ExtractArguments& arguments, Session& session) {
+                    const FloatHermite* hermite, const ChosenExtractor& chosen, const ExtractArguments& arguments,
+                    Session& session) {
   const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);
   const std::string& input = paths.in;
   check_written_precision(paths.out, level_set);
   const Stopwatch watch;
+  // A thickened solid has Hermite data of its own, and no ends.
+  const bool thickened = hermite && !source;
   const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
   EndedMesh ended = about_file(input, [&] {
     return hermesh::extract(level_set, source,
                             {.chosen = chosen,
                              .isovalue = arguments.isovalue,
-                             .ends = treatment,
+                             .ends = thickened ? std::nullopt : std::optional(treatment),
                              .field = field ? &*field : nullptr,
+                             .hermite = hermite,
                              .written_in_single = is_written_in_single(paths.out)},
                             session.context);
   });
@@ -73,7 +79,7 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
     throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
   if (mesh.empty())
     throw Error("'" + input + "': " +
-                no_surface(level_set, arguments.isovalue, source != nullptr, chosen.extractor.name));
+                no_surface(level_set, arguments.isovalue, source || hermite, chosen.extractor.name));
   if (const std::string note = ends_note(ended.ends, treatment); !note.empty()) session.context.note(note);
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;
@@ -90,7 +96,7 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
     source = read_polygons(arguments.source, session);
   }
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  PolygonMesh mesh = extract(paths, level_set, source ? &*source : nullptr, chosen, arguments, session);
+  PolygonMesh mesh = extract(paths, level_set, source ? &*source : nullptr, nullptr, chosen, arguments, session);
   if (!attributes.empty()) {
     std::string line = "attributes";
     for (const std::string& name : sample_attributes(mesh, paths.in, attributes, session.context))
@@ -101,17 +107,61 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
   return kDone;
 }
 
+/// The mesh of what the samples show of the polygons.
+PolygonMesh remesh_shown(const Paths& paths, const PolygonMesh& mesh, const VoxelizeArguments& voxelizing,
+                         const ChosenVoxelizer& voxelizer, const ExtractArguments& extracting,
+                         const ChosenExtractor& chosen, Session& session) {
+  const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
+  return extract(paths, level_set, &mesh, nullptr, chosen, extracting, session);
+}
+
+/// The mesh of all of the polygons, of which thin parts are thickened.
+PolygonMesh remesh_all(const Paths& paths, const PolygonMesh& mesh, const VoxelizeArguments& voxelizing,
+                       const ChosenVoxelizer& voxelizer, const ExtractArguments& extracting,
+                       const ChosenExtractor& chosen, Session& session) {
+  const PolygonSolid made = sample_polygons(mesh, paths.in, voxelizing, voxelizer, session);
+  if (made.thin && chosen.options.is("crossings", "exact"))
+    throw UsageError("-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
+                     "--thin drop");
+  const bool from_polygons = chosen.options.is("hermite", "auto") || chosen.options.is("hermite", "exact");
+  if (const std::string note = missed_edges_note(made.solid.sampling); from_polygons && !note.empty())
+    session.context.note(note);
+  return extract(paths, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, chosen, extracting,
+                 session);
+}
+
+/// The share of the visible surface that may be lost. @throws UsageError
+double most_loss(const std::string& text, ThinRule rule) {
+  // What is dropped by choice is not to go unnoticed.
+  if (text.empty()) return rule == ThinRule::drop ? 0.01 : 1.0;
+  double percent = 0.0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), percent);
+  if (failure != std::errc() || std::string(end, text.data() + text.size()) != "%" || !(percent >= 0.0 && percent <= 100.0))
+    throw UsageError("--max-loss must be a percentage such as 1%, not '" + text + "'");
+  return percent / 100.0;
+}
+
 int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const ExtractArguments& extracting,
                Session& session) {
   const ChosenVoxelizer voxelizer = choose_voxelizer(voxelizing);
   const ChosenExtractor chosen = choose_extractor(extracting.variant);
   check_mesh_output(paths.out);
+  const ThinRule rule = thin_rule(voxelizing, voxelizer, extracting.isovalue);
+  // A limit holds for the loss that the user chose.
+  const double max_loss = most_loss(extracting.max_loss, voxelizing.thin ? rule : ThinRule::keep);
   const PolygonMesh mesh = read_polygons(paths.in, session);
-  const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  const PolygonMesh made = extract(paths, level_set, &mesh, chosen, extracting, session);
+  const PolygonMesh made = rule == ThinRule::drop
+                               ? remesh_shown(paths, mesh, voxelizing, voxelizer, extracting, chosen, session)
+                               : remesh_all(paths, mesh, voxelizing, voxelizer, extracting, chosen, session);
   note_components(mesh, made, session);
+  // Other isovalues, and parts that a mask leaves out, are not meant to show the polygons.
+  const bool is_of_polygons = extracting.isovalue == 0.0 && extracting.adaptivity.mask.empty() &&
+                              extracting.adaptivity.frustum.empty() && !voxelizer.options.is("signs", "unsigned");
+  const bool shows =
+      !is_of_polygons ||
+      check_visible_loss(mesh, made, *recipe_of(mesh, paths.in, voxelizing, voxelizer).voxel_size, max_loss, session);
   save(paths.out, made, session);
-  return kDone;
+  return shows ? kDone : kNotMet;
 }
 
 }  // namespace
@@ -153,6 +203,9 @@ void add_conversions(CLI::App& app, Session& session) {
   add_json_option(*command, session);
   CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
   add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
+  command->add_option("--max-loss", arguments->extracting.max_loss,
+                      "Exit with 3 if more of the visible surface than this is lost, such as 1% (default: no limit, or 1% "
+                      "with --thin drop)");
   add_bound_options(*command, *size, arguments->bound);
   command->callback([arguments, command, &session] {
     session.command = [arguments, command, &session] {

@@ -1,5 +1,7 @@
 #include "experiments/cli/extracting.h"
 
+#include <cmath>
+
 #include "algorithms/core/disjoint_sets.h"
 #include "algorithms/io/mesh_units.h"
 #include "experiments/cli/cli11.h"
@@ -10,6 +12,7 @@
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
 #include "experiments/harness/harness.h"
+#include "validation/visible_loss.h"
 
 namespace hermesh::cli {
 
@@ -72,6 +75,32 @@ void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Sessi
 
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session) {
   (session.units.empty() ? write_mesh : write_mesh_in_metres)(path, mesh, session.context);
+}
+
+bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size, double max_loss,
+                        Session& session) {
+  constexpr std::int64_t kSamples = 10'000;
+  const MeshFile model = to_mesh_file(polygons), file = to_mesh_file(mesh);
+  const validation::VisibleLoss loss = validation::measure_visible_loss(
+      validation::TriangleSoup(model), validation::TriangleSoup(file), voxel_size, kSamples, session.context);
+  made(session, "visible_loss", loss.lost.value);
+  made(session, "visible_loss_interval", std::vector<double>{loss.lost.lower, loss.lost.upper});
+  made(session, "visible_filled", loss.filled.value);
+  made(session, "invented_share", loss.invented.value);
+  made(session, "invented_area", loss.invented_area);
+  const auto percent = [](double share) { return text(100.0 * std::round(1e5 * share) / 1e5) + " %"; };
+  const auto interval = [&](const validation::Estimate& share) {
+    return percent(share.value) + " (" + percent(share.lower) + " to " + percent(share.upper) + ")";
+  };
+  if (loss.lost.value > 0.0)
+    session.context.note(interval(loss.lost) + " of the visible surface is not shown within half a voxel" +
+                         (loss.filled.value > 0.0 ? ", of it " + percent(loss.filled.value) + " where gaps are filled" : ""));
+  if (loss.invented.value > 0.0)
+    session.context.note(interval(loss.invented) + " of the mesh, an area of " + text(loss.invented_area) +
+                         ", is farther than a voxel from all polygons, as where holes are closed");
+  if (loss.lost.value <= max_loss) return true;
+  session.context.note("more than " + percent(max_loss) + " of the visible surface is lost (--max-loss)");
+  return false;
 }
 
 void save(const std::string& path, const PolygonMesh& mesh, Session& session) {

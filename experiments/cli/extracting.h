@@ -30,6 +30,11 @@ void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Sessi
 
 /// Writes the mesh, with the unit of its coordinates if --units says it and the format has a place for it.
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);
+/// Measures how much of the visible surface of the polygons the mesh does not show (validation/visible_loss.h), and notes
+/// it. Returns true if the share is at most `max_loss`. @param voxel_size world units
+bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size, double max_loss,
+                        Session& session);
+
 /// Writes the mesh as write_output() does; from then on a signal is too late.
 void save(const std::string& path, const PolygonMesh& mesh, Session& session);
 

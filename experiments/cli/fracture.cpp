@@ -53,10 +53,10 @@ FractureObject read_object(const FractureArguments& arguments, std::optional<Pol
   const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
   source = read_polygons(arguments.paths.in, session, {.attributes = true});
   object.source = &*source;
-  object.level_set = voxelize(*source, arguments.paths.in, arguments.voxelizing, chosen, session);
-  object.hermite = arguments.hermite == "level-set"
-                       ? sample_level_set(object.level_set, 0.0, session.context)
-                       : sample_polygons(object.level_set, 0.0, *source, session.context);
+  PolygonSolid made = sample_polygons(*source, arguments.paths.in, arguments.voxelizing, chosen, session);
+  object.level_set = std::move(made.solid.level_set);
+  object.hermite = arguments.hermite == "level-set" ? sample_level_set(object.level_set, 0.0, session.context)
+                                                    : std::move(made.solid.hermite);
   return object;
 }
 

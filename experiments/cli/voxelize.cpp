@@ -97,6 +97,27 @@ VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& 
       [&](const VoxelizeOptions& asked) { return thesis_voxelization(input, of_thesis, asked.nearest); }, input.context);
 }
 
+/// Replaces the level set, and the Hermite data if there are any, by those in which thin parts are thickened.
+void keep_thin_parts(VolumeOutputs& outputs, const VolumeRequest& request, const PolygonMesh& mesh, ThinRule rule,
+                     Session& session) {
+  if (rule == ThinRule::drop || !request.sdf) return;
+  // Without signs the distances are a grid "udf".
+  const auto named = [&](const std::string& name) {
+    return std::ranges::find_if(outputs.grids, [&](const auto& grid) { return grid->getName() == name; });
+  };
+  auto grid = named("sdf");
+  if (grid == outputs.grids.end()) grid = named("udf");
+  const auto distances = openvdb::gridPtrCast<openvdb::FloatGrid>(*grid);
+  const double voxel_size = distances->voxelSize().x();
+  PolygonSolid made = solid_of(mesh, make_level_set(distances), rule, session.context);
+  note_thin_parts(made.thin, voxel_size, session);
+  if (!made.thin) return;
+  *grid = made.solid.level_set.grid().grid->deepCopy();
+  if (outputs.hermite) outputs.hermite = std::move(made.solid.hermite);
+  if (outputs.grids.size() > 1)
+    session.context.note("only the level set and the Hermite data have the thickened parts, the other grids have not");
+}
+
 /// Makes the grids of the request by a voxelizer that knows which triangle is nearest, and writes them.
 void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, const ChosenVoxelizer& chosen,
                    Session& session) {
@@ -116,7 +137,9 @@ void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, cons
   const VoxelizationInput input =
       voxelization_input(mesh, recipe_of(mesh, paths.in, voxelizing, chosen), session.context);
   const Stopwatch watch;
-  const VolumeOutputs outputs = outputs_by(chosen.voxelizer.name, input, request);
+  const ThinRule rule = thin_rule(voxelizing, chosen);
+  VolumeOutputs outputs = outputs_by(chosen.voxelizer.name, input, request);
+  about_file(paths.in, [&] { keep_thin_parts(outputs, request, mesh, rule, session); });
   if (voxelizing.like) out_of_frame(outputs.grids, frame, first);
   session.context.check();
   Json names = Json::array();
@@ -124,7 +147,7 @@ void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, cons
   made(session, "grids", names);
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
   for (const openvdb::GridBase::Ptr& grid : outputs.grids)
-    if (grid->getName() == "sdf")
+    if (rule == ThinRule::drop && grid->getName() == "sdf")
       note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), chosen, session);
   write_volume_outputs(paths.out, outputs, session.context);
   print_summary(session, "wrote " + paths.out + ": " + names_of_grids(outputs.grids));

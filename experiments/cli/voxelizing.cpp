@@ -73,6 +73,11 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
       "How the voxelizer hermesh finds the inside: auto (the default), flood-fill, winding-number, or "
       "unsigned for none; short for --voxelizer-option signs=...");
   command
+      .add_option("--thin", arguments.thin,
+                  "What becomes of walls, wires and open sheets that are too thin for the voxels: keep (the default) "
+                  "thickens them until they show, drop loses them, refuse is an error")
+      ->check(CLI::IsMember({"keep", "drop", "refuse"}));
+  command
       .add_option("--voxelizer-option", arguments.options,
                   "key=value, an option of the voxelizer, see hermesh list; may be repeated")
       ->allow_extra_args(false);
@@ -148,8 +153,36 @@ LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const Voxeli
   LevelSet level_set = hermesh::voxelize(mesh, recipe, session.context);
   session.context.check();
   print_voxelized(session, file, input, level_set.active_voxels(), chosen.voxelizer.name, watch.seconds());
-  note_lost_surface(mesh, level_set, chosen, session);
+  if (thin_rule(arguments, chosen) == ThinRule::drop) note_lost_surface(mesh, level_set, chosen, session);
   return level_set;
+}
+
+ThinRule thin_rule(const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen, double isovalue) {
+  if (arguments.thin == "drop") return ThinRule::drop;
+  const char* reason = chosen.voxelizer.name != "hermesh"               ? "the voxelizer is not hermesh"
+                       : chosen.options.is("signs", "unsigned")         ? "distances without sign have no inside"
+                       : isovalue != 0.0 ? "the surface of the isovalue is not that of the polygons"
+                                         : nullptr;
+  if (reason && arguments.thin) throw UsageError("--thin " + *arguments.thin + " has no effect: " + reason);
+  if (reason) return ThinRule::drop;
+  return arguments.thin == "refuse" ? ThinRule::refuse : ThinRule::keep;
+}
+
+void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session) {
+  made(session, "thickened_share", thin ? thin->thickened_area / thin->area : 0.0);
+  made(session, "thickened_by", thin ? thin->thickest : 0.0);
+  made(session, "thinnest_wall", thin ? thin->thinnest_wall : 0.0);
+  made(session, "merged_share", thin ? thin->merged_area / thin->area : 0.0);
+  if (thin) session.context.note(thin_note(*thin, voxel_size));
+}
+
+PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                             const ChosenVoxelizer& chosen, Session& session) {
+  const LevelSet level_set = voxelize(mesh, file, arguments, chosen, session);
+  PolygonSolid made =
+      about_file(file, [&] { return solid_of(mesh, level_set, thin_rule(arguments, chosen), session.context); });
+  note_thin_parts(made.thin, level_set.voxel_size(), session);
+  return made;
 }
 
 void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const ChosenVoxelizer& chosen,

@@ -8,6 +8,7 @@
 
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/core/variant.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "experiments/cli/session.h"
 #include "experiments/pipeline.h"
 
@@ -26,6 +27,7 @@ struct VoxelizeArguments {
   std::string voxelizer = "hermesh";
   std::optional<std::string> signs;  ///< value of the voxelizer's option `signs`, which it is a shorthand for
   std::vector<std::string> options;  ///< key=value
+  std::optional<std::string> thin;   ///< keep, drop or refuse; none: keep where that is possible
 };
 
 /// Adds the input and the output, and registers them as files of these kinds (session.h); `many` lets the command run on
@@ -58,6 +60,18 @@ VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const std::string& file, const
 /// voxelization_input() and the voxelizer do.
 LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
                   const ChosenVoxelizer& chosen, Session& session);
+
+/// Returns what becomes of thin parts: what was asked for, or else to keep them where that is possible.
+/// @throws UsageError if thin parts cannot be kept but that was asked for
+ThinRule thin_rule(const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen, double isovalue = 0.0);
+
+/// Voxelizes the mesh of `file` as voxelize() does and samples its polygons, with thin parts as thin_rule() says, and
+/// notes what was thickened.
+PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                             const ChosenVoxelizer& chosen, Session& session);
+
+/// Notes what of the polygons was thickened; nothing if `thin` is empty.
+void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session);
 
 /// Notes what of the polygons passes between the samples.
 void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const ChosenVoxelizer& chosen,

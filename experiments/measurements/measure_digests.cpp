@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <sstream>
 
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/variants.h"
@@ -232,10 +233,10 @@ class Digests {
         for (Eigen::Vector3f& point : other.points) point += shift;
         const SharedLattice lattice = shared_lattice(mesh(), other, voxel_size());
         const auto sampled = [&](const PolygonMesh& solid) {
-          const auto voxelize_it = [&](const PolygonMesh& framed) {
-            return voxelized(framed, "hermesh", {}, 3.0, child);
+          const auto sample = [&](const PolygonMesh& framed) {
+            return solid_of(framed, voxelized(framed, "hermesh", {}, 3.0, child), ThinRule::drop, child).solid;
           };
-          return sample_solid(solid, lattice, voxelize_it, child);
+          return sample_solid(solid, lattice, sample);
         };
         const CombinedSolid made = combine(boolean, sampled(mesh()), sampled(other), child);
         return digest_of_text(digest(made.level_set) + digest(made.hermite));

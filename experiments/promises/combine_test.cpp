@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/variants.h"
@@ -194,7 +195,9 @@ class Pairs {
   SampledSolid sampled(const PolygonMesh& mesh) {
     const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = lattice_.voxel_size};
     return sample_solid(
-        mesh, lattice_, [&](const PolygonMesh& framed) { return voxelize(framed, recipe, context_); }, context_);
+        mesh, lattice_, [&](const PolygonMesh& framed) {
+          return solid_of(framed, voxelize(framed, recipe, context_), ThinRule::drop, context_).solid;
+        });
   }
   PolygonMesh contour(Boolean boolean, const SampledSolid& a, const SampledSolid& b) {
     const CombinedSolid result = combine(boolean, a, b, context_);

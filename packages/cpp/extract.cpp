@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
@@ -182,10 +183,11 @@ Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOpti
     const SharedLattice lattice =
         shared_lattice(first, second, voxel_size_of(second_is_longer ? second : first, voxelizing));
     const auto sampled = [&](const PolygonMesh& mesh, const std::string& name) {
-      const auto voxelized = [&](const PolygonMesh& framed) {
-        return level_set_of(framed, lattice.voxel_size, voxelizing, voxelizer, inner);
+      const auto sample = [&](const PolygonMesh& framed) {
+        const LevelSet level_set = level_set_of(framed, lattice.voxel_size, voxelizing, voxelizer, inner);
+        return solid_of(framed, level_set, ThinRule::drop, inner).solid;
       };
-      SampledSolid solid = about_file(name, [&] { return sample_solid(mesh, lattice, voxelized, inner); });
+      SampledSolid solid = about_file(name, [&] { return sample_solid(mesh, lattice, sample); });
       if (const std::string note = missed_edges_note(solid.sampling); !note.empty())
         inner.note(name + ": " + note);
       return solid;
