@@ -192,13 +192,29 @@ class Ledger {
         std::none_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface < 0; });
     const bool some_cut =
         std::any_of(entries_.begin(), entries_.end(), [](const Entry& e) { return e.surface > 0; });
-    ledger_.gaps_can_be_judged = (all_tagged && (some_cut || is_complete())) || are_far_apart();
+    ledger_.gaps_can_be_judged =
+        (all_tagged && (some_cut || is_complete() || is_on_whole())) || are_far_apart();
   }
 
   /// Whether the pieces' volumes add up to the whole's: the volume of a gap would be missing.
   bool is_complete() const {
     return expected_.whole &&
            std::abs(ledger_.pieces_volume - *expected_.whole) <= 1e-9 * std::abs(*expected_.whole);
+  }
+
+  /// Returns whether all triangles lie near the uncut surface, by their corners and middles: pieces that
+  /// touch in edges have no cut between them.
+  bool is_on_whole() const {
+    if (!(expected_.reach > 0.0) || !expected_.surface) return false;
+    const TriangleSoup whole(*expected_.surface);
+    if (whole.triangles.empty()) return false;
+    const TriangleTree tree(whole);
+    const auto is_near = [&](const Vector3d& p) {
+      return tree.closest(p).squared <= expected_.reach * expected_.reach;
+    };
+    return std::ranges::all_of(points_, is_near) && std::ranges::all_of(triangles_, [&](const Triangle& t) {
+             return is_near((points_[t[0]] + points_[t[1]] + points_[t[2]]) / 3.0);
+           });
   }
 
   /// Whether no two pieces can ever have been one. A gap that a fracture leaves is narrower than the cells

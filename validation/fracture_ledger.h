@@ -12,10 +12,13 @@
 
 namespace hermesh::validation {
 
-/// The volumes that those of the pieces are compared with, as far as they are known (world units).
+/// What the pieces are compared with, as far as it is known (world units).
 struct ExpectedVolumes {
   std::optional<double> whole;  ///< volume of the uncut object's mesh
   std::vector<double> pieces;   ///< recorded volume of each piece; empty if there are no records
+  const MeshFile* surface = nullptr;  ///< the uncut object's mesh
+  double reach =
+      0.0;  ///< how far the original surface of a piece may be from `surface`; 0 if that is not known
 };
 
 /// What was found about all pieces of a fracture together.
@@ -23,7 +26,8 @@ struct FractureLedger {
   std::int64_t pieces = 0, triangles = 0;
   /// Whether gaps between several pieces would show: the tags tell what was cut, or there is no need to know,
   /// because each triangle is matched, or the pieces are so far apart that no two of them were one, or
-  /// nothing was cut and nothing of the whole is missing.
+  /// nothing was cut: nothing of the whole is missing, or all of the pieces' surface is near the whole's, in
+  /// which the walls of a gap are not.
   bool gaps_can_be_judged = true;
 
   // Triangles with the same three points, compared exactly, in any order.

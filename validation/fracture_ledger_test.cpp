@@ -86,6 +86,23 @@ TEST(FractureLedger, DoesNotBalanceWhereNothingIsSaidToBeCut) {
   }
 }
 
+TEST(FractureLedger, AcceptsPiecesThatTouchInAnEdgeIfTheyFollowTheWhole) {
+  const std::vector<MeshFile> pieces = {cuboid({0, 0, 0}, {1, 1, 1}, false, false),
+                                        cuboid({1, 1, 0}, {2, 2, 1}, false, false)};
+  MeshFile whole = pieces[0];
+  for (const Triangle& t : pieces[1].triangles) whole.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
+  whole.points.insert(whole.points.end(), pieces[1].points.begin(), pieces[1].points.end());
+  // The volume of the whole is not that of the pieces: nothing else tells that they have no gap.
+  EXPECT_FALSE(judged(pieces, {.whole = 2.1, .pieces = {}}).is_consistent());
+  const FractureLedger ledger = judged(pieces, {.whole = 2.1, .pieces = {}, .surface = &whole, .reach = 0.1});
+  EXPECT_TRUE(ledger.is_consistent()) << first_sentence(ledger);
+  // The walls of a gap lie within the whole.
+  const MeshFile bar = cuboid({0, 0, 0}, {3, 1, 1}, false, false);
+  const std::vector<MeshFile> parted = {cuboid({0, 0, 0}, {1, 1, 1}, false, false),
+                                        cuboid({1.01, 0, 0}, {3, 1, 1}, false, false)};
+  EXPECT_FALSE(judged(parted, {.whole = 3.0, .pieces = {}, .surface = &bar, .reach = 0.1}).is_consistent());
+}
+
 TEST(FractureLedger, NeedsNoTagsWhereNoGapCanBe) {
   std::vector<MeshFile> one = {cuboid({0, 0, 0}, {1, 1, 1}, false, false)};
   remove_tags(one);

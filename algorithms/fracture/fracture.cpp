@@ -148,16 +148,16 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
   return records;
 }
 
-/// Two pieces that meet across a face only have no seam there, but a gap.
-void note_gaps(const LabelledSolid& solid, RunContext& context) {
-  const auto gaps = std::ranges::count_if(solid.joined_faces, [&](const LabelledSolid::JoinedFace& face) {
-    return solid.label(face.samples[0]) != solid.label(face.samples[1]);
-  });
-  if (gaps > 0)
-    context.note(
-        "At " + std::to_string(gaps) + (gaps == 1 ? " place" : " places") +
-        " the object is too thin for a seam: pieces come apart there with a gap of less than a voxel. "
-        "Smaller voxels leave fewer.");
+/// Counts the faces across which two pieces hang together, but have no seam, and notes those that leave a
+/// gap. Parts that touch in an edge have none.
+void count_gaps(const LabelledSolid& solid, LabelledFracture& result, RunContext& context) {
+  for (const LabelledSolid::JoinedFace& face : solid.joined_faces)
+    if (solid.label(face.samples[0]) != solid.label(face.samples[1]))
+      ++(face.touches ? result.touches : result.gaps);
+  if (result.gaps == 0) return;
+  context.note("At " + std::to_string(result.gaps) + (result.gaps == 1 ? " place" : " places") +
+               " the object is too thin for a seam: pieces come apart there with a gap of less than a voxel. "
+               "Smaller voxels leave fewer.");
 }
 
 }  // namespace
@@ -205,7 +205,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     result.cutters = records_of(solid, grid, cutters, result.merged);
     result.mesh = joint_mesh(grid, options.placement, context);
   } while (!result.mesh.meeting_joints.empty());
-  note_gaps(solid, context);
+  count_gaps(solid, result, context);
   // Decimation comes last, for its patches are those of the final labels. The counts above are of the
   // lattice.
   decimate_joint_mesh(result.mesh, options.tolerance, context);

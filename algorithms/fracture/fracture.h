@@ -73,6 +73,9 @@ struct LabelledFracture {
   /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's surface
   /// passes (LabelledGrid).
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
+  /// Faces across which the object's mesh joins two pieces that have no seam there: those at which a gap is
+  /// left, and those at which the pieces touch in an edge.
+  std::uint64_t gaps = 0, touches = 0;
   std::size_t grid_bytes = 0;  ///< memory of labels, codes and crossings
 
   /// The pieces have the numbers 1 to piece_count().

@@ -1,9 +1,16 @@
 #include "algorithms/fracture/joint_decimation.h"
 
+#include <algorithm>
+
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
 
 namespace hermesh {
 namespace {
+
+/// Share of a shell's volume that decimation may change.
+constexpr double kMostChange = 0.01;
+/// The share of a tolerance that is tried next, and the least one in voxels, below which it is 0.
+constexpr float kLower = 0.25f, kLeastTolerance = 1.0f / 64;
 
 /// Whether two triangles belong to one patch: the same two pieces on the same sides, the same cutter.
 bool same_patch(const EdgeSides& a, const EdgeSides& b) {
@@ -31,8 +38,26 @@ void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context)
   const FineMesh fine(mesh.points, mesh.triangles, context);
   // Where more than two triangles share an edge its ends lie on a rim, and rims are pinned: that is what
   // decimate_certified() asks of a complex of patches.
-  const std::vector<float> asked(mesh.points.size(), static_cast<float>(tolerance));
-  CertifiedMesh coarse = decimate_certified(fine, asked, rims(mesh), file, context);
+  std::vector<TrianglePieces> pieces;
+  for (const EdgeSides& side : mesh.sides) pieces.push_back({side.back, side.front});
+  const ShellVolumes shells(fine, pieces);
+  const std::vector<std::uint8_t> pinned = rims(mesh);
+  std::vector<float> asked(mesh.points.size(), static_cast<float>(tolerance));
+  CertifiedMesh coarse;
+  // A part that is not much thicker than the tolerance could lose most of its volume within it. This ends,
+  // for a part whose tolerance is 0 does not change.
+  for (;;) {
+    coarse = decimate_certified(fine, asked, pinned, file, context, {}, pieces);
+    const std::vector<std::uint8_t> changed =
+        shells.changed(coarse.points, coarse.triangles, coarse.fine_triangle, kMostChange);
+    if (std::ranges::find(changed, 1) == changed.end()) break;
+    std::vector<std::uint8_t> lowers(asked.size());
+    for (std::uint32_t t = 0; t < pieces.size(); ++t)
+      if (shells.is_in(changed, t))
+        for (const std::uint32_t p : fine.triangles()[t]) lowers[p] = 1;
+    for (std::size_t p = 0; p < asked.size(); ++p)
+      if (lowers[p]) asked[p] = kLower * asked[p] < kLeastTolerance ? 0.0f : kLower * asked[p];
+  }
   std::vector<EdgeSides> sides;
   // A coarse triangle is a fine one whose corners went elsewhere, within its patch: it keeps its sides.
   for (const std::uint32_t t : coarse.fine_triangle) sides.push_back(mesh.sides[t]);

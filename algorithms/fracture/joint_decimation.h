@@ -11,8 +11,9 @@ namespace hermesh {
 /// are, so merging never crosses a change of labels, and a seam has the same triangles on both of its sides
 /// because it is there only once. The guarantees of JointMesh hold afterwards, too, and neither mesh, the one
 /// before or the one after, has a place farther than `tolerance` voxels (and 0.005) from the other
-/// (certified_decimation.h). A tolerance of 0 leaves the mesh as it is. The result has the same bytes at any
-/// thread count. @throws Cancelled.
+/// (certified_decimation.h). Each connected part of a piece's boundary keeps its sign and 99 % of its volume:
+/// where merging would change it by more, the tolerance is lowered for that part. A tolerance of 0 leaves the
+/// mesh unchanged. The result has the same bytes at any thread count. @throws Cancelled.
 void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context);
 
 }  // namespace hermesh

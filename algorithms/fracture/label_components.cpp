@@ -134,7 +134,7 @@ class Components {
   /// label_sheets.h cuts their inside corners off.
   std::vector<std::array<LabelledSolid::Place, 2>> samples_of_joined_faces() const {
     std::vector<std::array<LabelledSolid::Place, 2>> result;
-    for (const auto& [samples, cells] : solid_.joined_faces)
+    for (const auto& [samples, cells, touches] : solid_.joined_faces)
       if (std::ranges::none_of(
               cells, [&](const LabelledSolid::Place& cell) { return has_cut(corner_labels(solid_, cell)); }))
         result.push_back(samples);

@@ -1,5 +1,7 @@
 #include "algorithms/fracture/labelled_grid.h"
 
+#include <Eigen/LU>
+
 #include "algorithms/core/parallel.h"
 #include "algorithms/fracture/label_repair.h"
 
@@ -114,9 +116,19 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
   return made_up;
 }
 
+/// Returns the number of a crossing edge, in the order of fill_block().
+std::size_t LabelledGrid::number_of(std::int32_t block, int sample, int axis) const {
+  const auto b = static_cast<std::size_t>(block);
+  return first_[b] + solid_.blocks[b].rank(axis, sample);
+}
+
 EdgeCrossing LabelledGrid::crossing(std::int32_t block, int sample, int axis) const {
-  // The same order as in fill_block().
-  return crossings_[first_[static_cast<std::size_t>(block)] + solid_.blocks[static_cast<std::size_t>(block)].rank(axis, sample)];
+  return crossings_[number_of(block, sample, axis)];
+}
+
+std::array<std::uint32_t, 2> LabelledGrid::pieces(std::int32_t block, int sample, int axis) const {
+  const EdgeSides& sides = sides_[number_of(block, sample, axis)];
+  return {sides.back, sides.front};
 }
 
 bool LabelledGrid::is_of_one_piece(std::int32_t block, int cell, int face) const {
@@ -135,6 +147,36 @@ std::size_t LabelledGrid::memory_bytes() const {
          sheets + solid_.labels.memory_bytes() +
          solid_.codes.memory_bytes();
 }
+
+namespace {
+
+/// Returns whether the surface leaves nothing but a point of a face between its two inside corners, as where
+/// the solid touches itself in an edge: whether the lines in which the planes of the crossings beside either
+/// corner meet the face intersect in one point of the face.
+bool touches_in_a_point(const CellBlocks& cells, std::int32_t block, int cell, int face, int inside) {
+  constexpr double kNear = 0.01;  // voxels
+  const std::array<int, 4> edges = face_edges(face);
+  const int u = ((face >> 1) + 1) % 3, v = ((face >> 1) + 2) % 3;
+  const Eigen::Vector3d lower = cells.corner(block, cell);
+  const auto tip = [&](int corner) {
+    Eigen::Matrix2d normals;
+    Eigen::Vector2d distances;
+    for (int i = 0; i < 2; ++i) {
+      const CellBlocks::Edge edge = cells.edge_of_cell(block, cell, edges[(corner + 3 * i) % 4]);
+      const EdgeCrossing crossing = cells.grid().crossing(edge.block, edge.sample, edge.axis);
+      const Eigen::Vector3d point = cells.crossing_point(edge, crossing) - lower;
+      normals.row(i) << crossing.normal[u], crossing.normal[v];
+      distances[i] = normals.row(i).dot(Eigen::Vector2d(point[u], point[v]));
+    }
+    return Eigen::Vector2d(normals.inverse() * distances);
+  };
+  // Two walls that face each other at a small angle have one line of intersection, too, but far away. That of
+  // parallel ones is not finite, and near nothing.
+  const Eigen::Vector2d first = tip(inside), second = tip(inside + 2);
+  return (first - second).norm() < kNear && first.minCoeff() > -kNear && first.maxCoeff() < 1.0 + kNear;
+}
+
+}  // namespace
 
 void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                        RunContext& context) {
@@ -160,8 +202,9 @@ void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const 
         // Corner i lies between edges i − 1 and i of the face: a segment that joins these cuts it off.
         const bool is_cut_off = sheets.partner[face][edges[inside]] == edges[(inside + 3) % 4];
         if (!is_cut_off)
-          found[b].push_back(
-              {{moved(corners[inside]), moved(corners[inside + 2])}, {moved(0), moved(1 << (face >> 1))}});
+          found[b].push_back({{moved(corners[inside]), moved(corners[inside + 2])},
+                              {moved(0), moved(1 << (face >> 1))},
+                              touches_in_a_point(cells, block, cell, face, inside)});
       }
     });
   });

@@ -37,6 +37,7 @@ class LabelledGrid : public CellGrid {
   std::span<const std::array<BlockMask, 3>> cuts() const override { return cuts_; }
   std::span<const SheetsOfBlock> joint_sheets() const override { return joint_sheets_; }
   bool is_of_one_piece(std::int32_t block, int cell, int face) const override;
+  std::array<std::uint32_t, 2> pieces(std::int32_t block, int sample, int axis) const override;
 
   /// The two sides of a crossing edge, by its number in the order of blocks, axes and samples.
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
@@ -45,6 +46,7 @@ class LabelledGrid : public CellGrid {
   std::size_t memory_bytes() const;
 
  private:
+  std::size_t number_of(std::int32_t block, int sample, int axis) const;
   void find_edges(RunContext& context);
   std::uint64_t fill_block(std::size_t b, const FloatHermite& hermite, const Cutters& cutters);
 

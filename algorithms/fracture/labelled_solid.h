@@ -73,6 +73,7 @@ struct LabelledSolid {
   struct JoinedFace {
     std::array<Place, 2> samples;  ///< the inside corners
     std::array<Place, 2> cells;    ///< on either side of the face
+    bool touches = false;  ///< the corners' parts of the solid have nothing but an edge in common there
   };
   std::vector<JoinedFace> joined_faces;  ///< empty until find_joined_faces() of labelled_grid.h fills it
 

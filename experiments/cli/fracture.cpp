@@ -102,8 +102,18 @@ void note_idle_cutters(const FractureSummary& summary, Session& session) {
                          " more cutters cut nothing; pieces.json has the state of each");
 }
 
+/// Returns why the pieces of the method `labelled`, which keeps volumes at any tolerance, may hold less than
+/// the uncut mesh.
+std::string cause_of_loss(const FractureSummary& summary) {
+  const std::string thin = "parts thinner than two voxels end in a sharp edge at cuts";
+  if (!summary.labelled || summary.labelled->gaps + summary.labelled->touches == 0) return thin;
+  const std::string apart = "pieces that the uncut mesh joins along an edge come apart there";
+  return summary.labelled->cut_edges == 0 ? apart : apart + ", and " + thin;
+}
+
 /// Whether the pieces are right by themselves; a loss of volume is said in a note, as it is of surfaces.
-bool report_ledger(const validation::FractureLedger& ledger, Session& session) {
+bool report_ledger(const validation::FractureLedger& ledger, const FractureSummary& summary,
+                   Session& session) {
   std::vector<std::string> lines = ledger.sentences();
   for (const std::string& place : ledger.places) lines.push_back("  " + place);
   lines.push_back("original surface: " + std::to_string(ledger.rest_triangles) + " triangles, volume " + text(ledger.rest_volume) +
@@ -117,9 +127,9 @@ bool report_ledger(const validation::FractureLedger& ledger, Session& session) {
     for (const std::string& line : lines) std::cout << line << '\n';
   if (ledger.lost_a_piece()) {
     const double difference = 100.0 * *ledger.expected_difference;
-    session.context.note("the pieces hold " + text(std::abs(difference)) + " % " + (difference < 0 ? "less" : "more") +
-                         " than the uncut mesh: parts thinner than two voxels end in a sharp edge at cuts; "
-                         "smaller voxels keep them");
+    session.context.note("the pieces hold " + text(std::abs(difference)) + " % " +
+                         (difference < 0 ? "less" : "more") +
+                         " than the uncut mesh: " + cause_of_loss(summary) + "; smaller voxels keep them");
   }
   return ledger.is_consistent();
 }
@@ -177,8 +187,9 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
   summarise(summary, session);
   note_idle_cutters(summary, session);
   const bool balances =
-      !arguments.judge ||
-      report_ledger(folder.judge(session.context, uncut_volume(object, session.context)), session);
+      !arguments.judge || report_ledger(folder.judge(session.context, uncut_mesh(object, session.context),
+                                                     reach_of_pieces(object, arguments.method, summary)),
+                                        summary, session);
   folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
   work_is_finished();
   return balances ? kDone : kNotMet;
@@ -226,10 +237,11 @@ void add_fracture(CLI::App& app, Session& session) {
   command->add_option("--method", arguments->method.name, "labelled, thesis or openvdb (default: labelled)")
       ->check(CLI::IsMember({"labelled", "thesis", "openvdb"}));
   command
-      ->add_option("--tolerance", arguments->method.tolerance,
-                   "labelled: how far the pieces may be from their finest meshes, in voxels; thesis: the root of its QEF "
-                   "threshold, in voxels: cells merge while the sum of their squared distances to all planes is below "
-                   "its square; openvdb: its adaptivity (default: 0, nothing is merged)")
+      ->add_option(
+          "--tolerance", arguments->method.tolerance,
+          "labelled: how far the pieces may be from their finest meshes, in voxels, or less where more than 1 % "
+          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge while the sum of their squared distances to all planes is below "
+          "its square; openvdb: its adaptivity (default: 0, nothing is merged)")
       ->check(finite_number());
   command
       ->add_option("--rule", arguments->rule,

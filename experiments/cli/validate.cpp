@@ -144,8 +144,8 @@ void add_validate(CLI::App& app, Session& session) {
       "--require", arguments->require,
       "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "
       "watertight (all of these, no-self-intersection, and no component inside out), no-self-intersection, "
-      "solid (bounds the solid of the --reference: no inner wall taken for an outer one, no part lost or added); with --reference, watertight asks "
-      "that the solid is no other, too");
+      "solid (bounds the solid of the --reference: no inner wall taken for an outer one, no part lost or added); "
+      "with --reference, watertight asks that the solid is no other, too");
   command
       ->add_option("--voxel-size", arguments->voxel_size,
                    "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "algorithms/fracture/mass_properties.h"
 #include "algorithms/io/mesh_file.h"
 #include "experiments/pictures/render.h"
 #include "experiments/pictures/viewpoint.h"
@@ -130,12 +131,14 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
   sketches_.push_back({std::move(piece.mesh), place});
 }
 
-validation::FractureLedger FractureFolder::judge(RunContext& context,
-                                                 std::optional<double> uncut_volume) const {
+validation::FractureLedger FractureFolder::judge(RunContext& context, const PolygonMesh& uncut,
+                                                 double reach) const {
   std::vector<MeshFile> files;
   for (std::uint32_t piece = 1; piece <= sketches_.size(); ++piece)
     files.push_back(read_mesh_file(folder_.path() / file_name(piece), context, {.attributes = true}));
-  validation::ExpectedVolumes expected{uncut_volume, {}};
+  const MeshFile surface = to_mesh_file(uncut);
+  validation::ExpectedVolumes expected{.pieces = {}, .surface = &surface, .reach = reach};
+  if (!uncut.empty()) expected.whole = mass_properties(uncut).volume;
   for (const Json& piece : pieces_) expected.pieces.push_back(piece.at("volume").get<double>());
   return validation::judge_fracture(files, context, expected);
 }

@@ -28,9 +28,10 @@ class FractureFolder {
   void commit(nlohmann::ordered_json head, const FractureSummary& summary, bool picture, RunContext& context);
 
   /// Reads the pieces' files back and judges them, also against the volumes that were recorded when they
-  /// were added, and against that of the uncut object's mesh if it is given. @throws Error for a file
-  /// that cannot be read; Cancelled
-  validation::FractureLedger judge(RunContext& context, std::optional<double> uncut_volume = {}) const;
+  /// were added, and against the uncut object's mesh if it is given. `reach` is how far from that the
+  /// original surface of the pieces may be. @throws Error for a file that cannot be read; Cancelled
+  validation::FractureLedger judge(RunContext& context, const PolygonMesh& uncut = {},
+                                   double reach = 0.0) const;
 
   /// Name of the file of piece number `piece`, which counts from 1 on.
   static std::string file_name(std::uint32_t piece);

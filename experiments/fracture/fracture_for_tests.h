@@ -87,12 +87,13 @@ inline std::vector<PolygonMesh> pieces_of(const LabelledFracture& fracture) {
   return result;
 }
 
-inline validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces, std::optional<double> whole = {}) {
+inline validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces,
+                                         const validation::ExpectedVolumes& expected = {}) {
   RunContext context;
   std::vector<MeshFile> files;
   for (const PolygonMesh& piece : pieces) files.push_back(to_mesh_file(piece));
   for (std::size_t i = 0; i < pieces.size(); ++i) files[i].attributes = pieces[i].attributes;
-  return validation::judge_fracture(files, context, {whole, {}});
+  return validation::judge_fracture(files, context, expected);
 }
 
 inline std::string text(const validation::FractureLedger& ledger) {

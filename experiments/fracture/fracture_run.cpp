@@ -1,7 +1,9 @@
 #include "experiments/fracture/fracture_run.h"
 
+#include <Eigen/Eigenvalues>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
@@ -122,11 +124,20 @@ void check_method(const FractureMethod& method) {
     throw Error("the tolerance of openvdb is its adaptivity, from 0 to 1");
 }
 
+PolygonMesh uncut_mesh(const FractureObject& object, RunContext& context) {
+  if (object.hermite.leaves.empty()) return {};
+  return manifold_dual_contouring(view_of(object.hermite, context), {.tolerance = 0.0, .uniform = {}},
+                                  nullptr, context);
+}
+
 double uncut_volume(const FractureObject& object, RunContext& context) {
-  if (object.hermite.leaves.empty()) return 0.0;
-  const PolygonMesh uncut = manifold_dual_contouring(view_of(object.hermite, context),
-                                                     {.tolerance = 0.0, .uniform = {}}, nullptr, context);
-  return mass_properties(uncut).volume;
+  return mass_properties(uncut_mesh(object, context)).volume;
+}
+
+double reach_of_pieces(const FractureObject& object, const FractureMethod& method,
+                       const FractureSummary& summary) {
+  if (!summary.labelled || summary.labelled->gaps > 0) return 0.0;
+  return (std::numbers::sqrt3 + method.tolerance) * object.hermite.placement.linear.operatorNorm();
 }
 
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,

@@ -18,8 +18,9 @@ struct FractureObject {
   const PolygonMesh* source = nullptr;  ///< whose attributes the pieces take over; null: none
 };
 
-/// Volume of the object's mesh before it is broken, at tolerance 0 (cubic world units); 0 if no sample
-/// is inside. @throws Cancelled.
+/// The object's mesh before it is broken, at tolerance 0; empty if no sample is inside. @throws Cancelled.
+PolygonMesh uncut_mesh(const FractureObject& object, RunContext& context);
+/// Volume of uncut_mesh() (cubic world units); 0 if no sample is inside. @throws Cancelled.
 double uncut_volume(const FractureObject& object, RunContext& context);
 
 struct FractureMethod {
@@ -39,6 +40,12 @@ struct FractureSummary {
   double seconds =
       0.0;  ///< time of the method itself: neither handing pieces over nor making polygons of OpenVDB's cutters
 };
+
+/// How far the pieces' original surface may be from uncut_mesh(), in world units: where pieces part, points
+/// are placed again within their cells. 0 if that is not known: for other methods than `labelled`, and if
+/// pieces come apart with a gap in place of a seam.
+double reach_of_pieces(const FractureObject& object, const FractureMethod& method,
+                       const FractureSummary& summary);
 
 /// Breaks the object by the method and hands its pieces over, one after the other.
 /// @throws Error for a method that does not exist, or a tolerance that it does not take; Cancelled.

@@ -9,6 +9,7 @@
 #include <ostream>
 
 #include "algorithms/core/error.h"
+#include "algorithms/fracture/cutter_words.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
@@ -17,13 +18,13 @@
 #include "algorithms/lattice/simd/simd_level.h"
 #include "experiments/cases/cases.h"
 #include "experiments/cases/recipes.h"
-#include "algorithms/fracture/cutter_words.h"
 #include "experiments/fracture/fracture_for_tests.h"
 #include "experiments/fracture/fracture_run.h"
 #include "experiments/fracture/fracture_tags.h"
 #include "experiments/fracture/fracture_trials.h"
 #include "experiments/harness/harness.h"
 #include "experiments/pipeline.h"
+#include "experiments/promises/solids_for_tests.h"
 #include "validation/fracture_ledger.h"
 
 namespace hermesh {
@@ -185,15 +186,52 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
 
 /// The books of a fracture of polygons, made as the program makes it by default.
 validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
-                                     std::uint64_t seed, RunContext& context) {
+                                     std::uint64_t seed, RunContext& context, double tolerance = 0.0) {
   const LevelSet level_set =
       voxelize(mesh, {.chosen = choose(all_voxelizers(), "hermesh"), .resolution = longest}, context);
   const FloatHermite object = sample_polygons(level_set, 0.0, mesh, context);
   CutterChoices choices;
   choices.seed = seed;
   const MadeCutters made = make_cutters(parse_cutters(cutters), object, choices, context);
-  const LabelledFracture fracture = labelled_fracture(object, *made.cutters, {}, context);
-  return judged(pieces_of(fracture), uncut_volume({object, level_set}, context));
+  FractureMethod method;
+  method.tolerance = tolerance;
+  std::vector<PolygonMesh> pieces;
+  const FractureSummary summary = run_fracture(
+      {object, level_set}, made, method,
+      [&](PieceOutput&& piece) { pieces.push_back(std::move(piece.mesh)); }, context);
+  const MeshFile uncut = to_mesh_file(uncut_mesh({object, level_set}, context));
+  return judged(pieces, {.whole = uncut_volume({object, level_set}, context),
+                         .pieces = {},
+                         .surface = &uncut,
+                         .reach = reach_of_pieces({object, level_set}, method, summary)});
+}
+
+/// The cubes of edge length 3 at the places, which have corners in common.
+PolygonMesh cubes(const std::vector<Vector3d>& places) {
+  MeshFile file;
+  for (const Vector3d& place : places) {
+    const auto first = std::uint32_t(file.points.size());
+    const MeshFile cube = to_mesh_file(test_solids::cuboid(3.0 * place, Vector3d::Constant(3.0)));
+    file.points.insert(file.points.end(), cube.points.begin(), cube.points.end());
+    for (const Triangle& t : cube.triangles)
+      file.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return to_polygon_mesh(file);
+}
+
+TEST(FractureOfPolygons, PiecesThatTouchInEdgesPassTheJudge) {
+  const PolygonMesh checkerboard = cubes({{0, 0, 0}, {1, 1, 0}, {2, 0, 0}, {0, 2, 0}, {2, 2, 0}});
+  const PolygonMesh stairs = cubes({{0, 0, 0}, {1, 0, 1}, {2, 0, 0}, {1, 1, 0}, {2, 2, 0}, {2, 1, 1}});
+  for (const PolygonMesh* mesh : {&checkerboard, &stairs})
+    for (const char* cutters : {"planes:1,0,0,3;0,1,0,6", "planes:1,0,0,6;0,1,0,3;0,0,1,3", "voronoi:8"})
+      for (const double longest : {18.0, 30.0})
+        for (const double tolerance : {0.0, 1.0}) {
+          RunContext context;
+          const validation::FractureLedger ledger = ledger_of(*mesh, longest, cutters, 0, context, tolerance);
+          EXPECT_GE(ledger.pieces, 2);
+          EXPECT_TRUE(ledger.is_consistent())
+              << cutters << " " << longest << " " << tolerance << ": " << text(ledger);
+        }
 }
 
 TEST(FractureOfPolygons, BalancesWhereNormalsJoinTwoPiecesAcrossAFace) {
@@ -241,6 +279,35 @@ TEST(FractureOfPolygons, AGapInPlaceOfASeamFailsTheJudgeAndIsNoted) { EXPECT_EQ(
 
 TEST(Slow, FracturesOfRandomSolidsBalance) {
   std::printf("gaps in place of seams: %d\n", expect_balance(1000, 200));
+}
+
+TEST(FractureOfATube, EachPieceKeepsItsVolumeAtAnyTolerance) {
+  // A ring as thick as three voxels, of which a tolerance of 1 leaves no wall.
+  const FloatHermite object = sampled(
+      {.value = [](const Vector3d& p) { return std::hypot(std::hypot(p.x(), p.y()) - 12.0, p.z()) - 1.6; },
+       .gradient =
+           [](const Vector3d& p) {
+             const double r = std::hypot(p.x(), p.y()), out = (r - 12.0) / r;
+             return Vector3d(out * p.x(), out * p.y(), p.z());
+           }},
+      {20, 20, 20});
+  RunContext context;
+  const auto cutters = cutters_of("voronoi", object, 5);
+  const auto volumes = [&](double tolerance) {
+    FractureOptions options;
+    options.tolerance = tolerance;
+    std::vector<double> result;
+    for (const PolygonMesh& piece : pieces_of(labelled_fracture(object, *cutters, options, context)))
+      result.push_back(mass_properties(piece).volume);
+    return result;
+  };
+  const std::vector<double> right = volumes(0.0);
+  for (const double tolerance : {0.2, 0.5, 1.0, 3.0}) {
+    const std::vector<double> kept = volumes(tolerance);
+    ASSERT_EQ(kept.size(), right.size());
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      EXPECT_NEAR(kept[i], right[i], 0.0101 * right[i]) << tolerance;
+  }
 }
 
 TEST(FractureOfABox, CutByTwoPlanesIsExact) {

@@ -98,7 +98,8 @@ class FractureBooks {
     SampledSubject made = sample_subject(mesh, longest, input_, input_.parameters.text("voxelizer"));
     conversion_ = made.hermite_seconds;
     FractureObject object = std::move(made.object);
-    uncut_volume_ = uncut_volume(object, child);
+    uncut_ = uncut_mesh(object, child);
+    uncut_volume_ = mass_properties(uncut_).volume;
     return object;
   }
 
@@ -142,7 +143,8 @@ class FractureBooks {
           folder.add(std::move(piece), child);
         },
         child);
-    const validation::FractureLedger ledger = folder.judge(child, uncut_volume_);
+    const validation::FractureLedger ledger = folder.judge(
+        child, uncut_, reach_of_pieces(object, {.tolerance = tolerance, .options = {}}, summary));
     // The printed pieces are kept, too, for their picture.
     if (method == "labelled" || (method == "thesis" && named.rule == ThesisFractureOptions::Rule::printed))
       folder.commit({{"object", subject.source}, {"seed", input_.seed}}, summary, true, child);
@@ -231,6 +233,7 @@ class FractureBooks {
 
   const MeasurementInput& input_;
   double conversion_ = 0.0, uncut_volume_ = 0.0;
+  PolygonMesh uncut_;
   std::optional<DistanceOracle> tag_oracle_;  ///< of the subject's input
   Eigen::Vector3d tag_origin_ = Eigen::Vector3d::Zero();
   bool order_cutters_ = false;

@@ -99,12 +99,12 @@ class FractureGuarantee {
   /// An object and its mesh before it is broken; some have no sample inside, and nothing to break.
   struct Subject {
     FractureObject object;
-    double uncut_volume = 0.0;
+    PolygonMesh uncut;
   };
   Subject subject_of(const PolygonMesh& mesh, double longest) const {
     RunContext child = child_context(input_.context, false);
     Subject subject{sample_subject(mesh, longest, input_).object};
-    subject.uncut_volume = uncut_volume(subject.object, child);
+    subject.uncut = uncut_mesh(subject.object, child);
     return subject;
   }
 
@@ -159,10 +159,13 @@ class FractureGuarantee {
       choices.seed = seed;
       const MadeCutters made = make_cutters(parse_cutters(cutters), subject.object.hermite, choices, child);
       FractureFolder folder(input_.out / "pieces", bounds_of(subject.object.hermite));  // removed with it
+      const FractureMethod method;
       const FractureSummary summary = run_fracture(
-          subject.object, made, {}, [&](PieceOutput&& piece) { folder.add(std::move(piece), child); }, child);
-      const validation::FractureLedger ledger = folder.judge(child, subject.uncut_volume);
-      sum.add(ledger, summary, subject.uncut_volume);
+          subject.object, made, method, [&](PieceOutput&& piece) { folder.add(std::move(piece), child); },
+          child);
+      const validation::FractureLedger ledger =
+          folder.judge(child, subject.uncut, reach_of_pieces(subject.object, method, summary));
+      sum.add(ledger, summary, mass_properties(subject.uncut).volume);
       if (ledger.is_consistent()) return;
       for (const std::string& sentence : ledger.sentences())
         row.broken.push_back("seed " + std::to_string(seed) + ": " + sentence);

@@ -207,16 +207,22 @@ struct Painter {
     return colour;
   }
 
+  /// Returns the mean of the samples of a pixel, or the first one if the last one has the same colour, as on
+  /// a flat face in the light.
   std::uint32_t pixel_colour(int column, int row) const {
-    Vector3f sum = Vector3f::Zero();
-    for (int i = 0; i < kSamplesPerAxis * kSamplesPerAxis; ++i) {
+    constexpr int kSamples = kSamplesPerAxis * kSamplesPerAxis;
+    const auto at = [&](int i) {
       const float x =
           static_cast<float>(column) + (static_cast<float>(i % kSamplesPerAxis) + 0.5f) / kSamplesPerAxis;
       const float y =
           static_cast<float>(row) + (static_cast<float>(i / kSamplesPerAxis) + 0.5f) / kSamplesPerAxis;
-      sum += sample(x, y, hashed(static_cast<std::uint32_t>((row * view.width + column) * 16 + i)));
-    }
-    return packed(sum / (kSamplesPerAxis * kSamplesPerAxis));
+      return sample(x, y, hashed(static_cast<std::uint32_t>((row * view.width + column) * 16 + i)));
+    };
+    const Vector3f first = at(0), last = at(kSamples - 1);
+    if (first == last) return packed(first);
+    Vector3f sum = first;
+    for (int i = 1; i < kSamples - 1; ++i) sum += at(i);
+    return packed((sum + last) / kSamples);
   }
 };
 
