@@ -86,6 +86,18 @@ std::vector<std::set<std::uint32_t>> find_neighbours(const BlockTable& table, co
   return neighbours;
 }
 
+/// Takes out of `regions_left` those that are as small as a pocket and touch the outside.
+void leave_out_folds(const std::vector<std::set<std::uint32_t>>& neighbours, const Regions& regions,
+                     std::vector<char>& regions_left) {
+  constexpr int kLargestFold = 64;  // voxels
+  std::vector<int> size(regions.count);
+  for (const auto& [voxels, region] : regions.components)
+    if (size[region] <= kLargestFold) size[region] += count(voxels);
+  for (std::uint32_t region = 0; region < regions.count; ++region)
+    if (size[region] <= kLargestFold && neighbours[region].contains(Regions::kOutside))
+      regions_left[region] = 0;
+}
+
 }  // namespace
 
 void open_cavities(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
@@ -93,14 +105,17 @@ void open_cavities(const IndexSoup& soup, const TriangleBins& bins, const Band& 
                    RunContext& context) {
   const std::vector<std::optional<Wall>> walls = find_walls(band, regions);
   // From within a solid the first wall is seen from behind. Where that is so in all regions, as nearly
-  // always, none is a void.
+  // always, none is a void; nor are folds of the surface, which are small and open to the outside.
+  std::vector<char> faced(regions.count);
   CellObstacles obstacles(soup, bins, 1);
-  const bool all_solid = std::ranges::none_of(walls, [&](const std::optional<Wall>& wall) {
-    if (!wall) return false;
-    const Vector3d from = side_place(wall->voxel);
-    return obstacles.first_met(from, from + Vector3d::Unit(wall->axis)).faces_from;
-  });
-  if (all_solid || !winding().usable()) return;
+  for (std::uint32_t region = 0; region < regions.count; ++region) {
+    if (!walls[region]) continue;
+    const Vector3d from = side_place(walls[region]->voxel);
+    faced[region] = obstacles.first_met(from, from + Vector3d::Unit(walls[region]->axis)).faces_from;
+  }
+  if (std::ranges::find(faced, 1) == faced.end()) return;
+  leave_out_folds(find_neighbours(bins.blocks(), band, regions, faced), regions, faced);
+  if (std::ranges::find(faced, 1) == faced.end() || !winding().usable()) return;
   const std::optional<WindingNumber> inward = winding().inward();
   if (!inward) return;
   const auto place = [&](std::uint32_t region) { return side_place(walls[region]->voxel); };
