@@ -240,8 +240,9 @@ void add_fracture(CLI::App& app, Session& session) {
       ->add_option(
           "--tolerance", arguments->method.tolerance,
           "labelled: how far the pieces may be from their finest meshes, in voxels, or less where more than 1 % "
-          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge while the sum of their squared distances to all planes is below "
-          "its square; openvdb: its adaptivity (default: 0, nothing is merged)")
+          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge while "
+          "the sum of their squared distances to all planes is below its square; openvdb: its adaptivity "
+          "(default: 0, nothing is merged)")
       ->check(finite_number());
   command
       ->add_option("--rule", arguments->rule,

@@ -16,6 +16,9 @@ using Eigen::Vector3d;
 using Json = nlohmann::ordered_json;
 
 constexpr int kPixels = 900;
+/// Up to this number of triangles the pieces have few details, and a smaller picture shows them in half the time.
+constexpr std::size_t kFewTriangles = 20'000;
+constexpr int kFewPixels = 640;
 /// How many triangles are drawn as they are; the pieces beyond are sketched, so that a picture takes little
 /// memory.
 constexpr std::size_t kExact = 3'000'000;
@@ -170,7 +173,7 @@ void FractureFolder::draw(const std::string& title, RunContext& context) const {
   const Vector3d middle = 0.5 * (object_.lower + object_.upper);
   Sheet sheet;
   sheet.title = title;
-  sheet.cell_pixels = kPixels;
+  sheet.cell_pixels = drawn_triangles_ <= kFewTriangles ? kFewPixels : kPixels;
   const auto shift = [&](const Sketch& sketch) { return Vector3d(kExplosion * (sketch.centre - middle)); };
   for (const Sketch& sketch : sketches_) {
     const Bounds box = bounds(sketch.mesh);
