@@ -140,7 +140,7 @@ validation::FractureLedger FractureFolder::judge(RunContext& context, const Poly
   for (std::uint32_t piece = 1; piece <= sketches_.size(); ++piece)
     files.push_back(read_mesh_file(folder_.path() / file_name(piece), context, {.attributes = true}));
   const MeshFile surface = to_mesh_file(uncut);
-  validation::ExpectedVolumes expected{.pieces = {}, .surface = &surface, .reach = reach};
+  validation::ExpectedVolumes expected{.whole = {}, .pieces = {}, .surface = &surface, .reach = reach};
   if (!uncut.empty()) expected.whole = mass_properties(uncut).volume;
   for (const Json& piece : pieces_) expected.pieces.push_back(piece.at("volume").get<double>());
   return validation::judge_fracture(files, context, expected);
