@@ -99,7 +99,7 @@ class FractureGuarantee {
   /// An object and its mesh before it is broken; some have no sample inside, and nothing to break.
   struct Subject {
     FractureObject object;
-    PolygonMesh uncut;
+    PolygonMesh uncut = {};
   };
   Subject subject_of(const PolygonMesh& mesh, double longest) const {
     RunContext child = child_context(input_.context, false);
