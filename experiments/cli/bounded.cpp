@@ -46,7 +46,7 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
       "there is to the surface on which the winding number is 1/2");
   group
       ->add_option("--limit-points", arguments.most_points,
-                   "Points of the finest mesh at most (default: 3e7, some 9 GiB, with --error, and 1e6 in each "
+                   "Points of the finest mesh at most (default: 3e7, some 9 GiB, with --error, and 4e5 in each "
                    "try with --triangles); the bound is refused where it needs more")
       ->check(CLI::Range(1e3, 1e9));
   group
@@ -95,7 +95,7 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   const double diagonal = bounds(mesh).size().norm();
   BoundedRemeshOptions options{.signs = sign_rule(voxelizing),
                                .over_holes = arguments.over_holes,
-                               .most_points = arguments.most_points.value_or(arguments.triangles ? 1e6 : 3e7),
+                               .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
                                .smallest_voxel = arguments.smallest_voxel,
                                .written_in_single = is_written_in_single(paths.out),
                                .thin = voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
