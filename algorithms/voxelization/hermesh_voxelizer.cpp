@@ -12,6 +12,7 @@ SignRule sign_rule(const Options& options) {
   if (options.is("signs", "flood-fill")) return SignRule::flood_fill;
   if (options.is("signs", "winding-number")) return SignRule::winding_number;
   if (options.is("signs", "unsigned")) return SignRule::none;
+  if (options.is("signs", "auto-sheets")) return SignRule::automatic_sheets;
   return SignRule::automatic;
 }
 
@@ -24,8 +25,8 @@ std::vector<OptionSpec> hermesh_voxelizer_options() {
        .fallback = "auto",
        .help =
            "inside is what infinity cannot reach, or what the polygons wind around; auto floods, and winds "
-           "where the flood leaks in",
-       .choices = {"auto", "flood-fill", "winding-number", "unsigned"}}};
+           "where the flood leaks in; auto-sheets does not wind where that would close large holes",
+       .choices = {"auto", "auto-sheets", "flood-fill", "winding-number", "unsigned"}}};
 }
 
 VoxelizeOptions voxelize_options(const VoxelizationInput& input) {

@@ -116,6 +116,10 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
     const Voxelizer voxelizer = find_variant(all_voxelizers(), arguments.voxelizer);
     std::vector<std::string> options = arguments.options;
     if (arguments.signs) options.push_back("signs=" + *arguments.signs);
+    // Where thin parts are kept, so are open sheets.
+    const bool has_signs = std::ranges::any_of(options, [](const auto& o) { return o.starts_with("signs="); });
+    if (voxelizer.name == "hermesh" && !has_signs && arguments.thin.value_or("keep") == "keep")
+      options.push_back("signs=auto-sheets");
     return ChosenVoxelizer{voxelizer, parse_options(voxelizer.name, voxelizer.options, options)};
   });
 }

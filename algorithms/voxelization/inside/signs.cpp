@@ -1,5 +1,6 @@
 #include "algorithms/voxelization/inside/signs.h"
 
+#include <Eigen/Geometry>
 #include <optional>
 
 #include "algorithms/core/parallel.h"
@@ -96,11 +97,31 @@ bool leaked(const std::vector<OpenEdge>& open, const WindingNumber& winding) {
   return false;
 }
 
+/// Caps with a larger share of the polygons' area close more than the holes of a solid.
+constexpr double kMostCapped = 0.015;
+
+/// Area of triangles, voxels².
+double area_of(const TriangleCorners& c) {
+  const Eigen::Map<const Eigen::Vector3d> p(c.data()), q(c.data() + 3), r(c.data() + 6);
+  return 0.5 * (q - p).cross(r - p).norm();
+}
+double area_of(const std::vector<TriangleCorners>& triangles) {
+  double area = 0.0;
+  for (const TriangleCorners& t : triangles) area += area_of(t);
+  return area;
+}
+double area_of(const IndexSoup& soup) {
+  double area = 0.0;
+  for (std::size_t i = 0; i < soup.size(); ++i) area += area_of(soup.corners(i));
+  return area;
+}
+
 }  // namespace
 
 Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins, const Band& band,
                  double reach, RunContext& context) {
   Signs signs;
+  const bool is_automatic = rule == SignRule::automatic || rule == SignRule::automatic_sheets;
   Regions regions = find_regions(bins.blocks(), band.crossed, context);
   std::optional<OrientedWinding> winding;
   // Winding numbers are made when first asked for: a closed mesh never needs them.
@@ -119,11 +140,11 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
     leaks = !flood.leaks.empty() && wound().usable() && leaked(flood.leaks, wound().number());
   };
   if (rule != SignRule::winding_number) {
-    if (rule == SignRule::automatic) flood_from_infinity();
+    if (is_automatic) flood_from_infinity();
     // Pockets only make the outside larger: what leaks without them leaks with them, and there may be thousands.
     if (!leaks) {
       open_pockets(soup, bins, band.blocks, regions, context);
-      if (rule == SignRule::automatic) open_cavities(soup, bins, band, wound, regions, context);
+      if (is_automatic) open_cavities(soup, bins, band, wound, regions, context);
       flood_from_infinity();
     }
     if (rule == SignRule::flood_fill) return signs;
@@ -132,22 +153,28 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   }
   if (!wound().usable()) {
     // Faces that cancel can still enclose something.
-    if (rule == SignRule::automatic && flood.share > 0.5) return signs;
+    if (rule == SignRule::automatic_sheets || (rule == SignRule::automatic && flood.share > 0.5)) return signs;
     // Nobody gets signs that are made up: voxelize() gives distances alone.
     context.note(std::string("The distances have no sign: ") + explanation(wound().orientation().verdict) + ".");
     signs.inside.clear();
     signs.usable = false;
     return signs;
   }
-  if (rule == SignRule::automatic) {
-    if (!leaks) return signs;
-    context.note(
-        "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
-  }
+  if (is_automatic && !leaks) return signs;
   const Orientation& orientation = wound().orientation();
   // A surface of which every edge has two faces has no rim for a cap to begin at.
   const bool open = orientation.boundary_edges + orientation.non_manifold_edges > 0;
-  return winding_signs(wound().number(), bins.blocks(), band, regions, open, reach, context);
+  Signs by_number = winding_signs(wound().number(), bins.blocks(), band, regions, open, reach, context);
+  if (rule == SignRule::automatic_sheets && area_of(by_number.caps) > kMostCapped * area_of(soup)) {
+    context.note("the polygons have holes too large to be closed, so open parts are sheets that enclose nothing");
+    open_pockets(soup, bins, band.blocks, regions, context);
+    flood_from_infinity();
+    return signs;
+  }
+  if (is_automatic)
+    context.note(
+        "Flooding leaks in through holes of the mesh, so the signs are those of its winding numbers.");
+  return by_number;
 }
 
 }  // namespace hermesh
