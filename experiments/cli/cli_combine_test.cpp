@@ -78,7 +78,10 @@ TEST_F(CombineTest, WhatIsLostBetweenSamplesIsSaid) {
 TEST_F(CombineTest, AnOperandWithoutInsideIsRefused) {
   write_box("a.off", -1.0, 1.0);
   write("sheet.off", "OFF\n4 1 0\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n4 0 1 2 3\n");
-  const Outcome outcome = run({"combine", "union", "a.off", "sheet.off", "out.ply", "--voxel-size", "0.1"});
+  const std::vector<std::string> keep = {"combine", "union", "a.off", "sheet.off", "kept.ply", "--voxel-size", "0.1"};
+  EXPECT_EQ(run(keep).exit_code, 0) << "an open sheet becomes a shell";
+  const Outcome outcome =
+      run({"combine", "union", "a.off", "sheet.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("'sheet.off': it has no inside"), std::string::npos) << outcome.err;
   EXPECT_EQ(run({"combine", "union", "a.off", "a.off", "out.ply", "--voxel-size", "0.1", "--signs", "unsigned"})

@@ -287,10 +287,57 @@ TEST_F(CliTest, ManyNewComponentsAreANote) {
   }
   faces += "4 3 2 1 0\n4 316 317 318 319\n";
   write("beads.off", "OFF\n320 " + std::to_string(4 * 79 + 2) + " 0\n" + points + faces);
-  const Outcome outcome = run({"remesh", "beads.off", "out.ply", "--voxel-size", "0.23"});
+  const Outcome outcome =
+      run({"remesh", "beads.off", "out.ply", "--voxel-size", "0.23", "--thin", "drop", "--max-loss", "100%"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("note: the mesh has 20 components and the polygons have 1:"), std::string::npos) << outcome.err;
   EXPECT_EQ(run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.2"}).err.find("components"), std::string::npos);
+}
+
+TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
+  // A square without thickness, and a plate of a fifth of a voxel.
+  write("sheet.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
+  write("plate.off",
+        "OFF\n8 6 0\n0 0 0.003\n1 0 0.003\n1 1 0.003\n0 1 0.003\n0 0 0.013\n1 0 0.013\n1 1 0.013\n0 1 0.013\n"
+        "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  for (const std::string in : {"sheet.off", "plate.off"}) {
+    SCOPED_TRACE(in);
+    const auto remesh = [&](const std::vector<std::string>& more) {
+      std::vector<std::string> arguments = {"remesh", in, "out.ply", "--voxel-size", "0.05"};
+      arguments.insert(arguments.end(), more.begin(), more.end());
+      return run(arguments);
+    };
+    const Outcome kept = remesh({"--json"});
+    ASSERT_EQ(kept.exit_code, 0) << kept.err;
+    const Json result = Json::parse(kept.out).at("result");
+    EXPECT_GT(result.at("thickened_share").get<double>(), 0.9);
+    EXPECT_NEAR(result.at("thickened_by").get<double>(), in == "sheet.off" ? 0.06 : 0.05, 1e-3);
+    EXPECT_EQ(result.at("visible_loss").get<double>(), 0.0);
+    EXPECT_EQ(run({"validate", "out.ply", "--require", "watertight"}).exit_code, 0);
+    // What is dropped leaves nothing here, and what is refused is named.
+    EXPECT_EQ(remesh({"--thin", "drop"}).exit_code, 1);
+    EXPECT_EQ(remesh({"--thin", "refuse"}).exit_code, 1);
+    EXPECT_EQ(remesh({"--thin", "keep", "--isovalue", "0.1"}).exit_code, 2);
+    EXPECT_EQ(remesh({"--max-loss", "1"}).exit_code, 2);
+    EXPECT_EQ(run({"voxelize", in, "out.vdb", "--voxel-size", "0.05"}).exit_code, 0);
+    EXPECT_EQ(run({"extract", "out.vdb", "of_volume.ply"}).exit_code, 0);
+    EXPECT_EQ(run({"validate", "of_volume.ply", "--require", "watertight"}).exit_code, 0);
+  }
+}
+
+TEST_F(CliTest, MuchThatIsLostIsNotMet) {
+  // A cube with a fin beside it that holds no sample.
+  write("fin.off",
+        "OFF\n16 12 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+        "0 0 1.53\n1 0 1.53\n1 1 1.53\n0 1 1.53\n0 0 1.56\n1 0 1.56\n1 1 1.56\n0 1 1.56\n"
+        "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
+        "4 11 10 9 8\n4 12 13 14 15\n4 8 9 13 12\n4 9 10 14 13\n4 10 11 15 14\n4 11 8 12 15\n");
+  const Outcome dropped = run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--json"});
+  EXPECT_EQ(dropped.exit_code, 3) << dropped.err;
+  // The fin has two of eight squares, and its four sides.
+  EXPECT_NEAR(Json::parse(dropped.out).at("result").at("visible_loss").get<double>(), 2.12 / 8.12, 0.02);
+  EXPECT_EQ(run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--max-loss", "30%"}).exit_code, 0);
+  EXPECT_EQ(run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--max-loss", "1%"}).exit_code, 0);
 }
 
 TEST_F(CliTest, InfoOfAMesh) {

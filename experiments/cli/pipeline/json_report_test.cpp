@@ -170,7 +170,7 @@ TEST_F(OptionsTest, ALogHasStagesNotesAndSummariesWithTimes) {
   }
   EXPECT_GT(count, 10u);
   for (const char* text : {"remesh open.off out.stl", "stage 'distances'", "end of stage 'distances'",
-                           "note: Flooding leaks in", "extracted ", "ended with exit code 0", "failed: ", "none.off"})
+                           "note: the polygons have holes", "extracted ", "ended with exit code 0", "failed: ", "none.off"})
     EXPECT_NE(read("log").find(text), std::string::npos) << text << '\n' << read("log");
   EXPECT_EQ(run({"remesh", "sphere.off", "out.stl", "--voxel-size", "0.1", "--log", "none/log"}).exit_code,
             1);
