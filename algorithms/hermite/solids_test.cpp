@@ -27,15 +27,15 @@ class Solids : public testing::Test {
  protected:
   SampledSolid sampled(const PolygonMesh& mesh, const SharedLattice& lattice) {
     const Voxelizer voxelizer = find_variant(our_voxelizers(), "hermesh");
-    return sample_solid(
-        mesh, lattice,
-        [&](const PolygonMesh& framed) {
-          return voxelizer.voxelize({.mesh = framed,
-                                     .voxel_size = lattice.voxel_size,
-                                     .context = context,
-                                     .options = Options("hermesh", voxelizer.options, {})});
-        },
-        context);
+    return sample_solid(mesh, lattice, [&](const PolygonMesh& framed) {
+      SampledSolid solid;
+      solid.level_set = voxelizer.voxelize({.mesh = framed,
+                                            .voxel_size = lattice.voxel_size,
+                                            .context = context,
+                                            .options = Options("hermesh", voxelizer.options, {})});
+      solid.hermite = sample_polygons(solid.level_set, 0.0, framed, context, &solid.sampling);
+      return solid;
+    });
   }
   RunContext context;
 };

@@ -9,6 +9,7 @@
 
 #include "algorithms/fracture/fracture.h"
 #include "algorithms/hermite/solids.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "experiments/fracture/fracture_for_tests.h"
 #include "experiments/pipeline.h"
@@ -117,9 +118,9 @@ void check_booleans(std::uint64_t seed, int pairs) {
     const auto sampled = [&](const PolygonMesh& mesh) -> std::optional<SampledSolid> {
       const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = 1.0};
       try {
-        return sample_solid(
-            mesh, lattice, [&](const PolygonMesh& framed) { return voxelize(framed, recipe, context); },
-            context);
+        return sample_solid(mesh, lattice, [&](const PolygonMesh& framed) {
+          return solid_of(framed, voxelize(framed, recipe, context), ThinRule::drop, context).solid;
+        });
       } catch (const Error&) {
         return std::nullopt;  // it has no sample inside
       }
