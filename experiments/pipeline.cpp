@@ -110,7 +110,9 @@ PromiseCheck check_promises(const Promises& promises, const MeshReport& report, 
   if (promises.oriented && !report.oriented())
     check.broken.push_back("oriented (" + counted(report.inconsistent_edges, "inconsistent edges)"));
   // A component all of whose polygons are flipped has no inconsistent edge, but its volume is then negative.
-  const bool inside_out = !report.faces_outwards() || (report.closed() && report.volume < 0.0);
+  // Components of a mesh that may intersect itself have no inside of their own, and only the whole is looked at.
+  const bool inside_out = (promises.no_self_intersection && !report.faces_outwards()) ||
+                          (report.closed() && report.volume < 0.0);
   if (promises.oriented && report.oriented() && inside_out && !circumstances.encloses_the_outside)
     check.broken.push_back("oriented (inside out, the volume is negative)");
   if (promises.no_self_intersection) {

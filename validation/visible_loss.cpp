@@ -82,6 +82,7 @@ class Measurement {
  private:
   bool is_visible(const Vector3d& at, const Vector3d& side) const {
     const double diagonal = model_tree_.bounds().diagonal();
+    int escaped = 0;
     for (int i = 0; i < kEscapes; ++i) {
       Vector3d along = direction(i);
       const double slope = along.dot(side);
@@ -92,7 +93,8 @@ class Measurement {
       model_tree_.for_each_on_segment(from, from + 2.0 * diagonal * along, [&](std::uint32_t slot) {
         met = met || meets(from, along, model_tree_.corners(slot));
       });
-      if (!met) return true;
+      // One ray may slip through between two triangles.
+      if (!met && ++escaped == 2) return true;
     }
     return false;
   }

@@ -99,7 +99,10 @@ class Inflater {
       throw Error(name_ + " is truncated: its gzip data breaks off");
     if (status != Z_OK && status != Z_STREAM_END)
       throw Error(name_ + " is damaged: its gzip data does not unpack");
-    if (status == Z_STREAM_END && !is_gzip(rest_)) bytes.resize(used_);
+    if (status == Z_STREAM_END && !is_gzip(rest_)) {
+      check_unpacked(packed_, used_, name_);
+      bytes.resize(used_);
+    }
     return status;
   }
 

@@ -30,7 +30,7 @@ using Eigen::Vector3d;
 constexpr double kPiece = 1.5;       ///< longest side of the pieces that are looked at
 constexpr double kShown = 0.5;       ///< distance within which the solid's surface shows a piece
 constexpr double kShownByShell = kShellRadius + 0.2;  ///< the same for the outer face of a shell
-constexpr double kAligned = 0.5;     ///< cosine of the angle up to which two normals count as parallel
+constexpr double kAligned = 0.7;     ///< cosine of the angle up to which two normals count as parallel
 constexpr double kNearPlane = 0.2;   ///< error of distances up to which samples show a plane
 constexpr double kAround = 3.0;      ///< how far from lost pieces thin walls are thickened, too
 constexpr double kOff = 1e-3;        ///< where rays begin, and how far inside samples are for certain

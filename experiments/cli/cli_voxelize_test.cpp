@@ -208,7 +208,7 @@ TEST_F(VoxelizeTest, ListShowsTheOptionsOfVoxelizers) {
   EXPECT_EQ(hermesh->at("ours"), true);
   EXPECT_EQ(hermesh->at("options").at(0).at("name"), "signs");
   EXPECT_EQ(hermesh->at("options").at(0).at("default"), "auto");
-  EXPECT_NE(run({"list"}).out.find("--voxelizer-option signs=auto (auto|flood-fill|winding-number|unsigned)"),
+  EXPECT_NE(run({"list"}).out.find("--voxelizer-option signs=auto (auto|auto-sheets|flood-fill|winding-number|unsigned)"),
             std::string::npos);
 }
 

@@ -92,10 +92,12 @@ bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, do
   const auto interval = [&](const validation::Estimate& share) {
     return percent(share.value) + " (" + percent(share.lower) + " to " + percent(share.upper) + ")";
   };
-  if (loss.lost.value > 0.0)
+  // Single samples at edges may be wrong.
+  constexpr double kNoticeable = 1e-3;
+  if (loss.lost.value >= kNoticeable)
     session.context.note(interval(loss.lost) + " of the visible surface is not shown within half a voxel" +
                          (loss.filled.value > 0.0 ? ", of it " + percent(loss.filled.value) + " where gaps are filled" : ""));
-  if (loss.invented.value > 0.0)
+  if (loss.invented.value >= kNoticeable)
     session.context.note(interval(loss.invented) + " of the mesh, an area of " + text(loss.invented_area) +
                          ", is farther than a voxel from all polygons, as where holes are closed");
   if (loss.lost.value <= max_loss) return true;
