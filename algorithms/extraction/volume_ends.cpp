@@ -240,15 +240,13 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
 
 EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends) {
   const ClosedVolume closed = close_ends(input.level_set, input.isovalue, input.context);
-  // Hermite data of a volume that was not closed have other signs.
-  const bool is_same = &closed.volume.grid() == &input.level_set.grid();
   EndedMesh result{extractor.extract({.level_set = closed.volume,
                                       .isovalue = input.isovalue,
                                       .source = input.source,
                                       .options = input.options,
                                       .context = input.context,
                                       .field = input.field,
-                                      .hermite = is_same ? input.hermite : nullptr,
+                                      .hermite = input.hermite,
                                       .written_in_single = input.written_in_single,
                                       .caps = closed.ends.caps}),
                    closed.ends};

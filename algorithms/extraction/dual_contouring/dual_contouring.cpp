@@ -70,7 +70,7 @@ class Contourer {
   }
 
  private:
-  /// A sample all of whose neighbours are on the other side, with the points and quads around it.
+  /// A sample all 26 of whose neighbours are on the other side, with the points and quads around it.
   struct LoneSample {
     Eigen::Vector3d place;                ///< voxels, relative to the placement's base
     double sign;                          ///< 1 inside, −1 outside
@@ -79,7 +79,7 @@ class Contourer {
     std::array<std::array<double, 2>, 3> hits;  ///< distances of the crossings below and above, by axis
   };
 
-  /// Finds the block's samples whose six edges are all crossed.
+  /// Finds the block's samples that are alone on their side.
   void find_lone_samples(std::int32_t b, std::vector<LoneSample>& found) const {
     const HermiteView::Block& block = grid_.blocks()[b];
     BlockMask candidates;
@@ -101,6 +101,14 @@ class Contourer {
           lone.hits[axis][side] = side ? offset : 1.0 - offset;
           lone.quads[2 * axis + side] = outputs_[there].first_quad + grid_.blocks()[there].rank(axis, start);
         }
+      }
+      // With another sample of its sign around it, its surface shares points with that one's, and is no component.
+      for (int n = 0; n < 27; ++n) {
+        const LatticePlace other =
+            locate(block.neighbours, at[0] + n / 9 - 1, at[1] + n / 3 % 3 - 1, at[2] + n % 3 - 1);
+        if (n != 13 && other.block >= 0 &&
+            test(grid_.blocks()[other.block].inside, other.sample) == test(block.inside, sample))
+          return;
       }
       for (int octant = 0; octant < 8; ++octant) {
         const LatticePlace cell = locate(block.neighbours, at[0] - 1 + (octant & 1),
