@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kEscapes = 32;
+constexpr int kEscapes = 16;
 constexpr double kHalf = 0.5, kWhole = 1.0;  // voxels
 constexpr double kSlack = 1.02;  // of these lengths: samples lie where the distance is greatest, too
 constexpr double kOff = 1e-6;    // of the model's diagonal: where rays begin

@@ -11,7 +11,7 @@ namespace hermesh::validation {
 
 /// Measures the loss of visible surface by stratified samples of both surfaces.
 ///
-/// A place of the model is *visible* from a side if two of 32 rays from there leave the model without meeting it. It is *shown*
+/// A place of the model is *visible* from a side if two of 16 rays from there leave the model without meeting it. It is *shown*
 /// if the mesh has surface that faces the same side within half a voxel, or within a voxel in front of it, as where a
 /// thin part was thickened. What is visible and not shown is *lost*: *filled* where the place lies within the mesh, as
 /// in a gap that was closed, and *vanished* elsewhere. Surface of the mesh with no polygon of the model within a voxel

@@ -79,7 +79,7 @@ void write_output(const std::string& path, const PolygonMesh& mesh, Session& ses
 
 bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size, double max_loss,
                         Session& session) {
-  constexpr std::int64_t kSamples = 10'000;
+  constexpr std::int64_t kSamples = 4'000;
   const MeshFile model = to_mesh_file(polygons), file = to_mesh_file(mesh);
   const validation::VisibleLoss loss = validation::measure_visible_loss(
       validation::TriangleSoup(model), validation::TriangleSoup(file), voxel_size, kSamples, session.context);
