@@ -15,9 +15,9 @@
 namespace hermesh {
 namespace {
 
-constexpr int kSteps = 40;          ///< radii to a voxel
-constexpr double kSlack = 1e-5;     ///< voxels: rounding of the distances in single precision
-constexpr double kSame = 1e-9;      ///< voxels: the crossing is found to this
+constexpr int kSteps = 40;       ///< radii to a voxel
+constexpr double kSlack = 1e-5;  ///< voxels: rounding of the distances in single precision
+constexpr double kSame = 1e-9;   ///< voxels: the crossing is found to this
 
 /// Triangles with their radii in voxels.
 struct Shell {
@@ -26,8 +26,8 @@ struct Shell {
 };
 
 /// Lowers the grid's values to the distances from triangles that share one radius, less that radius.
-void lower_to(openvdb::FloatGrid& grid, const PolygonMesh& mesh, double radius, double voxel_size, double exterior,
-              RunContext& context) {
+void lower_to(openvdb::FloatGrid& grid, const PolygonMesh& mesh, double radius, double voxel_size,
+              double exterior, RunContext& context) {
   const IndexSoup soup(mesh, voxel_size);
   const double reach = std::max(1.0, exterior + radius);
   TriangleBins bins(soup, reach, context);
@@ -67,15 +67,17 @@ class ShellEdges {
     const std::array<std::int32_t, 3>& lower = leaf.lower;
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(edges[std::size_t(axis)], [&](int sample) {
-        const Eigen::Vector3d first(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7));
+        const Eigen::Vector3d first(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7),
+                                    lower[2] + (sample & 7));
         move(first, axis, test(leaf.inside, sample), start, *crossing++);
       });
   }
 
  private:
-  /// Follows the edge from its inside end. Each body of the shell is convex, so the edge leaves it once; where it does,
-  /// another body may go on.
-  void move(const Eigen::Vector3d& first, int axis, bool first_inside, Start start, EdgeCrossing& crossing) const {
+  /// Follows the edge from its inside end. Each body of the shell is convex, so the edge leaves it once;
+  /// where it does, another body may go on.
+  void move(const Eigen::Vector3d& first, int axis, bool first_inside, Start start,
+            EdgeCrossing& crossing) const {
     const Eigen::Vector3d inside = first + (first_inside ? 0.0 : 1.0) * Eigen::Vector3d::Unit(axis);
     const Eigen::Vector3d along = (first_inside ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis);
     const double given = first_inside ? crossing.offset : 1.0 - crossing.offset;
@@ -129,7 +131,8 @@ class ShellEdges {
 CombinedSolid with_shell(const SampledSolid& solid, const std::vector<ShellTriangle>& triangles,
                          const Eigen::Vector3d& origin, RunContext& context) {
   const Stage stage(context, "shell around thin parts");
-  const double voxel_size = solid.level_set.voxel_size(), exterior = solid.level_set.background() / voxel_size;
+  const double voxel_size = solid.level_set.voxel_size(),
+               exterior = solid.level_set.background() / voxel_size;
   // Distances to triangles of one radius are computed together.
   std::map<int, PolygonMesh> by_radius;
   Shell shell;
@@ -155,7 +158,8 @@ CombinedSolid with_shell(const SampledSolid& solid, const std::vector<ShellTrian
   around.hermite = sample_level_set(around.level_set, 0.0, context);
   const ShellEdges edges(shell, voxel_size);
   const auto move_all = [&](FloatHermite& hermite, ShellEdges::Start start) {
-    parallel_blocks(hermite.leaves.size(), context, [&](std::size_t i) { edges.move_crossings(hermite, i, start); });
+    parallel_blocks(hermite.leaves.size(), context,
+                    [&](std::size_t i) { edges.move_crossings(hermite, i, start); });
   };
   move_all(around.hermite, ShellEdges::Start::inside_end);
   CombinedSolid result = combine(Boolean::unite, solid, around, context);

@@ -3,11 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <map>
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <limits>
+#include <map>
 #include <vector>
 
 #include "algorithms/core/disjoint_sets.h"
@@ -27,25 +27,26 @@ namespace {
 using Eigen::Vector3d;
 
 // All lengths are in voxels.
-constexpr double kPiece = 1.5;       ///< longest side of the pieces that are looked at
-constexpr double kShown = 0.5;       ///< distance within which the solid's surface shows a piece
+constexpr double kPiece = 1.5;  ///< longest side of the pieces that are looked at
+constexpr double kShown = 0.5;  ///< distance within which the solid's surface shows a piece
 constexpr double kShownByShell = kShellRadius + 0.2;  ///< the same for the outer face of a shell
-constexpr double kAligned = 0.7;     ///< cosine of the angle up to which two normals count as parallel
-constexpr double kNearPlane = 0.2;   ///< error of distances up to which samples show a plane
-constexpr double kAround = 3.0;      ///< how far from lost pieces thin walls are thickened, too
-constexpr double kOff = 1e-3;        ///< where rays begin, and how far inside samples are for certain
-constexpr double kWideGap = 1.0;     ///< gaps from here on are shown by the samples in every position
-constexpr double kBeside = 0.5;      ///< the same for what a shell does not show
-constexpr double kBetween = 0.1;     ///< how much farther places between those that are looked at may be
+constexpr double kAligned = 0.7;       ///< cosine of the angle up to which two normals count as parallel
+constexpr double kNearPlane = 0.2;     ///< error of distances up to which samples show a plane
+constexpr double kAround = 3.0;        ///< how far from lost pieces thin walls are thickened, too
+constexpr double kOff = 1e-3;          ///< where rays begin, and how far inside samples are for certain
+constexpr double kWideGap = 1.0;       ///< gaps from here on are shown by the samples in every position
+constexpr double kBeside = 0.5;        ///< the same for what a shell does not show
+constexpr double kBetween = 0.1;       ///< how much farther places between those that are looked at may be
 constexpr double kBesideCrumbs = 1.5;  ///< the same for what came apart
 constexpr std::uint32_t kCrumb = 64;   ///< samples of what may have come apart at most
-constexpr double kFar = 1.4;          ///< what is farther from all surface has vanished, not only its outermost part
-constexpr double kLittleLost = 0.01;  ///< share of the area up to which it may be edges and tips that are lost
-constexpr double kParallel = 0.9;     ///< cosine up to which the sides of a wall count as parallel
-constexpr double kDeep = 0.9;        ///< a place one voxel within a thick solid is farther than this from polygons
+constexpr double kFar = 1.4;  ///< what is farther from all surface has vanished, not only its outermost part
+constexpr double kLittleLost =
+    0.01;                          ///< share of the area up to which it may be edges and tips that are lost
+constexpr double kParallel = 0.9;  ///< cosine up to which the sides of a wall count as parallel
+constexpr double kDeep = 0.9;  ///< a place one voxel within a thick solid is farther than this from polygons
 constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
 constexpr std::size_t kTrianglesPerTask = 1024;
-constexpr double kNoWall = 1e-3;     ///< a wall thinner than this has no thickness to speak of
+constexpr double kNoWall = 1e-3;  ///< a wall thinner than this has no thickness to speak of
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
 std::string short_text(double value) {
@@ -62,7 +63,8 @@ double area_of(const Corners& c) { return 0.5 * (c[1] - c[0]).cross(c[2] - c[0])
 
 /// Number of the corner opposite of the longest side, if that is longer than a piece may be; else −1.
 int corner_to_split(const Corners& c) {
-  const double side[3] = {(c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm(), (c[1] - c[0]).squaredNorm()};
+  const double side[3] = {(c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm(),
+                          (c[1] - c[0]).squaredNorm()};
   const auto longest = std::max_element(side, side + 3) - side;
   return side[longest] > kPiece * kPiece ? int(longest) : -1;
 }
@@ -86,7 +88,8 @@ void for_each_piece(const Corners& c, const F& f) {
 class ShownSurface {
  public:
   /// `frame` is where the polygons' origin is.
-  ShownSurface(const LevelSet& level_set, const FloatHermite& hermite, const Vector3d& frame, RunContext& context)
+  ShownSurface(const LevelSet& level_set, const FloatHermite& hermite, const Vector3d& frame,
+               RunContext& context)
       : grid_(*level_set.grid().grid), voxel_size_(level_set.voxel_size()) {
     if (hermite.leaves.empty()) return;
     RunContext quiet;
@@ -101,10 +104,10 @@ class ShownSurface {
   Samples samples() const { return grid_.getConstUnsafeAccessor(); }
 
   enum class Verdict { shown, hidden, lost };
-  /// Returns whether the solid shows a place with a normal of unit length, by surface within `limit` whose normal is
-  /// parallel or opposite to within a cosine of `aligned`; a place within the solid is
-  /// hidden.
-  Verdict look(const Vector3d& at, const Vector3d& normal, double limit, double aligned, Samples& samples) const {
+  /// Returns whether the solid shows a place with a normal of unit length, by surface within `limit` whose
+  /// normal is parallel or opposite to within a cosine of `aligned`; a place within the solid is hidden.
+  Verdict look(const Vector3d& at, const Vector3d& normal, double limit, double aligned,
+               Samples& samples) const {
     const openvdb::Coord cell = cell_of(at);
     bool with = true, against = true, inside_somewhere = false, outside_somewhere = false, hidden = false;
     // Most cells have all their corners in one leaf.
@@ -114,7 +117,8 @@ class ShownSurface {
     for (int i = 0; i < 8; ++i) {
       const int x = i & 1, y = i >> 1 & 1, z = i >> 2;
       const Vector3d away = Vector3d(cell.x() + x, cell.y() + y, cell.z() + z) - at;
-      const double value = (values ? values[64 * x + 8 * y + z] : samples.getValue(cell.offsetBy(x, y, z))) / voxel_size_;
+      const double value =
+          (values ? values[64 * x + 8 * y + z] : samples.getValue(cell.offsetBy(x, y, z))) / voxel_size_;
       const double plane = away.dot(normal);
       with &= std::abs(value - plane) <= kNearPlane;
       against &= std::abs(value + plane) <= kNearPlane;
@@ -137,7 +141,8 @@ class ShownSurface {
     return true;
   }
 
-  /// Returns true if the mesh has surface within `limit` whose normal is parallel or opposite to within a cosine.
+  /// Returns true if the mesh has surface within `limit` whose normal is parallel or opposite to within a
+  /// cosine.
   bool mesh_shows(const Vector3d& at, const Vector3d& normal, double limit, double aligned) const {
     if (!tree_) return false;
     bool shown = false;
@@ -188,8 +193,8 @@ class Thickening {
     double wall = kNone;  ///< thickness of the wall that is thickened; 0 for a sheet
     bool is_gap = false;  ///< it is there to fill a gap
   };
-  /// What a shell is for: to show the pieces, to join what came apart at the border of a sheet, or to show what the
-  /// first shell does not.
+  /// What a shell is for: to show the pieces, to join what came apart at the border of a sheet, or to show
+  /// what the first shell does not.
   enum class Mode { sheets, rims, wires };
   Need need(const Corners& piece, const Vector3d& normal, std::uint32_t triangle, bool is_lost, Mode mode,
             const ShownSurface& shown) const {
@@ -209,7 +214,8 @@ class Thickening {
       wall = ahead.distance;
       inwards = outwards;
     } else if (is_lost && is_free(at - outwards, kDeep) && is_free(at + outwards, kDeep)) {
-      // Neither a wall, nor the boundary of a thick solid, nor the rim of a wall, within which there are polygons.
+      // Neither a wall, nor the boundary of a thick solid, nor the rim of a wall, within which there are
+      // polygons.
       wall = 0.0;
     }
     if (std::isfinite(wall)) {
@@ -229,7 +235,8 @@ class Thickening {
     return result;
   }
 
-  /// Returns true if a piece is part of a wall or sheet that is thinner than a voxel, and not near its border.
+  /// Returns true if a piece is part of a wall or sheet that is thinner than a voxel, and not near its
+  /// border.
   bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle) const {
     const Vector3d inwards = -turn(triangle) * normal;
     const Opposite behind = opposite(at, inwards);
@@ -261,7 +268,7 @@ class Thickening {
       if (part < 0.0 || part >= nearest) return;
       nearest = part;
       const double slope = turn(t) * facet.normal().stableNormalized().dot(along);
-      result = {kOff + part * (kReach - kOff), slope < 0.0, slope > 0.0, std::abs(slope)};
+      result = {kOff + part * (kReach - kOff), slope<0.0, slope> 0.0, std::abs(slope)};
     });
     return result;
   }
@@ -274,7 +281,8 @@ class Thickening {
     return tree_.nearest(at, distance * distance, distance * distance).triangle == TriangleTree::kNone;
   }
 
-  /// Returns true where a thin part ends on both sides along at least two of four lines: it is a wire or a speck.
+  /// Returns true where a thin part ends on both sides along at least two of four lines: it is a wire or a
+  /// speck.
   bool is_wire(const Vector3d& at, const Vector3d& normal, double half_width) const {
     const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
     const auto ends = [&](double x, double y) {
@@ -305,8 +313,8 @@ class Thickening {
   const Orientation orientation_;
 };
 
-/// Which pieces lost_pieces() returns: all, or those that a shell does not show either, among which pieces in filled
-/// gaps do not count.
+/// Which pieces lost_pieces() returns: all, or those that a shell does not show either, among which pieces in
+/// filled gaps do not count.
 enum class Wanted { all, after_thickening };
 
 /// A piece that is lost.
@@ -344,8 +352,8 @@ LostPieces lost_pieces(const PolygonMesh& mesh, const ShownSurface& shown, doubl
         parts[chunk].area += area;
         if (shown.look(middle, normal, limit, aligned, samples) != ShownSurface::Verdict::lost) return;
         if (wanted == Wanted::after_thickening && shown.is_all(true, middle)) return;
-        parts[chunk].pieces.push_back(
-            {middle, normal, static_cast<std::uint32_t>(t), area, !shown.mesh_shows(middle, normal, kFar, 0.0)});
+        parts[chunk].pieces.push_back({middle, normal, static_cast<std::uint32_t>(t), area,
+                                       !shown.mesh_shows(middle, normal, kFar, 0.0)});
       });
     }
   });
@@ -386,8 +394,8 @@ class Near {
   openvdb::MaskTree cells_;
 };
 
-/// Returns the samples of components of at most kCrumb samples that lie next to others. Samples inside are connected
-/// along edges and across faces.
+/// Returns the samples of components of at most kCrumb samples that lie next to others. Samples inside are
+/// connected along edges and across faces.
 std::vector<Vector3d> crumbs(const openvdb::FloatGrid& grid) {
   std::vector<openvdb::Coord> inside;
   openvdb::Int32Tree number(-1);
@@ -413,7 +421,8 @@ std::vector<Vector3d> crumbs(const openvdb::FloatGrid& grid) {
     if (size[sets.find(i)] > kCrumb) continue;
     bool beside_others = false;
     for (int n = 0; n < 125 && !beside_others; ++n) {
-      const std::int32_t other = read.getValue(inside[i] + openvdb::Coord(n / 25 - 2, n / 5 % 5 - 2, n % 5 - 2));
+      const std::int32_t other =
+          read.getValue(inside[i] + openvdb::Coord(n / 25 - 2, n / 5 % 5 - 2, n % 5 - 2));
       beside_others = other >= 0 && sets.find(std::uint32_t(other)) != sets.find(i);
     }
     if (beside_others) result.emplace_back(inside[i].x(), inside[i].y(), inside[i].z());
@@ -425,16 +434,20 @@ std::vector<Vector3d> crumbs(const openvdb::FloatGrid& grid) {
 struct Part {
   std::vector<ShellTriangle> shell;
   double area = 0.0, thickened_area = 0.0, merged_area = 0.0;  ///< voxels²
-  double thickest = 0.0, thinnest = kNone;         ///< voxels
+  double thickest = 0.0, thinnest = kNone;                     ///< voxels
   bool has_sheets = false;
 };
 
 /// Chooses the shell around the pieces near some places.
 class ShellMaker {
  public:
-  ShellMaker(const Thickening& thickening, const ShownSurface& shown, const Near& around, Thickening::Mode mode,
-             const PolygonMesh& mesh, double voxel_size)
-      : thickening_(thickening), shown_(shown), around_(around.reader()), mode_(mode), mesh_(mesh),
+  ShellMaker(const Thickening& thickening, const ShownSurface& shown, const Near& around,
+             Thickening::Mode mode, const PolygonMesh& mesh, double voxel_size)
+      : thickening_(thickening),
+        shown_(shown),
+        around_(around.reader()),
+        mode_(mode),
+        mesh_(mesh),
         voxel_size_(voxel_size) {}
 
   void add(std::uint32_t t, const Triangle& triangle, Part& part) {
@@ -507,9 +520,9 @@ LevelSet nothing_on(const openvdb::FloatGrid& distances) {
   return make_level_set(grid);
 }
 
-/// Returns the lost pieces that are worth a shell. If more than kLittleLost of the area is lost, all are. Else those are
-/// that belong to a patch of lost pieces of which one is far from the solid's surface, or lies amid a wall, which has a
-/// hole there: what is left are the outermost parts of edges and tips.
+/// Returns the lost pieces that are worth a shell. If more than kLittleLost of the area is lost, all are.
+/// Else those are that belong to a patch of lost pieces of which one is far from the solid's surface, or lies
+/// amid a wall, which has a hole there: what is left are the outermost parts of edges and tips.
 std::vector<LostPiece> worth_a_shell(const LostPieces& lost, const Thickening& thickening) {
   double area = 0.0;
   for (const LostPiece& piece : lost.pieces) area += piece.area;
@@ -517,7 +530,8 @@ std::vector<LostPiece> worth_a_shell(const LostPieces& lost, const Thickening& t
   // Patches are sets of pieces in neighbouring cells twice as large as voxels.
   std::map<std::array<int, 3>, std::uint32_t> cells;
   const auto cell_of = [](const Vector3d& at) {
-    return std::array{int(std::floor(0.5 * at.x())), int(std::floor(0.5 * at.y())), int(std::floor(0.5 * at.z()))};
+    return std::array{int(std::floor(0.5 * at.x())), int(std::floor(0.5 * at.y())),
+                      int(std::floor(0.5 * at.z()))};
   };
   for (const LostPiece& piece : lost.pieces) cells.emplace(cell_of(piece.at), std::uint32_t(cells.size()));
   DisjointSets sets(cells.size());
@@ -537,7 +551,8 @@ std::vector<LostPiece> worth_a_shell(const LostPieces& lost, const Thickening& t
 }
 
 /// Adds the shell that a solid needs to show all polygons.
-std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, ThinRule rule, RunContext& context) {
+std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, ThinRule rule,
+                                 RunContext& context) {
   const double voxel_size = solid.level_set.voxel_size(), square = voxel_size * voxel_size;
   const Stage stage(context, "thin parts");
   const std::vector<Triangle> triangles = triangulated(mesh);
@@ -550,9 +565,9 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   if (lost.empty()) return std::nullopt;
   if (rule == ThinRule::refuse) {
     const Vector3d at = mesh.origin + voxel_size * lost.front().at;
-    throw Error("the polygons have parts that voxels of " + short_text(voxel_size) + " do not show, such as at (" +
-                short_text(at.x()) + ", " + short_text(at.y()) + ", " + short_text(at.z()) +
-                "); use smaller voxels, or keep thin parts, which thickens them");
+    throw Error("the polygons have parts that voxels of " + short_text(voxel_size) +
+                " do not show, such as at (" + short_text(at.x()) + ", " + short_text(at.y()) + ", " +
+                short_text(at.z()) + "); use smaller voxels, or keep thin parts, which thickens them");
   }
   ThinParts sum;
   double thinnest = kNone;
@@ -590,16 +605,19 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   join();
   const std::size_t first = shell.size();
   const ShownSurface thicker(solid.level_set, solid.hermite, mesh.origin, context);
-  if (const auto still = lost_pieces(mesh, thicker, voxel_size, Wanted::after_thickening, context).pieces; !still.empty())
+  if (const auto still = lost_pieces(mesh, thicker, voxel_size, Wanted::after_thickening, context).pieces;
+      !still.empty())
     add(Near(still, kBeside), Mode::wires);
-  if (const auto apart = crumbs(*solid.level_set.grid().grid); !apart.empty()) add(Near(apart, kBesideCrumbs), Mode::rims);
+  if (const auto apart = crumbs(*solid.level_set.grid().grid); !apart.empty())
+    add(Near(apart, kBesideCrumbs), Mode::rims);
   if (shell.size() > first) join();
   return sum;
 }
 
 }  // namespace
 
-PolygonSolid solid_of(const PolygonMesh& mesh, const LevelSet& level_set, ThinRule rule, RunContext& context) {
+PolygonSolid solid_of(const PolygonMesh& mesh, const LevelSet& level_set, ThinRule rule,
+                      RunContext& context) {
   PolygonSolid result;
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
   const bool encloses = rule == ThinRule::drop || grid.getGridClass() == openvdb::GRID_LEVEL_SET;
@@ -610,17 +628,20 @@ PolygonSolid solid_of(const PolygonMesh& mesh, const LevelSet& level_set, ThinRu
 }
 
 std::string thin_note(const ThinParts& thin, double voxel_size) {
-  const auto share = [&](double area) { return short_text(100.0 * area / thin.area) + " % of the polygons' area"; };
+  const auto share = [&](double area) {
+    return short_text(100.0 * area / thin.area) + " % of the polygons' area";
+  };
   std::string note;
   if (thin.thickened_area > 0.0) {
-    note = share(thin.thickened_area) + " bounds walls that are thinner than voxels of " + short_text(voxel_size) +
-           " can show" + (thin.has_sheets ? ", or nothing at all" : "") + ", and was thickened by up to " +
-           short_text(thin.thickest);
+    note = share(thin.thickened_area) + " bounds walls that are thinner than voxels of " +
+           short_text(voxel_size) + " can show" + (thin.has_sheets ? ", or nothing at all" : "") +
+           ", and was thickened by up to " + short_text(thin.thickest);
     if (thin.thinnest_wall > kNoWall * voxel_size)
       note += "; voxels of " + short_text(thin.thinnest_wall) + " would show the thinnest wall";
   }
   if (thin.merged_area > 0.0)
-    note += (note.empty() ? "" : "; ") + share(thin.merged_area) + " is at gaps that are thinner than a voxel, which were filled";
+    note += (note.empty() ? "" : "; ") + share(thin.merged_area) +
+            " is at gaps that are thinner than a voxel, which were filled";
   return note;
 }
 

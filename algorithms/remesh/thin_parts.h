@@ -1,6 +1,6 @@
-// Parts of polygons that a level set cannot show: walls, wires and bodies thinner than its samples, and open sheets,
-// which bound nothing. They are found by comparison with the surface that the level set stands for, and are kept as a
-// shell around the polygons that is as thin as the samples allow.
+// Parts of polygons that a level set cannot show: walls, wires and bodies thinner than its samples, and open
+// sheets, which bound nothing. They are found by comparison with the surface that the level set stands for,
+// and are kept as a shell around the polygons that is as thin as the samples allow.
 #pragma once
 
 #include <optional>
@@ -35,12 +35,14 @@ struct PolygonSolid {
   std::optional<ThinParts> thin;  ///< none if no part was thickened
 };
 
-/// Returns the solid of polygons with its exact Hermite data. With ThinRule::keep it is the union of the solid that the
-/// level set shows and a shell around those of the polygons that it does not show within half a voxel. Polygons within
-/// the solid do not count. Walls and sheets become at most 1.2 voxels thick where they are thinner, wires and specks
-/// 1.75; gaps that are thinner than a voxel and do not show are filled. Where the level set shows all polygons, the
-/// solid is the same as with ThinRule::drop. The bytes are the same for every number of threads.
-/// @param level_set with samples at multiples of the voxel size from the mesh's origin; distances without sign, of
+/// Returns the solid of polygons with its exact Hermite data. With ThinRule::keep it is the union of the
+/// solid that the level set shows and a shell around those of the polygons that it does not show within half
+/// a voxel. Polygons within the solid do not count. Walls and sheets become at most 1.2 voxels thick where
+/// they are thinner, wires and specks 1.75; gaps that are thinner than a voxel and do not show are filled.
+/// Where the level set shows all polygons, the solid is the same as with ThinRule::drop. The bytes are the
+/// same for every number of threads.
+/// @param level_set with samples at multiples of the voxel size from the mesh's origin; distances without
+/// sign, of
 ///   polygons that enclose nothing, stand for an empty solid unless the rule is to drop
 /// @throws Error if the rule is to refuse and a part is lost; as sample_polygons(); Cancelled
 PolygonSolid solid_of(const PolygonMesh& mesh, const LevelSet& level_set, ThinRule rule, RunContext& context);

@@ -102,7 +102,7 @@ class Contourer {
           lone.quads[2 * axis + side] = outputs_[there].first_quad + grid_.blocks()[there].rank(axis, start);
         }
       }
-      // With another sample of its sign around it, its surface shares points with that one's, and is no component.
+      // If a neighbour has the same sign, the two surfaces share vertices and form one component.
       for (int n = 0; n < 27; ++n) {
         const LatticePlace other =
             locate(block.neighbours, at[0] + n / 9 - 1, at[1] + n / 3 % 3 - 1, at[2] + n % 3 - 1);
@@ -122,8 +122,8 @@ class Contourer {
 
   /// Keeps the surface around a lone sample from being inside out. Around other samples points that leave
   /// their cells do not go as far as the opposite side. Around a lone one they can pass one another in the
-  /// middle: if its volume has the wrong sign, or none, the eight points go to the means of the crossings
-  /// beside the sample, a box around it.
+  /// middle: if its volume has the wrong sign, or none, the eight vertices move to the means of the
+  /// crossings next to the sample, a box around it.
   void turn_lone_samples(PolygonMesh& mesh, RunContext& context) const {
     std::vector<std::vector<LoneSample>> found(outputs_.size());
     parallel_blocks(found.size(), context,
