@@ -9,6 +9,9 @@ hermesh_packages=(
   libexpat1-dev libbenchmark-dev libgtest-dev
   libopenvdb-tools python3 pybind11-dev python3-dev python3-numpy python3-venv)
 
+# To run benchmarks (experiments/lab).
+lab_packages=(python3 python3-scipy)
+
 # To run sweeps on all cores of a machine, and to try them on a cluster of one node (experiments/sweep).
 sweep_packages=(snakemake)
 slurm_packages=(slurm-wlm munge)

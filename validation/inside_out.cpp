@@ -24,10 +24,11 @@ bool is_enclosed(const TriangleSoup& soup, const TriangleTree& tree,
     int sum = 0;
     bool sure = true;
     tree.for_each_on_segment(from, to, [&](std::uint32_t slot) {
-      if (component[soup.triangles[tree.triangle(slot)][0]] == own) return;
+      if (component[soup.triangles[tree.triangle(slot)][0]] == own) return true;
       const std::optional<int> crossing = crossing_of(tree.corners(slot), from, to);
-      sure = sure && crossing;
+      sure = crossing.has_value();
       sum += crossing.value_or(0);
+      return sure;
     });
     if (sure) return sum > 0;
   }

@@ -142,12 +142,12 @@ Solid::Crossings Solid::crossings(const Eigen::Vector3d& from, int direction) co
   const Eigen::Vector3d to = from + directions_[std::size_t(direction)];
   Crossings result;
   tree_.for_each_on_segment(from, to, [&](std::uint32_t slot) {
-    if (!result.sure) return;
     const std::optional<int> crossing = crossing_of(tree_.corners(slot), from, to);
     result.sure = crossing.has_value();
-    if (crossing.value_or(0) == 0) return;
+    if (crossing.value_or(0) == 0) return result.sure;
     result.sum += *crossing;
     ++result.count;
+    return true;
   });
   result.sum *= turn_;
   return result;
@@ -206,6 +206,7 @@ bool Solid::leads_to(const Eigen::Vector3d& point,
     double hit = 1.0;
     tree_.for_each_on_segment(point, point + direction, [&](std::uint32_t slot) {
       hit = std::min(hit, hit_along(tree_.corners(slot), point, direction));
+      return true;
     });
     const double length = hit * direction.norm();
     const Eigen::Vector3d along = direction.normalized();

@@ -89,12 +89,11 @@ class Measurement {
       if (std::abs(slope) < 0.05) continue;
       if (slope < 0.0) along = -along;
       const Vector3d from = at + kOff * diagonal * side;
-      bool met = false;
-      model_tree_.for_each_on_segment(from, from + 2.0 * diagonal * along, [&](std::uint32_t slot) {
-        met = met || meets(from, along, model_tree_.corners(slot));
-      });
+      const bool escapes = model_tree_.for_each_on_segment(
+          from, from + 2.0 * diagonal * along,
+          [&](std::uint32_t slot) { return !meets(from, along, model_tree_.corners(slot)); });
       // One ray may slip through between two triangles.
-      if (!met && ++escaped == 2) return true;
+      if (escapes && ++escaped == 2) return true;
     }
     return false;
   }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/hermite/solids.h"
 
 namespace hermesh {
 namespace {
@@ -15,13 +16,8 @@ FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
       polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
   FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, source, input.context, &sampling);
-  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons' (samplers.h); the
-  // user is told how many do, and where their crossings are from.
-  const std::size_t missed = sampling.nearest + sampling.fallback;
-  if (missed > 0)
-    input.context.note(std::to_string(missed) + " of " + std::to_string(sampling.exact + missed) +
-                       " crossing edges hit no polygon: " + std::to_string(sampling.nearest) +
-                       " took the nearest one's plane, the others the level set's gradient");
+  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons' (samplers.h).
+  if (const std::string note = missed_edges_note(sampling); !note.empty()) input.context.note(note);
   return hermite;
 }
 

@@ -240,13 +240,14 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
 
 EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends) {
   const ClosedVolume closed = close_ends(input.level_set, input.isovalue, input.context);
+  const bool is_unchanged = closed.volume.grid().grid == input.level_set.grid().grid;
   EndedMesh result{extractor.extract({.level_set = closed.volume,
                                       .isovalue = input.isovalue,
                                       .source = input.source,
                                       .options = input.options,
                                       .context = input.context,
                                       .field = input.field,
-                                      .hermite = input.hermite,
+                                      .hermite = is_unchanged ? input.hermite : nullptr,
                                       .written_in_single = input.written_in_single,
                                       .caps = closed.ends.caps}),
                    closed.ends};

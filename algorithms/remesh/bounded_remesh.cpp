@@ -234,6 +234,7 @@ class BoundedRemesher {
     const auto view = view_of(hermite, context_);
     const FilePoints file(hermite.placement);
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
+    result_.work += double(uniform.points.size());
     Attempt result{
         voxel_size,
         std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), keeps_thin ? std::span<const std::int8_t>() : turns_,
@@ -361,7 +362,9 @@ class BoundedRemesher {
       const Attempt now{uniform.voxel_size, uniform.surface, uniform.file, FineMesh(mesh.points, mesh.triangles, context_),
                         uniform.in_file(mesh.points), uniform.offset};
       if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh).empty()) {
+        const double work = result_.work;
         result_ = before;
+        result_.work = work;
         break;
       }
       result_.rounds = before.rounds;
@@ -386,6 +389,7 @@ class BoundedRemesher {
     std::vector<Far> far;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
       CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
+      result_.work += double(now.fine.points().size());
       far = prove(now, surface, coarse);
       // Nothing is written but what was proved just now, as the file will hold it.
       if (far.empty()) {

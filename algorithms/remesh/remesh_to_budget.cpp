@@ -42,6 +42,7 @@ class Tries {
     context_.figures.resize(figures_);
     try {
       BoundedMesh made = bounded_remesh(mesh_, options, context_);
+      work_ += made.work;
       count_ = made.mesh.triangle_count();
       if (!made.unmet.empty()) {
         refused_ = std::move(made);
@@ -63,6 +64,7 @@ class Tries {
   /// Larger bound of the best mesh, each way, which may be far below the error that was asked for.
   double best_bound() const { return std::max(best_->to_surface, best_->from_surface); }
   bool has_best() const { return best_.has_value(); }
+  bool is_out_of_work() const { return work_ > kBudgetWork; }
 
   /// Returns the best mesh, or why there is none. @throws Error
   BoundedMesh result() {
@@ -100,6 +102,7 @@ class Tries {
   const PolygonMesh& mesh_;
   std::size_t triangles_, count_ = 0;
   int tries_ = 0;
+  double work_ = 0.0;
   RunContext& context_;
   std::size_t notes_, figures_;  ///< how many there were before
   std::optional<BoundedMesh> best_, refused_;
@@ -133,7 +136,7 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
   if (mesh.triangle_count() <= triangles)
     for (const double share : kPlaneErrors)
       if (run_plane(share) == Outcome::fits && tries.best_bound() <= exact) return tries.result();
-  for (int i = 0; i < kTries; ++i) {
+  for (int i = 0; i < kTries && !tries.is_out_of_work(); ++i) {
     const Outcome outcome = tries.run(now);
     double count = tries.count();
     if (outcome == Outcome::refused) {

@@ -65,11 +65,12 @@ class ShellEdges {
     EdgeCrossing* crossing = hermite.crossings.data() + leaf.first;
     const std::array<BlockMask, 3> edges = crossing_edges(leaf);
     const std::array<std::int32_t, 3>& lower = leaf.lower;
+    std::vector<std::uint32_t> near;
     for (int axis = 0; axis < 3; ++axis)
       for_each_bit(edges[std::size_t(axis)], [&](int sample) {
         const Eigen::Vector3d first(lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7),
                                     lower[2] + (sample & 7));
-        move(first, axis, test(leaf.inside, sample), start, *crossing++);
+        move(first, axis, test(leaf.inside, sample), start, *crossing++, near);
       });
   }
 
@@ -77,12 +78,12 @@ class ShellEdges {
   /// Follows the edge from its inside end. Each body of the shell is convex, so the edge leaves it once;
   /// where it does, another body may go on.
   void move(const Eigen::Vector3d& first, int axis, bool first_inside, Start start,
-            EdgeCrossing& crossing) const {
+            EdgeCrossing& crossing, std::vector<std::uint32_t>& near) const {
     const Eigen::Vector3d inside = first + (first_inside ? 0.0 : 1.0) * Eigen::Vector3d::Unit(axis);
     const Eigen::Vector3d along = (first_inside ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis);
     const double given = first_inside ? crossing.offset : 1.0 - crossing.offset;
     const double from = start == Start::inside_end ? 0.0 : given;
-    std::vector<std::uint32_t> near;
+    near.clear();
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(largest_ + kSlack), end = inside + along;
     tree_.for_each_near(inside.cwiseMin(end) - reach, inside.cwiseMax(end) + reach,
                         [&](std::uint32_t t) { near.push_back(t); });
@@ -92,12 +93,7 @@ class ShellEdges {
       moved = false;
       for (const std::uint32_t t : near) {
         if (beyond(t, inside + reached * along) > (last == TriangleTree::kNone ? kSlack : 0.0)) continue;
-        double low = reached, high = 1.0;
-        if (beyond(t, end) <= 0.0) low = high;
-        while (high - low > kSame) {
-          const double middle = 0.5 * (low + high);
-          (beyond(t, inside + middle * along) <= 0.0 ? low : high) = middle;
-        }
+        const double low = leaves(t, inside, along, reached);
         if (low <= reached + kSame && last != TriangleTree::kNone) continue;
         reached = low;
         last = t;
@@ -114,11 +110,28 @@ class ShellEdges {
     for (int i = 0; i < 3; ++i) crossing.normal[std::size_t(i)] = static_cast<float>(normal[i]);
   }
 
-  /// How far a place is outside of the body around a triangle; not positive within.
+  /// Returns where a ray that is inside the body around a triangle at `low` leaves it, at most 1.
+  double leaves(std::uint32_t t, const Eigen::Vector3d& from, const Eigen::Vector3d& along, double low) const {
+    double high = 1.0, at_low = beyond(t, from + low * along), at_high = beyond(t, from + along);
+    if (at_high <= 0.0) return 1.0;
+    // Regula falsi (Illinois): the distance is a convex function of the position along the ray.
+    for (int last = 0; high - low > kSame;) {
+      const double part = at_low < 0.0 ? std::clamp(at_low / (at_low - at_high), 0.01, 0.99) : 0.5;
+      const double between = low + part * (high - low);
+      const double at = beyond(t, from + between * along);
+      const int side = at <= 0.0 ? -1 : 1;
+      (side < 0 ? low : high) = between;
+      (side < 0 ? at_low : at_high) = at;
+      if (side == last) (side < 0 ? at_high : at_low) *= 0.5;
+      last = side;
+    }
+    return low;
+  }
+
+  /// Returns the distance of a position from the body around a triangle; not positive within.
   double beyond(std::uint32_t t, const Eigen::Vector3d& p) const {
-    const Eigen::Vector3d nearest =
-        closest_point(p, tree_.corner(t, 0), tree_.corner(t, 1), tree_.corner(t, 2)).position;
-    return (p - nearest).norm() - shell_.radius[t];
+    return std::sqrt(squared_distance(p, tree_.corner(t, 0), tree_.corner(t, 1), tree_.corner(t, 2))) -
+           shell_.radius[t];
   }
 
   const Shell& shell_;

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <limits>
 #include <map>
 #include <vector>
@@ -13,10 +12,9 @@
 #include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/remesh/shell.h"
-#include "algorithms/search/triangle_point.h"
+#include "algorithms/remesh/shown_surface.h"
 #include "algorithms/search/triangle_tree.h"
 #include "algorithms/voxelization/distance/segment.h"
 #include "algorithms/voxelization/inside/orientation.h"
@@ -27,11 +25,6 @@ namespace {
 using Eigen::Vector3d;
 
 // All lengths are in voxels.
-constexpr double kPiece = 1.5;  ///< longest side of the pieces that are looked at
-constexpr double kShown = 0.5;  ///< distance within which the solid's surface shows a piece
-constexpr double kShownByShell = kShellRadius + 0.2;  ///< the same for the outer face of a shell
-constexpr double kAligned = 0.7;       ///< cosine of the angle up to which two normals count as parallel
-constexpr double kNearPlane = 0.2;     ///< error of distances up to which samples show a plane
 constexpr double kAround = 3.0;        ///< how far from lost pieces thin walls are thickened, too
 constexpr double kOff = 1e-3;          ///< where rays begin, and how far inside samples are for certain
 constexpr double kWideGap = 1.0;       ///< gaps from here on are shown by the samples in every position
@@ -45,7 +38,6 @@ constexpr double kLittleLost =
 constexpr double kParallel = 0.9;  ///< cosine up to which the sides of a wall count as parallel
 constexpr double kDeep = 0.9;  ///< a place one voxel within a thick solid is farther than this from polygons
 constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
-constexpr std::size_t kTrianglesPerTask = 1024;
 constexpr double kNoWall = 1e-3;  ///< a wall thinner than this has no thickness to speak of
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
@@ -55,121 +47,6 @@ std::string short_text(double value) {
   return text;
 }
 
-using Corners = std::array<Vector3d, 3>;
-
-Vector3d centre(const Corners& c) { return (c[0] + c[1] + c[2]) / 3.0; }
-
-double area_of(const Corners& c) { return 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm(); }
-
-/// Number of the corner opposite of the longest side, if that is longer than a piece may be; else −1.
-int corner_to_split(const Corners& c) {
-  const double side[3] = {(c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm(),
-                          (c[1] - c[0]).squaredNorm()};
-  const auto longest = std::max_element(side, side + 3) - side;
-  return side[longest] > kPiece * kPiece ? int(longest) : -1;
-}
-
-/// The two halves of a triangle, cut from a corner to the middle of the opposite side.
-std::array<Corners, 2> halves(const Corners& c, int corner) {
-  const std::size_t i = std::size_t(corner), j = (i + 1) % 3, k = (i + 2) % 3;
-  const Vector3d middle = 0.5 * (c[j] + c[k]);
-  return {Corners{c[i], c[j], middle}, Corners{c[i], middle, c[k]}};
-}
-
-template <class F>
-void for_each_piece(const Corners& c, const F& f) {
-  if (const int split = corner_to_split(c); split >= 0)
-    for (const Corners& half : halves(c, split)) for_each_piece(half, f);
-  else
-    f(c);
-}
-
-/// The surface that a solid stands for, as its samples and its uniform mesh show it.
-class ShownSurface {
- public:
-  /// `frame` is where the polygons' origin is.
-  ShownSurface(const LevelSet& level_set, const FloatHermite& hermite, const Vector3d& frame,
-               RunContext& context)
-      : grid_(*level_set.grid().grid), voxel_size_(level_set.voxel_size()) {
-    if (hermite.leaves.empty()) return;
-    RunContext quiet;
-    quiet.cancel = context.cancel;
-    mesh_ = dual_contouring(view_of(hermite, quiet), {}, quiet);
-    triangles_ = triangulated(mesh_);
-    tree_.emplace(mesh_.points, triangles_, 1.0 / voxel_size_);
-    shift_ = (frame - mesh_.origin) / voxel_size_;
-  }
-
-  using Samples = openvdb::FloatGrid::ConstUnsafeAccessor;
-  Samples samples() const { return grid_.getConstUnsafeAccessor(); }
-
-  enum class Verdict { shown, hidden, lost };
-  /// Returns whether the solid shows a place with a normal of unit length, by surface within `limit` whose
-  /// normal is parallel or opposite to within a cosine of `aligned`; a place within the solid is hidden.
-  Verdict look(const Vector3d& at, const Vector3d& normal, double limit, double aligned,
-               Samples& samples) const {
-    const openvdb::Coord cell = cell_of(at);
-    bool with = true, against = true, inside_somewhere = false, outside_somewhere = false, hidden = false;
-    // Most cells have all their corners in one leaf.
-    const bool in_one_leaf = (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
-    const auto* leaf = in_one_leaf ? samples.probeConstLeaf(cell) : nullptr;
-    const float* values = leaf ? leaf->buffer().data() + leaf->coordToOffset(cell) : nullptr;
-    for (int i = 0; i < 8; ++i) {
-      const int x = i & 1, y = i >> 1 & 1, z = i >> 2;
-      const Vector3d away = Vector3d(cell.x() + x, cell.y() + y, cell.z() + z) - at;
-      const double value =
-          (values ? values[64 * x + 8 * y + z] : samples.getValue(cell.offsetBy(x, y, z))) / voxel_size_;
-      const double plane = away.dot(normal);
-      with &= std::abs(value - plane) <= kNearPlane;
-      against &= std::abs(value + plane) <= kNearPlane;
-      (value < 0.0 ? inside_somewhere : outside_somewhere) = true;
-      // No boundary is nearer to a sample inside than its depth.
-      hidden |= value < 0.0 && -value > away.norm() + kOff;
-    }
-    if (hidden) return Verdict::hidden;
-    // The distances are those to this plane: the cell's surface is that of the place.
-    if ((with || against) && inside_somewhere && outside_somewhere) return Verdict::shown;
-    return mesh_shows(at, normal, limit, aligned) ? Verdict::shown : Verdict::lost;
-  }
-
-  /// Returns true if all samples around a place are on the given side.
-  bool is_all(bool inside, const Vector3d& at) const {
-    Samples values = samples();
-    const openvdb::Coord cell = cell_of(at);
-    for (int i = 0; i < 8; ++i)
-      if ((values.getValue(cell.offsetBy(i & 1, i >> 1 & 1, i >> 2)) < 0.0f) != inside) return false;
-    return true;
-  }
-
-  /// Returns true if the mesh has surface within `limit` whose normal is parallel or opposite to within a
-  /// cosine.
-  bool mesh_shows(const Vector3d& at, const Vector3d& normal, double limit, double aligned) const {
-    if (!tree_) return false;
-    bool shown = false;
-    const Vector3d place = at + shift_, reach = Vector3d::Constant(limit);
-    tree_->for_each_near(place - reach, place + reach, [&](std::uint32_t t) {
-      if (shown) return;
-      const Vector3d a = tree_->corner(t, 0), b = tree_->corner(t, 1), c = tree_->corner(t, 2);
-      const Vector3d facing = (b - a).cross(c - a);
-      shown = std::abs(facing.dot(normal)) >= aligned * facing.norm() &&
-              squared_distance(place, a, b, c) <= limit * limit;
-    });
-    return shown;
-  }
-
- private:
-  static openvdb::Coord cell_of(const Vector3d& at) {
-    return {int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z()))};
-  }
-
-  const openvdb::FloatGrid& grid_;
-  double voxel_size_;
-  PolygonMesh mesh_;
-  std::vector<Triangle> triangles_;
-  std::optional<TriangleTree> tree_;
-  Vector3d shift_ = Vector3d::Zero();
-};
-
 /// Chooses the radius of the shell around each piece.
 class Thickening {
  public:
@@ -177,15 +54,11 @@ class Thickening {
       : mesh_(mesh),
         voxel_size_(voxel_size),
         triangles_(triangulated(mesh)),
-        tree_(mesh.points, triangles_, 1.0 / voxel_size),
+        parts_(parts_of(mesh, triangles_, voxel_size)),
+        tree_(parts_.points, parts_.triangles, 1.0 / voxel_size),
         orientation_(orient_faces(mesh.points, triangles_)) {}
 
-  Corners corners(std::size_t t) const {
-    const auto at = [&](std::size_t i) {
-      return Vector3d(mesh_.points[triangles_[t][i]].cast<double>() / voxel_size_);
-    };
-    return {at(0), at(1), at(2)};
-  }
+  Corners corners(std::size_t t) const { return corners_of(mesh_, triangles_[t], voxel_size_); }
 
   /// The width of what is on either side of a piece, and the radius that it needs.
   struct Need {
@@ -199,16 +72,16 @@ class Thickening {
   Need need(const Corners& piece, const Vector3d& normal, std::uint32_t triangle, bool is_lost, Mode mode,
             const ShownSurface& shown) const {
     const Vector3d at = centre(piece), outwards = turn(triangle) * normal;
-    const Opposite ahead = opposite(at, outwards), behind = opposite(at, -outwards);
+    const auto [ahead, behind] = across(at, outwards);
     // The orientation of a part may be wrong, so its inside is looked for on both sides.
-    const bool thick = shown.is_all(true, at - outwards) || shown.is_all(true, at + outwards);
+    const auto is_thick = [&] { return shown.is_all(true, at - outwards) || shown.is_all(true, at + outwards); };
     Need result;
     Vector3d inwards = -outwards;
     double wall = kNone, gap = kNone;
     if (behind.faces_away) {
       wall = behind.distance;
       if (ahead.faces_here) gap = ahead.distance;
-    } else if (thick) {
+    } else if (is_thick()) {
       if (ahead.faces_here) gap = ahead.distance;
     } else if (ahead.faces_here) {
       wall = ahead.distance;
@@ -239,7 +112,7 @@ class Thickening {
   /// border.
   bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle) const {
     const Vector3d inwards = -turn(triangle) * normal;
-    const Opposite behind = opposite(at, inwards);
+    const Opposite behind = across(at, inwards)[0];
     if (behind.faces_away && !(behind.slope > kParallel && behind.distance < 1.0)) return false;
     if (!behind.faces_away && !(is_free(at + inwards, kDeep) && is_free(at - inwards, kDeep))) return false;
     const double half_width = behind.faces_away ? 0.5 * behind.distance : 0.0;
@@ -256,21 +129,51 @@ class Thickening {
     bool faces_here = false, faces_away = false;
     double slope = 0.0;  ///< cosine of the angle between the ray and the triangle's normal, not negative
   };
-  Opposite opposite(const Vector3d& at, const Vector3d& along) const {
+  /// Returns the next triangle along a direction and the next one against it.
+  std::array<Opposite, 2> across(const Vector3d& at, const Vector3d& along) const {
     constexpr double kReach = 2.0 * kWireRadius;
-    const Vector3d from = at + kOff * along, to = at + kReach * along;
-    Opposite result;
-    double nearest = 2.0;
-    const Vector3d margin = Vector3d::Constant(1e-6);
-    tree_.for_each_near(from.cwiseMin(to) - margin, from.cwiseMax(to) + margin, [&](std::uint32_t t) {
-      const Facet facet(tree_.corner(t, 0), tree_.corner(t, 1), tree_.corner(t, 2));
-      const double part = meeting(from, to, facet);
-      if (part < 0.0 || part >= nearest) return;
-      nearest = part;
-      const double slope = turn(t) * facet.normal().stableNormalized().dot(along);
-      result = {kOff + part * (kReach - kOff), slope<0.0, slope> 0.0, std::abs(slope)};
+    std::array<Opposite, 2> result;
+    double nearest[2] = {2.0, 2.0};
+    tree_.for_each_on_segment(at - kReach * along, at + kReach * along, [&](std::uint32_t part) {
+      const std::uint32_t t = parts_.owner[part];
+      const Corners c = corners(t);
+      const Facet facet(c[0], c[1], c[2]);
+      for (std::size_t side = 0; side < 2; ++side) {
+        const Vector3d direction = (side == 0 ? 1.0 : -1.0) * along;
+        const double at_part = meeting(at + kOff * direction, at + kReach * direction, facet);
+        if (at_part < 0.0 || at_part >= nearest[side]) continue;
+        nearest[side] = at_part;
+        const double slope = turn(t) * facet.normal().stableNormalized().dot(direction);
+        result[side] = {kOff + at_part * (kReach - kOff), slope<0.0, slope> 0.0, std::abs(slope)};
+      }
     });
     return result;
+  }
+
+  /// The triangles in parts, because the boxes of large triangles meet many rays.
+  struct Parts {
+    std::vector<Eigen::Vector3f> points;
+    std::vector<Triangle> triangles;
+    std::vector<std::uint32_t> owner;  ///< triangle that each part belongs to
+  };
+  static Parts parts_of(const PolygonMesh& mesh, const std::vector<Triangle>& triangles, double voxel_size) {
+    constexpr double kLongest = 4.0;
+    Parts parts{mesh.points, {}, {}};
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      const Corners whole = corners_of(mesh, triangles[t], voxel_size);
+      if (cut(whole, kLongest).empty()) {
+        parts.triangles.push_back(triangles[t]);
+        parts.owner.push_back(t);
+        continue;
+      }
+      for_each_piece(whole, kLongest, [&](const Corners& c) {
+        const auto first = static_cast<std::uint32_t>(parts.points.size());
+        for (const Vector3d& p : c) parts.points.push_back((p * voxel_size).cast<float>());
+        parts.triangles.push_back({first, first + 1, first + 2});
+        parts.owner.push_back(t);
+      });
+    }
+    return parts;
   }
 
   /// 1 or −1, by which the normal of a triangle is turned outwards.
@@ -309,89 +212,9 @@ class Thickening {
   const PolygonMesh& mesh_;
   const double voxel_size_;
   const std::vector<Triangle> triangles_;
+  const Parts parts_;
   const TriangleTree tree_;
   const Orientation orientation_;
-};
-
-/// Which pieces lost_pieces() returns: all, or those that a shell does not show either, among which pieces in
-/// filled gaps do not count.
-enum class Wanted { all, after_thickening };
-
-/// A piece that is lost.
-struct LostPiece {
-  Vector3d at, normal;
-  std::uint32_t triangle;
-  double area;
-  bool is_far;  ///< no surface of the solid is within kFar, whichever side it faces
-};
-
-struct LostPieces {
-  std::vector<LostPiece> pieces;
-  double area = 0.0;  ///< of all polygons, voxels²
-};
-
-LostPieces lost_pieces(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size, Wanted wanted,
-                       RunContext& context) {
-  const double limit = wanted == Wanted::after_thickening ? kShownByShell : kShown;
-  const double aligned = wanted == Wanted::after_thickening ? 0.0 : kAligned;
-  const std::vector<Triangle> triangles = triangulated(mesh);
-  std::vector<LostPieces> parts((triangles.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
-  parallel_blocks(parts.size(), context, [&](std::size_t chunk) {
-    ShownSurface::Samples samples = shown.samples();
-    const std::size_t end = std::min(triangles.size(), (chunk + 1) * kTrianglesPerTask);
-    for (std::size_t t = chunk * kTrianglesPerTask; t < end; ++t) {
-      const auto at = [&](std::size_t i) {
-        return Vector3d(mesh.points[triangles[t][i]].cast<double>() / voxel_size);
-      };
-      const Corners corners{at(0), at(1), at(2)};
-      const Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
-      if (!(normal.squaredNorm() > 0.5)) continue;
-      for_each_piece(corners, [&](const Corners& piece) {
-        const Vector3d middle = centre(piece);
-        const double area = area_of(piece);
-        parts[chunk].area += area;
-        if (shown.look(middle, normal, limit, aligned, samples) != ShownSurface::Verdict::lost) return;
-        if (wanted == Wanted::after_thickening && shown.is_all(true, middle)) return;
-        parts[chunk].pieces.push_back({middle, normal, static_cast<std::uint32_t>(t), area,
-                                       !shown.mesh_shows(middle, normal, kFar, 0.0)});
-      });
-    }
-  });
-  LostPieces all;
-  for (const LostPieces& part : parts) {
-    all.pieces.insert(all.pieces.end(), part.pieces.begin(), part.pieces.end());
-    all.area += part.area;
-  }
-  return all;
-}
-
-/// Voxels, as a set that tells which places are within some voxels of others.
-class Near {
- public:
-  Near(const std::vector<LostPiece>& places, double distance) {
-    for (const LostPiece& piece : places) add(piece.at, distance);
-    cells_.voxelizeActiveTiles();
-  }
-  Near(const std::vector<Vector3d>& places, double distance) {
-    for (const Vector3d& p : places) add(p, distance);
-    cells_.voxelizeActiveTiles();
-  }
-  using Reader = openvdb::tree::ValueAccessor<const openvdb::MaskTree>;
-  Reader reader() const { return Reader(cells_); }
-  static bool holds(Reader& reader, const Vector3d& p) {
-    return reader.isValueOn({int(std::floor(p.x())), int(std::floor(p.y())), int(std::floor(p.z()))});
-  }
-
- private:
-  void add(const Vector3d& p, double distance) {
-    const auto cell = [&](double step) {
-      return openvdb::Coord(int(std::floor(p.x() + step)), int(std::floor(p.y() + step)),
-                            int(std::floor(p.z() + step)));
-    };
-    cells_.fill(openvdb::CoordBBox(cell(-distance), cell(distance)), true);
-  }
-
-  openvdb::MaskTree cells_;
 };
 
 /// Returns the samples of components of at most kCrumb samples that lie next to others. Samples inside are
@@ -438,23 +261,25 @@ struct Part {
   bool has_sheets = false;
 };
 
-/// Chooses the shell around the pieces near some places.
+/// Chooses the shell around the pieces near some positions, for the triangles of one task.
 class ShellMaker {
  public:
   ShellMaker(const Thickening& thickening, const ShownSurface& shown, const Near& around,
-             Thickening::Mode mode, const PolygonMesh& mesh, double voxel_size)
+             Thickening::Mode mode, const std::vector<ShownSurface::Verdict>& verdicts, const PolygonMesh& mesh,
+             double voxel_size)
       : thickening_(thickening),
         shown_(shown),
         around_(around.reader()),
         mode_(mode),
+        verdicts_(verdicts),
         mesh_(mesh),
         voxel_size_(voxel_size) {}
 
   void add(std::uint32_t t, const Triangle& triangle, Part& part) {
     triangle_ = t;
     const Corners corners = thickening_.corners(t);
-    normal_ = (corners[1] - corners[0]).cross(corners[2] - corners[0]).stableNormalized();
-    if (!(normal_.squaredNorm() > 0.5)) return;
+    normal_ = normal_of(corners);
+    if (normal_.isZero()) return;
     part.area += area_of(corners);
     const double radius = radius_of(corners, part);
     if (radius > 0.0)
@@ -463,29 +288,26 @@ class ShellMaker {
   }
 
  private:
-  /// Returns the radius if all pieces have one, else −1, and their halves are in the shell.
+  /// Returns the radius if all pieces have the same, else −1, and those with a radius are in the shell.
   double radius_of(const Corners& c, Part& part) {
-    const int split = corner_to_split(c);
-    if (split < 0) return radius_of_piece(c, part);
-    const std::array<Corners, 2> half = halves(c, split);
-    const double radius[2] = {radius_of(half[0], part), radius_of(half[1], part)};
-    if (radius[0] == radius[1]) return radius[0];
-    for (std::size_t i = 0; i < 2; ++i) {
-      if (radius[i] <= 0.0) continue;
-      ShellTriangle triangle{{}, radius[i]};
-      for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = (half[i][k] * voxel_size_).cast<float>();
+    const std::vector<Corners> pieces = cut(c, kPiece);
+    if (pieces.empty()) return radius_of_piece(c, part);
+    std::vector<double> radii;
+    for (const Corners& piece : pieces) radii.push_back(radius_of(piece, part));
+    if (std::ranges::all_of(radii, [&](double radius) { return radius == radii[0]; })) return radii[0];
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      if (radii[i] <= 0.0) continue;
+      ShellTriangle triangle{{}, radii[i]};
+      for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = (pieces[i][k] * voxel_size_).cast<float>();
       part.shell.push_back(triangle);
     }
     return -1.0;
   }
 
   double radius_of_piece(const Corners& c, Part& part) {
-    const Vector3d at = centre(c);
-    if (!Near::holds(around_, at)) return 0.0;
+    const ShownSurface::Verdict verdict = verdicts_[piece_++];
     // A neighbour of a lost piece that shows may be a sheet of a solid that is there.
-    ShownSurface::Samples samples = shown_.samples();
-    const ShownSurface::Verdict verdict = shown_.look(at, normal_, kShown, kAligned, samples);
-    if (verdict == ShownSurface::Verdict::hidden) return 0.0;
+    if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return 0.0;
     const Thickening::Need need =
         thickening_.need(c, normal_, triangle_, verdict == ShownSurface::Verdict::lost, mode_, shown_);
     if (!(need.radius > 0.0)) return 0.0;
@@ -505,6 +327,8 @@ class ShellMaker {
   const ShownSurface& shown_;
   Near::Reader around_;
   Thickening::Mode mode_;
+  const std::vector<ShownSurface::Verdict>& verdicts_;  ///< of the pieces, in the order in which they are added
+  std::size_t piece_ = 0;
   const PolygonMesh& mesh_;
   double voxel_size_;
   std::uint32_t triangle_ = 0;
@@ -523,17 +347,17 @@ LevelSet nothing_on(const openvdb::FloatGrid& distances) {
 /// Returns the lost pieces that are worth a shell. If more than kLittleLost of the area is lost, all are.
 /// Else those are that belong to a patch of lost pieces of which one is far from the solid's surface, or lies
 /// amid a wall, which has a hole there: what is left are the outermost parts of edges and tips.
-std::vector<LostPiece> worth_a_shell(const LostPieces& lost, const Thickening& thickening) {
+std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSurface& shown, const Thickening& thickening) {
   double area = 0.0;
-  for (const LostPiece& piece : lost.pieces) area += piece.area;
-  if (area > kLittleLost * lost.area) return lost.pieces;
+  for (const LostPiece& piece : all.lost) area += piece.area;
+  if (area > kLittleLost * all.area) return all.lost;
   // Patches are sets of pieces in neighbouring cells twice as large as voxels.
   std::map<std::array<int, 3>, std::uint32_t> cells;
   const auto cell_of = [](const Vector3d& at) {
     return std::array{int(std::floor(0.5 * at.x())), int(std::floor(0.5 * at.y())),
                       int(std::floor(0.5 * at.z()))};
   };
-  for (const LostPiece& piece : lost.pieces) cells.emplace(cell_of(piece.at), std::uint32_t(cells.size()));
+  for (const LostPiece& piece : all.lost) cells.emplace(cell_of(piece.at), std::uint32_t(cells.size()));
   DisjointSets sets(cells.size());
   for (const auto& [cell, number] : cells)
     for (int n = 0; n < 27; ++n) {
@@ -541,11 +365,12 @@ std::vector<LostPiece> worth_a_shell(const LostPieces& lost, const Thickening& t
       if (other != cells.end()) sets.join(number, other->second);
     }
   std::vector<std::uint8_t> counts(cells.size());
-  for (const LostPiece& piece : lost.pieces)
+  for (const LostPiece& piece : all.lost)
     if (std::uint8_t& patch = counts[sets.find(cells.at(cell_of(piece.at)))]; !patch)
-      patch = piece.is_far || thickening.is_amid_wall(piece.at, piece.normal, piece.triangle);
+      patch = !shown.mesh_shows(piece.at, piece.normal, kFar, 0.0) ||
+              thickening.is_amid_wall(piece.at, piece.normal, piece.triangle);
   std::vector<LostPiece> result;
-  for (const LostPiece& piece : lost.pieces)
+  for (const LostPiece& piece : all.lost)
     if (counts[sets.find(cells.at(cell_of(piece.at)))]) result.push_back(piece);
   return result;
 }
@@ -556,12 +381,11 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const double voxel_size = solid.level_set.voxel_size(), square = voxel_size * voxel_size;
   const Stage stage(context, "thin parts");
   const std::vector<Triangle> triangles = triangulated(mesh);
-  const SampledSolid bare = solid;
-  const ShownSurface shown(bare.level_set, bare.hermite, mesh.origin, context);
-  const LostPieces all_lost = lost_pieces(mesh, shown, voxel_size, Wanted::all, context);
-  if (all_lost.pieces.empty()) return std::nullopt;
+  const ShownSurface shown(solid.level_set, solid.hermite, mesh.origin, context);
+  const SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
+  if (comparison.lost.empty()) return std::nullopt;
   const Thickening thickening(mesh, voxel_size);
-  const std::vector<LostPiece> lost = worth_a_shell(all_lost, thickening);
+  const std::vector<LostPiece> lost = worth_a_shell(comparison, shown, thickening);
   if (lost.empty()) return std::nullopt;
   if (rule == ThinRule::refuse) {
     const Vector3d at = mesh.origin + voxel_size * lost.front().at;
@@ -569,6 +393,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
                 " do not show, such as at (" + short_text(at.x()) + ", " + short_text(at.y()) + ", " +
                 short_text(at.z()) + "); use smaller voxels, or keep thin parts, which thickens them");
   }
+  const SampledSolid bare = solid;
   ThinParts sum;
   double thinnest = kNone;
   std::vector<ShellTriangle> shell;
@@ -576,7 +401,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const auto add = [&](const Near& around, Thickening::Mode mode) {
     std::vector<Part> parts((triangles.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
     parallel_blocks(parts.size(), context, [&](std::size_t chunk) {
-      ShellMaker maker(thickening, shown, around, mode, mesh, voxel_size);
+      ShellMaker maker(thickening, shown, around, mode, comparison.verdicts[chunk], mesh, voxel_size);
       const std::size_t end = std::min(triangles.size(), (chunk + 1) * kTrianglesPerTask);
       for (std::size_t t = chunk * kTrianglesPerTask; t < end; ++t)
         maker.add(static_cast<std::uint32_t>(t), triangles[t], parts[chunk]);
@@ -600,13 +425,13 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
     solid.hermite = std::move(joined.hermite);
   };
   using Mode = Thickening::Mode;
-  add(Near(lost, kAround), Mode::sheets);
+  const Near around_lost(lost, kAround);
+  add(around_lost, Mode::sheets);
   if (shell.empty()) return std::nullopt;
   join();
   const std::size_t first = shell.size();
   const ShownSurface thicker(solid.level_set, solid.hermite, mesh.origin, context);
-  if (const auto still = lost_pieces(mesh, thicker, voxel_size, Wanted::after_thickening, context).pieces;
-      !still.empty())
+  if (const auto still = lost_after_thickening(mesh, thicker, voxel_size, around_lost, context); !still.empty())
     add(Near(still, kBeside), Mode::wires);
   if (const auto apart = crumbs(*solid.level_set.grid().grid); !apart.empty())
     add(Near(apart, kBesideCrumbs), Mode::rims);

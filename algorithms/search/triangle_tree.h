@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -51,32 +53,31 @@ class TriangleTree {
                           double upper_bound_squared = std::numeric_limits<double>::infinity(),
                           double enough_squared = -1.0) const;
 
-  /// Calls f(triangle) for the triangles of every leaf whose box meets the box from `low` to `high` (index space);
-  /// some of them may lie outside of that box.
+  /// Calls f(triangle) for the triangles whose boxes meet the box from `low` to `high` (index space).
   template <class F>
   void for_each_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, F&& f) const {
-    if (packs_.empty()) return;
-    struct Pack {
-      std::size_t number;
-      std::uint32_t level;
-    };
-    std::vector<Pack> packs{{packs_.size() - 1, static_cast<std::uint32_t>(first_.size() - 1)}};
-    while (!packs.empty()) {
-      const auto [number, level] = packs.back();
-      packs.pop_back();
-      const BoxPack& pack = packs_[number];
-      for (std::size_t k = 0; k < kFan; ++k) {
-        bool meets = pack.lower[0][k] <= pack.upper[0][k];  // else it is past the end
-        for (int a = 0; a < 3; ++a)
-          meets &= pack.lower[a][k] * scale_ <= high[a] && pack.upper[a][k] * scale_ >= low[a];
-        if (!meets) continue;
-        const Node box{static_cast<std::uint32_t>(number * kFan + k), level};
-        if (level > 0)
-          packs.push_back({child_pack(box), level - 1});
-        else
-          for (const std::uint32_t t : leaf(box.box)) f(t);
-      }
-    }
+    visit([&](const Eigen::Vector3d& lower,
+              const Eigen::Vector3d& upper) { return (lower.array() <= high.array()).all() && (upper.array() >= low.array()).all(); },
+          f);
+  }
+
+  /// Calls f(triangle) for the triangles whose boxes the segment meets (index space), and for some that it misses by
+  /// 1e-6 voxels.
+  template <class F>
+  void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, F&& f) const {
+    constexpr double kMargin = 1e-6;
+    const Eigen::Vector3d middle = 0.5 * (from + to), half = 0.5 * (to - from), reach = half.cwiseAbs();
+    // Separating axes of a box and a segment (Ericson, Real-Time Collision Detection, 2005, section 5.3.3).
+    visit(
+        [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
+          const Eigen::Vector3d c = middle - 0.5 * (lower + upper),
+                                e = 0.5 * (upper - lower) + Eigen::Vector3d::Constant(kMargin);
+          if ((c.cwiseAbs().array() > (e + reach).array()).any()) return false;
+          return std::abs(half.y() * c.z() - half.z() * c.y()) <= e.y() * reach.z() + e.z() * reach.y() + kMargin &&
+                 std::abs(half.z() * c.x() - half.x() * c.z()) <= e.z() * reach.x() + e.x() * reach.z() + kMargin &&
+                 std::abs(half.x() * c.y() - half.y() * c.x()) <= e.x() * reach.y() + e.y() * reach.x() + kMargin;
+        },
+        f);
   }
 
   double scale() const { return scale_; }
@@ -106,6 +107,40 @@ class TriangleTree {
 
  private:
   void build_boxes();
+
+  /// Calls f(triangle) for the triangles for whose boxes, and the boxes above them, meets(lower, upper) is true.
+  template <class Meets, class F>
+  void visit(const Meets& meets, F&& f) const {
+    if (packs_.empty()) return;
+    struct Pack {
+      std::size_t number;
+      std::uint32_t level;
+    };
+    // Each level leaves three packs at most, and 2³² triangles have 15 levels.
+    std::array<Pack, 64> packs;
+    std::size_t top = 0;
+    packs[top++] = {packs_.size() - 1, static_cast<std::uint32_t>(first_.size() - 1)};
+    while (top > 0) {
+      const auto [number, level] = packs[--top];
+      const BoxPack& pack = packs_[number];
+      for (std::size_t k = 0; k < kFan; ++k) {
+        if (!(pack.lower[0][k] <= pack.upper[0][k])) continue;  // It is past the end.
+        const auto side = [&](const float(&bound)[3][kFan]) {
+          return Eigen::Vector3d(bound[0][k] * scale_, bound[1][k] * scale_, bound[2][k] * scale_);
+        };
+        if (!meets(side(pack.lower), side(pack.upper))) continue;
+        const Node box{static_cast<std::uint32_t>(number * kFan + k), level};
+        if (level > 0) {
+          packs[top++] = {child_pack(box), level - 1};
+          continue;
+        }
+        for (const std::uint32_t t : leaf(box.box)) {
+          const Eigen::Vector3d a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
+          if (meets(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c))) f(t);
+        }
+      }
+    }
+  }
 
   std::span<const Eigen::Vector3f> points_;
   std::span<const Triangle> triangles_;

@@ -123,9 +123,11 @@ PolygonMesh remesh_all(const Paths& paths, const PolygonMesh& mesh, const Voxeli
   if (made.thin && chosen.options.is("crossings", "exact"))
     throw UsageError("-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
                      "--thin drop");
-  // Without a shell the extractor samples the polygons itself, where the level set's ends are closed.
-  if (!made.thin) return extract(paths, made.solid.level_set, &mesh, nullptr, chosen, extracting, session);
-  return extract(paths, made.solid.level_set, nullptr, &made.solid.hermite, chosen, extracting, session);
+  const Options& options = chosen.options;
+  if (!made.thin && (options.is("hermite", "auto") || options.is("hermite", "exact") || options.is("crossings", "exact")))
+    if (const std::string note = missed_edges_note(made.solid.sampling); !note.empty()) session.context.note(note);
+  return extract(paths, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, chosen, extracting,
+                 session);
 }
 
 /// The share of the visible surface that may be lost. @throws UsageError

@@ -67,9 +67,10 @@ class TriangleTree {
     return true;
   }
 
-  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more.
+  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more, until visit() returns false.
+  /// Returns true if it never did.
   template <class Visit>
-  void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
+  bool for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
     const Slabs slabs(from, to);
     std::size_t stack[kMaxDepth + 2];
     int top = 0;
@@ -83,8 +84,10 @@ class TriangleTree {
         continue;
       }
       const std::size_t leaf = node - (leaves() - 1);
-      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot) visit(std::uint32_t(slot));
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
+        if (!visit(std::uint32_t(slot))) return false;
     }
+    return true;
   }
 
   /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.

@@ -1,0 +1,1 @@
+"""The laboratory: experiments on programs that run as processes, and their tables."""

@@ -1,0 +1,150 @@
+"""Corpora of mesh files that are published in Debian packages.
+
+A corpus is a table of tab-separated values in experiments/data, one file per line: package, version, path, sha256, format,
+bytes, licence. A path has the form ARCHIVE!MEMBER if the file is inside an archive of the package. Nothing is installed:
+packages are downloaded with apt, and the required files are unpacked into the cache.
+"""
+
+import csv
+import dataclasses
+import hashlib
+import io
+import json
+import os
+import pathlib
+import posixpath
+import random
+import subprocess
+import tarfile
+import tempfile
+import zipfile
+
+
+class CorpusError(Exception):
+    """A file of the corpus is not available; the message says which one and why."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    package: str
+    version: str
+    path: str
+    sha256: str
+    format: str
+    bytes: int
+    licence: str
+
+    @property
+    def name(self):
+        return posixpath.basename(self.path.split("!")[-1])
+
+
+def read_corpus(path):
+    """Returns the entries of a corpus."""
+    with open(path, newline="") as file:
+        return [Entry(**{**row, "bytes": int(row["bytes"])}) for row in csv.DictReader(file, delimiter="\t")]
+
+
+def sample(entries, count, seed):
+    """Returns a random sample of the entries, in the order of the corpus; all of them if `count` is "all"."""
+    if count == "all" or count >= len(entries):
+        return entries
+    chosen = set(random.Random(seed).sample(sorted(e.sha256 for e in entries), count))
+    return [e for e in entries if e.sha256 in chosen]
+
+
+def cache_directory():
+    base = os.environ.get("HERMESH_CACHE") or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "hermesh")
+    return pathlib.Path(base) / "corpus"
+
+
+def location(entry, cache):
+    """Returns where an entry is, or will be, in the cache. The directory also holds the buffers that it refers to."""
+    return cache / entry.sha256[:16] / entry.name
+
+
+def fetch(entries, cache, say):
+    """Downloads and unpacks the entries that are not in the cache yet; `say` is called with progress messages.
+
+    Raises CorpusError if a package cannot be downloaded, or a file differs from the corpus.
+    """
+    missing = [e for e in entries if not location(e, cache).exists()]
+    for package in sorted({e.package for e in missing}):
+        wanted = [e for e in missing if e.package == package]
+        with tempfile.TemporaryDirectory() as work:
+            _unpack(_download(package, work, say), wanted, cache, work)
+
+
+def _download(package, work, say):
+    try:
+        shown = subprocess.run(["apt-cache", "show", "--no-all-versions", package], capture_output=True, text=True)
+        size = next((int(line.split()[1]) for line in shown.stdout.splitlines() if line.startswith("Size:")), 0)
+        say(f"downloading {package}, {size / 2**20:.0f} MiB")
+        got = subprocess.run(["apt-get", "download", package], cwd=work, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise CorpusError(f"apt is required to download the package {package}") from None
+    found = sorted(pathlib.Path(work).glob("*.deb"))
+    if got.returncode or not found:
+        raise CorpusError(f"{package}: apt-get download failed: {got.stderr.strip() or 'no package'}; try apt-get update")
+    return found[0]
+
+
+class _Package:
+    """The files of a package, by path."""
+
+    def __init__(self, deb, work):
+        data = os.path.join(work, "data.tar")
+        with open(data, "wb") as out:
+            subprocess.run(["dpkg-deb", "--fsys-tarfile", deb], stdout=out, check=True)
+        self._tar = tarfile.open(data)
+        self._archives = {}
+
+    def read(self, path):
+        outer, _, inner = path.partition("!")
+        if not inner:
+            return self._tar.extractfile(f"./{outer}").read()
+        if outer not in self._archives:
+            content = io.BytesIO(self.read(outer))
+            is_zip = zipfile.is_zipfile(content)
+            content.seek(0)
+            self._archives[outer] = zipfile.ZipFile(content) if is_zip else tarfile.open(fileobj=content)
+        archive = self._archives[outer]
+        return archive.read(inner) if isinstance(archive, zipfile.ZipFile) else archive.extractfile(inner).read()
+
+
+def _unpack(deb, entries, cache, work):
+    package = _Package(deb, work)
+    for entry in entries:
+        try:
+            content = package.read(entry.path)
+        except (KeyError, AttributeError):
+            raise CorpusError(f"{deb.name} has no file {entry.path}") from None
+        if hashlib.sha256(content).hexdigest() != entry.sha256:
+            raise CorpusError(f"{deb.name}: the SHA-256 of {entry.path} differs from the corpus, which is of version "
+                              f"{entry.version}")
+        target = location(entry, cache)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if entry.format == "gltf":
+            _unpack_buffers(package, entry.path, content, target.parent)
+        # The name appears when the file and its buffers are complete.
+        partial = target.with_suffix(".partial")
+        partial.write_bytes(content)
+        partial.rename(target)
+
+
+def _unpack_buffers(package, path, content, directory):
+    try:
+        buffers = json.loads(content).get("buffers", [])
+    except (ValueError, AttributeError):
+        return
+    for buffer in buffers:
+        uri = buffer.get("uri", "") if isinstance(buffer, dict) else ""
+        if not uri or uri.startswith("data:") or posixpath.isabs(uri) or ".." in uri.split("/"):
+            continue
+        try:
+            found = package.read(posixpath.join(posixpath.dirname(path), uri))
+        except (KeyError, AttributeError):
+            continue  # Files with missing buffers belong to the corpus as they are.
+        (directory / uri).parent.mkdir(parents=True, exist_ok=True)
+        (directory / uri).write_bytes(found)
