@@ -234,7 +234,8 @@ class BoundedRemesher {
     const auto view = view_of(hermite, context_);
     const FilePoints file(hermite.placement);
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
-    result_.work += double(uniform.points.size());
+    // Thin parts take about as long as three times the mesh.
+    count_work(double(uniform.points.size()) * (made.thin ? 3.0 : 1.0));
     Attempt result{
         voxel_size,
         std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), keeps_thin ? std::span<const std::int8_t>() : turns_,
@@ -246,6 +247,12 @@ class BoundedRemesher {
     if (result.surface->triangles.empty()) return std::nullopt;
     result.file_points = result.in_file(result.fine.points());
     return result;
+  }
+
+  void count_work(double work) {
+    result_.work += work;
+    if (result_.work > options_.most_work)
+      throw Error("the bound is not reached within the work that is allowed; allow a larger error or more triangles");
   }
 
   BoundaryTriangles all_polygons() const {
@@ -389,7 +396,7 @@ class BoundedRemesher {
     std::vector<Far> far;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
       CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
-      result_.work += double(now.fine.points().size());
+      count_work(double(now.fine.points().size()));
       far = prove(now, surface, coarse);
       // Nothing is written but what was proved just now, as the file will hold it.
       if (far.empty()) {

@@ -21,6 +21,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,8 @@ struct BoundedRemeshOptions {
   /// Points of the uniform mesh at most, so that voxels do not become smaller without end; each takes some
   /// 300 bytes, and there are no more than the available memory holds.
   double most_points = 3e7;
+  /// Work, as BoundedMesh::work, after which no further mesh is made; the bound is then not reached.
+  double most_work = std::numeric_limits<double>::infinity();
   double smallest_voxel = 0.0;     ///< world units: none is smaller; 0: an eighth of the error
   bool written_in_single = false;  ///< as in ExtractionInput
   /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin parts and sheets are thickened
@@ -71,7 +74,7 @@ struct BoundedMesh {
   double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
   bool over_holes = false;        ///< as it was asked for
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
-  double work = 0.0;              ///< vertices of all meshes that were made: a measure of time for any machine
+  double work = 0.0;              ///< vertices of all meshes that were made, a measure of time for any machine
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::optional<ThinParts> thin;  ///< what was thickened; none: nothing
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first
@@ -83,11 +86,11 @@ struct BoundedMesh {
 /// @param mesh any polygons, quads cut as they are to be
 /// @param options what is asked for
 /// @param context told of progress, and asked whether to stop
-/// @throws Error where the polygons give no inside, or as voxelize() does; Cancelled
+/// @throws Error where the polygons give no inside, or as voxelize() does, or after `options.most_work`; Cancelled
 BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context);
 
-/// The work after which remesh_to_budget() starts no further try.
-inline constexpr double kBudgetWork = 3e6;
+/// The work of all tries of remesh_to_budget() at most, some half a minute on two cores.
+inline constexpr double kBudgetWork = 2e6;
 
 /// Returns the mesh of bounded_remesh() with the smallest error that was found for which there are at most
 /// `triangles` triangles; `options.error` is ignored. Errors are tried until nine tenths of the triangles are used,

@@ -22,6 +22,8 @@ constexpr double kExact = 1e-5;
 /// voxels are enough for these.
 constexpr std::array<double, 3> kPlaneErrors = {6e-3, 1e-3, 1e-4};
 constexpr double kPointsOfPlane = 1e5;
+/// What a try that ends with an error counts for.
+constexpr double kWorkOfFailure = 3e5;
 
 /// Runs tries and keeps the best mesh, with the notes and figures of the run that made it.
 class Tries {
@@ -41,7 +43,9 @@ class Tries {
     context_.notes.resize(notes_);
     context_.figures.resize(figures_);
     try {
-      BoundedMesh made = bounded_remesh(mesh_, options, context_);
+      BoundedRemeshOptions limited = options;
+      limited.most_work = kBudgetWork - work_;
+      BoundedMesh made = bounded_remesh(mesh_, limited, context_);
       work_ += made.work;
       count_ = made.mesh.triangle_count();
       if (!made.unmet.empty()) {
@@ -54,6 +58,7 @@ class Tries {
       best_figures_ = context_.figures;
       return Outcome::fits;
     } catch (const Error&) {
+      work_ += kWorkOfFailure;
       failure_ = std::current_exception();
       return Outcome::refused;
     }

@@ -15,6 +15,7 @@
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/remesh/shell.h"
 #include "algorithms/remesh/shown_surface.h"
+#include "algorithms/search/triangle_point.h"
 #include "algorithms/search/triangle_tree.h"
 #include "algorithms/voxelization/distance/segment.h"
 #include "algorithms/voxelization/inside/orientation.h"
@@ -36,7 +37,8 @@ constexpr double kFar = 1.4;  ///< what is farther from all surface has vanished
 constexpr double kLittleLost =
     0.01;                          ///< share of the area up to which it may be edges and tips that are lost
 constexpr double kParallel = 0.9;  ///< cosine up to which the sides of a wall count as parallel
-constexpr double kDeep = 0.9;  ///< a place one voxel within a thick solid is farther than this from polygons
+constexpr double kAlong = 0.7;     ///< the same for a sheet that goes on
+constexpr double kDeep = 0.74;  ///< a position one voxel from a wall as thick as rays reach is farther than this from it
 constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
 constexpr double kNoWall = 1e-3;  ///< a wall thinner than this has no thickness to speak of
 constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -63,6 +65,7 @@ class Thickening {
   /// The width of what is on either side of a piece, and the radius that it needs.
   struct Need {
     double radius = 0.0;
+    double inset = 0.0;   ///< how far from the piece along its normal the shell's middle is
     double wall = kNone;  ///< thickness of the wall that is thickened; 0 for a sheet
     bool is_gap = false;  ///< it is there to fill a gap
   };
@@ -73,22 +76,18 @@ class Thickening {
             const ShownSurface& shown) const {
     const Vector3d at = centre(piece), outwards = turn(triangle) * normal;
     const auto [ahead, behind] = across(at, outwards);
-    // The orientation of a part may be wrong, so its inside is looked for on both sides.
-    const auto is_thick = [&] { return shown.is_all(true, at - outwards) || shown.is_all(true, at + outwards); };
     Need result;
     Vector3d inwards = -outwards;
     double wall = kNone, gap = kNone;
     if (behind.faces_away) {
       wall = behind.distance;
       if (ahead.faces_here) gap = ahead.distance;
-    } else if (is_thick()) {
+    } else if (is_thick(at, outwards, shown)) {
       if (ahead.faces_here) gap = ahead.distance;
     } else if (ahead.faces_here) {
       wall = ahead.distance;
       inwards = outwards;
-    } else if (is_lost && is_free(at - outwards, kDeep) && is_free(at + outwards, kDeep)) {
-      // Neither a wall, nor the boundary of a thick solid, nor the rim of a wall, within which there are
-      // polygons.
+    } else if (is_lost && (has_free_sides(at, outwards) || continues_a_sheet(at, normal, shown))) {
       wall = 0.0;
     }
     if (std::isfinite(wall)) {
@@ -99,6 +98,11 @@ class Thickening {
       else if (mode == Mode::rims)
         radius = std::max(radius, radius_at_rim(piece, within));
       result.radius = std::max(0.0, radius - 0.5 * wall);
+      // A wall that the samples could show, but that is no part of their solid, as between two open sheets.
+      if (is_lost && !(result.radius > 0.0) && shown.is_all(false, at + within)) {
+        result.radius = 0.5 * wall;
+        result.inset = within.dot(normal);
+      }
       result.wall = wall;
     }
     if (gap < kWideGap && 0.5 * gap > result.radius) {
@@ -178,6 +182,36 @@ class Thickening {
 
   /// 1 or −1, by which the normal of a triangle is turned outwards.
   double turn(std::uint32_t triangle) const { return orientation_.turns[triangle] < 0 ? -1.0 : 1.0; }
+
+  /// Returns true if the solid is thick on one side of a piece. The orientation of a part may be wrong, so both are tested.
+  static bool is_thick(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) {
+    return shown.is_all(true, at - normal) || shown.is_all(true, at + normal);
+  }
+
+  /// Returns true if there are no polygons one voxel away on either side. That is not so of the boundary of a thick solid
+  /// near its edges, nor of the rim of a wall.
+  bool has_free_sides(const Vector3d& at, const Vector3d& normal) const {
+    return is_free(at - normal, kDeep) && is_free(at + normal, kDeep);
+  }
+
+  /// Returns true if a piece near a crease is part of a sheet: farther from the crease there is nothing on either side.
+  bool continues_a_sheet(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) const {
+    constexpr double kOnSheet = 0.5;
+    const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+    for (const double distance : {1.5, 3.0})
+      for (int i = 0; i < 8; ++i) {
+        const double angle = i * M_PI / 4.0;
+        const Vector3d aside = at + distance * (std::cos(angle) * u + std::sin(angle) * v);
+        const std::uint32_t part = tree_.nearest(aside, kOnSheet * kOnSheet).triangle;
+        if (part == TriangleTree::kNone) continue;
+        const Corners c = corners(parts_.owner[part]);
+        const Vector3d there = closest_point(aside, c[0], c[1], c[2]).position, facing = normal_of(c);
+        if (std::abs(facing.dot(normal)) < kAlong || is_thick(there, facing, shown)) continue;
+        const auto [ahead, behind] = across(there, facing);
+        if (std::isinf(ahead.distance) && std::isinf(behind.distance) && has_free_sides(there, facing)) return true;
+      }
+    return false;
+  }
 
   /// Returns true if no triangle is within a distance of a place.
   bool is_free(const Vector3d& at, double distance) const {
@@ -265,62 +299,66 @@ struct Part {
 class ShellMaker {
  public:
   ShellMaker(const Thickening& thickening, const ShownSurface& shown, const Near& around,
-             Thickening::Mode mode, const std::vector<ShownSurface::Verdict>& verdicts, const PolygonMesh& mesh,
-             double voxel_size)
+             Thickening::Mode mode, const std::vector<ShownSurface::Verdict>& verdicts, double voxel_size)
       : thickening_(thickening),
         shown_(shown),
         around_(around.reader()),
         mode_(mode),
         verdicts_(verdicts),
-        mesh_(mesh),
         voxel_size_(voxel_size) {}
 
-  void add(std::uint32_t t, const Triangle& triangle, Part& part) {
+  void add(std::uint32_t t, Part& part) {
     triangle_ = t;
     const Corners corners = thickening_.corners(t);
     normal_ = normal_of(corners);
     if (normal_.isZero()) return;
     part.area += area_of(corners);
-    const double radius = radius_of(corners, part);
-    if (radius > 0.0)
-      part.shell.push_back(
-          {{mesh_.points[triangle[0]], mesh_.points[triangle[1]], mesh_.points[triangle[2]]}, radius});
+    if (const Sweep sweep = sweep_of(corners, part); sweep.radius > 0.0) append(corners, sweep, part);
   }
 
  private:
-  /// Returns the radius if all pieces have the same, else −1, and those with a radius are in the shell.
-  double radius_of(const Corners& c, Part& part) {
-    const std::vector<Corners> pieces = cut(c, kPiece);
-    if (pieces.empty()) return radius_of_piece(c, part);
-    std::vector<double> radii;
-    for (const Corners& piece : pieces) radii.push_back(radius_of(piece, part));
-    if (std::ranges::all_of(radii, [&](double radius) { return radius == radii[0]; })) return radii[0];
-    for (std::size_t i = 0; i < pieces.size(); ++i) {
-      if (radii[i] <= 0.0) continue;
-      ShellTriangle triangle{{}, radii[i]};
-      for (std::size_t k = 0; k < 3; ++k) triangle.corner[k] = (pieces[i][k] * voxel_size_).cast<float>();
-      part.shell.push_back(triangle);
-    }
-    return -1.0;
+  /// The body around a piece. Steps of 1/40 voxel keep faces in one plane together.
+  struct Sweep {
+    double radius = 0.0;  ///< 0: none, −1: the pieces' bodies are in the shell
+    double inset = 0.0;
+    bool operator==(const Sweep&) const = default;
+  };
+
+  void append(const Corners& c, const Sweep& sweep, Part& part) {
+    ShellTriangle triangle{{}, sweep.radius};
+    for (std::size_t k = 0; k < 3; ++k)
+      triangle.corner[k] = ((c[k] + sweep.inset * normal_) * voxel_size_).cast<float>();
+    part.shell.push_back(triangle);
   }
 
-  double radius_of_piece(const Corners& c, Part& part) {
+  /// Returns the body of the whole triangle if those of its pieces are the same.
+  Sweep sweep_of(const Corners& c, Part& part) {
+    const std::vector<Corners> pieces = cut(c, kPiece);
+    if (pieces.empty()) return sweep_of_piece(c, part);
+    std::vector<Sweep> sweeps;
+    for (const Corners& piece : pieces) sweeps.push_back(sweep_of(piece, part));
+    if (std::ranges::all_of(sweeps, [&](const Sweep& sweep) { return sweep == sweeps[0]; })) return sweeps[0];
+    for (std::size_t i = 0; i < pieces.size(); ++i)
+      if (sweeps[i].radius > 0.0) append(pieces[i], sweeps[i], part);
+    return {.radius = -1.0};
+  }
+
+  Sweep sweep_of_piece(const Corners& c, Part& part) {
     const ShownSurface::Verdict verdict = verdicts_[piece_++];
     // A neighbour of a lost piece that shows may be a sheet of a solid that is there.
-    if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return 0.0;
+    if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return {};
     const Thickening::Need need =
         thickening_.need(c, normal_, triangle_, verdict == ShownSurface::Verdict::lost, mode_, shown_);
-    if (!(need.radius > 0.0)) return 0.0;
+    if (!(need.radius > 0.0)) return {};
     const double area = area_of(c);
     (need.is_gap ? part.merged_area : part.thickened_area) += area;
     if (!need.is_gap) {
-      part.thickest = std::max(part.thickest, 2.0 * need.radius);
+      part.thickest = std::max(part.thickest, 2.0 * (need.radius - std::abs(need.inset)));
       part.has_sheets |= need.wall == 0.0;
       if (need.wall > 0.0) part.thinnest = std::min(part.thinnest, need.wall);
     }
-    // Steps of the radius keep faces in one plane together.
     constexpr double kStep = 1.0 / 40.0;
-    return kStep * std::ceil(need.radius / kStep - 1e-6);
+    return {kStep * std::ceil(need.radius / kStep - 1e-6), kStep * std::round(need.inset / kStep)};
   }
 
   const Thickening& thickening_;
@@ -329,7 +367,6 @@ class ShellMaker {
   Thickening::Mode mode_;
   const std::vector<ShownSurface::Verdict>& verdicts_;  ///< of the pieces, in the order in which they are added
   std::size_t piece_ = 0;
-  const PolygonMesh& mesh_;
   double voxel_size_;
   std::uint32_t triangle_ = 0;
   Vector3d normal_;
@@ -401,10 +438,10 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const auto add = [&](const Near& around, Thickening::Mode mode) {
     std::vector<Part> parts((triangles.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
     parallel_blocks(parts.size(), context, [&](std::size_t chunk) {
-      ShellMaker maker(thickening, shown, around, mode, comparison.verdicts[chunk], mesh, voxel_size);
+      ShellMaker maker(thickening, shown, around, mode, comparison.verdicts[chunk], voxel_size);
       const std::size_t end = std::min(triangles.size(), (chunk + 1) * kTrianglesPerTask);
       for (std::size_t t = chunk * kTrianglesPerTask; t < end; ++t)
-        maker.add(static_cast<std::uint32_t>(t), triangles[t], parts[chunk]);
+        maker.add(static_cast<std::uint32_t>(t), parts[chunk]);
     });
     for (const Part& part : parts) {
       shell.insert(shell.end(), part.shell.begin(), part.shell.end());

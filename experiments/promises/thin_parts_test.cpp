@@ -181,12 +181,11 @@ TEST(ThinParts, AreKeptInOnePieceWithoutHoles) {
     }
 }
 
-TEST(Slow, ThinPartsAreKeptInAllPositions) {
+TEST(Slow, ThinPartsAreKeptIn300PositionsEach) {
+  const std::vector<double> thickness = {0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.2, 1.5, 2.0, 3.0};
   for (const Surface& surface : surfaces())
-    for (const double thickness : {0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.2, 1.5, 2.0, 3.0}) {
-      for (std::uint64_t seed = 0; is_possible(surface, thickness) && seed < 300; ++seed)
-        expect_kept(surface, thickness, 1000 + seed);
-    }
+    for (std::uint64_t seed = 0; seed < 300; ++seed)
+      if (const double t = thickness[seed % thickness.size()]; is_possible(surface, t)) expect_kept(surface, t, 1000 + seed);
 }
 
 TEST(ThinParts, OfAPlateAreOneAndAFifthVoxelsThick) {
