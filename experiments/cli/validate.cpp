@@ -23,7 +23,7 @@ struct ValidateArguments {
   std::string mesh, reference, features, reference_quads = "better";
   std::string require;
   bool certify = false;
-  std::int64_t samples = JudgeOptions().samples;
+  std::int64_t samples = JudgeOptions().samples, solid_samples = JudgeOptions().solid_samples;
   double dihedral = JudgeOptions().dihedral_degrees, voxel_size = 0.0;
 };
 
@@ -83,7 +83,9 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
     throw UsageError("--voxel-size says what explains a distance to a reference: name it with --reference");
   if (arguments.reference.empty() && arguments.features.empty())
     refuse_idle(command, {"--samples"}, "distances need a --reference");
-  if (arguments.reference.empty()) refuse_idle(command, {"--reference-quads"}, "it is about a --reference");
+  if (solid && arguments.solid_samples == 0) throw UsageError("--require solid needs --solid-samples");
+  if (arguments.reference.empty())
+    refuse_idle(command, {"--reference-quads", "--solid-samples"}, "it is about a --reference");
   if (arguments.features.empty()) refuse_idle(command, {"--dihedral"}, "sharp edges are those of --features");
 
   const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
@@ -94,6 +96,7 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
   if (arguments.reference_quads == "as-given") options.reference_quads = validation::QuadRule::as_given;
   options.features = features ? &*features : nullptr;
   options.samples = arguments.samples;
+  options.solid_samples = arguments.solid_samples;
   options.certify = arguments.certify;
   options.dihedral_degrees = arguments.dihedral;
   options.voxel_size = arguments.voxel_size;
@@ -140,6 +143,11 @@ void add_validate(CLI::App& app, Session& session) {
           "--samples", arguments->samples,
           "Samples on each surface for the distances (default: " + std::to_string(arguments->samples) + ")")
       ->transform(whole_number(1, 1'000'000'000));
+  command
+      ->add_option("--solid-samples", arguments->solid_samples,
+                   "Samples for the comparison of the solid with that of the --reference; 0: it is not compared (default: " +
+                       std::to_string(arguments->solid_samples) + ")")
+      ->transform(whole_number(0, 1'000'000'000));
   command->add_option(
       "--require", arguments->require,
       "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "

@@ -132,7 +132,8 @@ class Benchmark:
             if ended.status != "done":
                 row["message"] = (ended.errors.strip().splitlines() or [""])[-1][:500]
                 return row
-            report = self._ask("validate", str(output), "--reference", str(path), "--voxel-size", repr(voxel))
+            report = self._ask("validate", str(output), "--reference", str(path), "--voxel-size", repr(voxel),
+                               "--samples", "20000", "--solid-samples", "0")
             if not report or not report.get("visible_loss"):
                 return {**row, "status": "wrong output", "message": "the output is missing or not a mesh"}
             visible = report["visible_loss"]
