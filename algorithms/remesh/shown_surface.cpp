@@ -130,7 +130,24 @@ ShownSurface::Verdict ShownSurface::look(const Vector3d& at, const Vector3d& nor
   if (hidden) return Verdict::hidden;
   // The distances are those to this plane: the cell's surface is that of the place.
   if ((with || against) && inside_somewhere && outside_somewhere) return Verdict::shown;
-  return mesh_shows(at, normal, limit, aligned) ? Verdict::shown : Verdict::lost;
+  if (!mesh_shows(at, normal, limit, aligned)) return Verdict::lost;
+  return is_pierced(at, normal, samples) ? Verdict::pierced : Verdict::shown;
+}
+
+bool ShownSurface::is_pierced(const Vector3d& at, const Vector3d& normal, Samples& samples) const {
+  const openvdb::Coord cell = cell_of(at);
+  bool before[8], behind[8];
+  for (int i = 0; i < 8; ++i) {
+    const openvdb::Coord corner = cell.offsetBy(i & 1, i >> 1 & 1, i >> 2);
+    const bool outside = samples.getValue(corner) >= 0.0f;
+    const double side = (Vector3d(corner.x(), corner.y(), corner.z()) - at).dot(normal);
+    before[i] = outside && side > 0.0;
+    behind[i] = outside && side < 0.0;
+  }
+  for (int i = 0; i < 8; ++i)
+    for (const int axis : {1, 2, 4})
+      if (before[i] && behind[i ^ axis]) return true;
+  return false;
 }
 
 bool ShownSurface::is_all(bool inside, const Vector3d& at) const {
@@ -175,7 +192,7 @@ void Near::add(const Vector3d& p, double distance) {
 SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
                               RunContext& context) {
   struct Part {
-    std::vector<LostPiece> lost;
+    std::vector<LostPiece> lost, pierced;
     std::vector<ShownSurface::Verdict> verdicts;
     double area = 0.0;
   };
@@ -187,10 +204,12 @@ SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface
         part.area += area;
         part.verdicts.push_back(shown.look(at, normal, kShown, kAligned, samples));
         if (part.verdicts.back() == ShownSurface::Verdict::lost) part.lost.push_back({at, normal, t, area});
+        if (part.verdicts.back() == ShownSurface::Verdict::pierced) part.pierced.push_back({at, normal, t, area});
       });
   SurfaceComparison all;
   for (Part& part : parts) {
     all.lost.insert(all.lost.end(), part.lost.begin(), part.lost.end());
+    all.pierced.insert(all.pierced.end(), part.pierced.begin(), part.pierced.end());
     all.area += part.area;
     all.verdicts.push_back(std::move(part.verdicts));
   }

@@ -56,11 +56,19 @@ class ShownSurface {
   using Samples = openvdb::FloatGrid::ConstUnsafeAccessor;
   Samples samples() const { return grid_.getConstUnsafeAccessor(); }
 
-  enum class Verdict : std::uint8_t { shown, hidden, lost };
+  enum class Verdict : std::uint8_t {
+    shown,
+    pierced,  ///< shown, but an edge of the lattice with both ends outside passes through: a wall may have a hole here
+    hidden,
+    lost
+  };
   /// Returns `shown` if the solid has surface within `limit` of a position whose normal is parallel or opposite to a
   /// normal of unit length to within a cosine of `aligned`, and `hidden` for a position inside the solid.
   Verdict look(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, double limit, double aligned,
                Samples& samples) const;
+
+  /// Returns true if an edge of the cell around a position has both ends outside, on different sides of its plane.
+  bool is_pierced(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, Samples& samples) const;
 
   /// Returns true if all eight samples around a position are on the given side.
   bool is_all(bool inside, const Eigen::Vector3d& at) const;
@@ -102,7 +110,7 @@ class Near {
 
 /// The comparison of all pieces with a solid's surface.
 struct SurfaceComparison {
-  std::vector<LostPiece> lost;
+  std::vector<LostPiece> lost, pierced;
   double area = 0.0;  ///< of all polygons
   /// What look() returns for each piece of each task's triangles, in their order.
   std::vector<std::vector<ShownSurface::Verdict>> verdicts;

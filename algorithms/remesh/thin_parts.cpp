@@ -112,13 +112,13 @@ class Thickening {
     return result;
   }
 
-  /// Returns true if a piece is part of a wall or sheet that is thinner than a voxel, and not near its
+  /// Returns true if a piece is part of a wall that is thinner than a voxel, or of a sheet if these count, and not near its
   /// border.
-  bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle) const {
+  bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle, bool sheets_count) const {
     const Vector3d inwards = -turn(triangle) * normal;
     const Opposite behind = across(at, inwards)[0];
     if (behind.faces_away && !(behind.slope > kParallel && behind.distance < 1.0)) return false;
-    if (!behind.faces_away && !(is_free(at + inwards, kDeep) && is_free(at - inwards, kDeep))) return false;
+    if (!behind.faces_away && !(sheets_count && has_free_sides(at, inwards))) return false;
     const double half_width = behind.faces_away ? 0.5 * behind.distance : 0.0;
     const Vector3d middle = at + half_width * inwards, u = normal.unitOrthogonal(), v = normal.cross(u);
     for (const auto& [x, y] : {std::pair{1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}, {0.0, -1.0}})
@@ -405,7 +405,7 @@ std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSu
   for (const LostPiece& piece : all.lost)
     if (std::uint8_t& patch = counts[sets.find(cells.at(cell_of(piece.at)))]; !patch)
       patch = !shown.mesh_shows(piece.at, piece.normal, kFar, 0.0) ||
-              thickening.is_amid_wall(piece.at, piece.normal, piece.triangle);
+              thickening.is_amid_wall(piece.at, piece.normal, piece.triangle, true);
   std::vector<LostPiece> result;
   for (const LostPiece& piece : all.lost)
     if (counts[sets.find(cells.at(cell_of(piece.at)))]) result.push_back(piece);
@@ -420,9 +420,12 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const std::vector<Triangle> triangles = triangulated(mesh);
   const ShownSurface shown(solid.level_set, solid.hermite, mesh.origin, context);
   const SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
-  if (comparison.lost.empty()) return std::nullopt;
+  if (comparison.lost.empty() && comparison.pierced.empty()) return std::nullopt;
   const Thickening thickening(mesh, voxel_size);
-  const std::vector<LostPiece> lost = worth_a_shell(comparison, shown, thickening);
+  std::vector<LostPiece> lost = worth_a_shell(comparison, shown, thickening);
+  // The border of a hole shows the polygons within it, if that is narrow.
+  for (const LostPiece& piece : comparison.pierced)
+    if (thickening.is_amid_wall(piece.at, piece.normal, piece.triangle, false)) lost.push_back(piece);
   if (lost.empty()) return std::nullopt;
   if (rule == ThinRule::refuse) {
     const Vector3d at = mesh.origin + voxel_size * lost.front().at;
