@@ -16,7 +16,8 @@ FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
       polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
   FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, source, input.context, &sampling);
-  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons' (samplers.h).
+  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons'
+  // (samplers.h).
   if (const std::string note = missed_edges_note(sampling); !note.empty()) input.context.note(note);
   return hermite;
 }

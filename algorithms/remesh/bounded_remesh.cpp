@@ -252,7 +252,8 @@ class BoundedRemesher {
   void count_work(double work) {
     result_.work += work;
     if (result_.work > options_.most_work)
-      throw Error("the bound is not reached within the work that is allowed; allow a larger error or more triangles");
+      throw Error(
+          "the bound is not reached within the work that is allowed; allow a larger error or more triangles");
   }
 
   BoundaryTriangles all_polygons() const {

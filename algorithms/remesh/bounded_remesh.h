@@ -74,7 +74,7 @@ struct BoundedMesh {
   double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
   bool over_holes = false;        ///< as it was asked for
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
-  double work = 0.0;              ///< vertices of all meshes that were made, a measure of time for any machine
+  double work = 0.0;  ///< vertices of all meshes that were made, a measure of time for any machine
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::optional<ThinParts> thin;  ///< what was thickened; none: nothing
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first
@@ -86,15 +86,16 @@ struct BoundedMesh {
 /// @param mesh any polygons, quads cut as they are to be
 /// @param options what is asked for
 /// @param context told of progress, and asked whether to stop
-/// @throws Error where the polygons give no inside, or as voxelize() does, or after `options.most_work`; Cancelled
+/// @throws Error where the polygons give no inside, or as voxelize() does, or after `options.most_work`;
+/// Cancelled
 BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context);
 
 /// The work of all tries of remesh_to_budget() at most, some half a minute on two cores.
 inline constexpr double kBudgetWork = 2e6;
 
 /// Returns the mesh of bounded_remesh() with the smallest error that was found for which there are at most
-/// `triangles` triangles; `options.error` is ignored. Errors are tried until nine tenths of the triangles are used,
-/// twelve at most, and until their work exceeds kBudgetWork.
+/// `triangles` triangles; `options.error` is ignored. Errors are tried until nine tenths of the triangles are
+/// used, twelve at most, and until their work exceeds kBudgetWork.
 /// @param mesh as in bounded_remesh()
 /// @param triangles at least 4
 /// @param options as in bounded_remesh(), but for the error

@@ -77,8 +77,8 @@ class ShellEdges {
  private:
   /// Follows the edge from its inside end. Each body of the shell is convex, so the edge leaves it once;
   /// where it does, another body may go on.
-  void move(const Eigen::Vector3d& first, int axis, bool first_inside, Start start,
-            EdgeCrossing& crossing, std::vector<std::uint32_t>& near) const {
+  void move(const Eigen::Vector3d& first, int axis, bool first_inside, Start start, EdgeCrossing& crossing,
+            std::vector<std::uint32_t>& near) const {
     const Eigen::Vector3d inside = first + (first_inside ? 0.0 : 1.0) * Eigen::Vector3d::Unit(axis);
     const Eigen::Vector3d along = (first_inside ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis);
     const double given = first_inside ? crossing.offset : 1.0 - crossing.offset;
@@ -111,7 +111,8 @@ class ShellEdges {
   }
 
   /// Returns where a ray that is inside the body around a triangle at `low` leaves it, at most 1.
-  double leaves(std::uint32_t t, const Eigen::Vector3d& from, const Eigen::Vector3d& along, double low) const {
+  double leaves(std::uint32_t t, const Eigen::Vector3d& from, const Eigen::Vector3d& along,
+                double low) const {
     double high = 1.0, at_low = beyond(t, from + low * along), at_high = beyond(t, from + along);
     if (at_high <= 0.0) return 1.0;
     // Regula falsi (Illinois): the distance is a convex function of the position along the ray.

@@ -14,20 +14,21 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kShown = 0.5;                        ///< distance within which the solid's surface shows a piece
+constexpr double kShown = 0.5;  ///< distance within which the solid's surface shows a piece
 constexpr double kShownByShell = kShellRadius + 0.2;  ///< the same for the outer face of a shell
-constexpr double kAligned = 0.7;                      ///< cosine of the angle up to which two normals count as parallel
-constexpr double kNearPlane = 0.2;                    ///< error of distances up to which samples represent a plane
-constexpr double kDepthSlack = 1e-3;                  ///< by which a position has to be deeper inside than it could be
+constexpr double kAligned = 0.7;      ///< cosine of the angle up to which two normals count as parallel
+constexpr double kNearPlane = 0.2;    ///< error of distances up to which samples represent a plane
+constexpr double kDepthSlack = 1e-3;  ///< by which a position has to be deeper inside than it could be
 
 openvdb::Coord cell_of(const Vector3d& at) {
   return {int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z()))};
 }
 
-/// Calls f(part, piece, triangle, normal) for all pieces of a mesh, with a part for each task, and returns the parts.
+/// Calls f(part, piece, triangle, normal) for all pieces of a mesh, with a part for each task, and returns
+/// the parts.
 template <class Part, class MakePart, class F>
-std::vector<Part> over_pieces(const PolygonMesh& mesh, double voxel_size, RunContext& context, const MakePart& make,
-                              const F& f) {
+std::vector<Part> over_pieces(const PolygonMesh& mesh, double voxel_size, RunContext& context,
+                              const MakePart& make, const F& f) {
   const std::vector<Triangle> triangles = triangulated(mesh);
   std::vector<Part> parts((triangles.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
   parallel_blocks(parts.size(), context, [&](std::size_t task) {
@@ -37,8 +38,9 @@ std::vector<Part> over_pieces(const PolygonMesh& mesh, double voxel_size, RunCon
       const Corners corners = corners_of(mesh, triangles[t], voxel_size);
       const Vector3d normal = normal_of(corners);
       if (normal.isZero()) continue;
-      for_each_piece(corners, kPiece,
-                     [&](const Corners& piece) { f(parts[task], piece, static_cast<std::uint32_t>(t), normal, state); });
+      for_each_piece(corners, kPiece, [&](const Corners& piece) {
+        f(parts[task], piece, static_cast<std::uint32_t>(t), normal, state);
+      });
     }
   });
   return parts;
@@ -47,7 +49,9 @@ std::vector<Part> over_pieces(const PolygonMesh& mesh, double voxel_size, RunCon
 }  // namespace
 
 Corners corners_of(const PolygonMesh& mesh, const Triangle& triangle, double voxel_size) {
-  const auto at = [&](std::size_t i) { return Vector3d(mesh.points[triangle[i]].cast<double>() / voxel_size); };
+  const auto at = [&](std::size_t i) {
+    return Vector3d(mesh.points[triangle[i]].cast<double>() / voxel_size);
+  };
   return {at(0), at(1), at(2)};
 }
 
@@ -77,12 +81,14 @@ std::vector<Corners> cut(const Corners& c, double limit) {
   const double foot = std::clamp((apex - from).dot(to - from) / (length * length), 0.0, 1.0);
   std::vector<Corners> parts;
   // From each end of the longest side to below the apex.
-  for (const auto& [end, part, reversed] : {std::tuple(from, foot, false), std::tuple(to, 1.0 - foot, true)}) {
+  for (const auto& [end, part, reversed] :
+       {std::tuple(from, foot, false), std::tuple(to, 1.0 - foot, true)}) {
     const int slices = static_cast<int>(std::ceil(part * length / width));
     const Vector3d below = from + foot * (to - from);
     Vector3d low = end, high = end;
     for (int k = 1; k <= slices; ++k) {
-      const Vector3d next_low = end + double(k) / slices * (below - end), next_high = end + double(k) / slices * (apex - end);
+      const Vector3d next_low = end + double(k) / slices * (below - end),
+                     next_high = end + double(k) / slices * (apex - end);
       const auto add = [&](const Vector3d& a, const Vector3d& b, const Vector3d& d) {
         parts.push_back(reversed ? Corners{a, d, b} : Corners{a, b, d});
       };
@@ -107,8 +113,8 @@ ShownSurface::ShownSurface(const LevelSet& level_set, const FloatHermite& hermit
   shift_ = (frame - mesh_.origin) / voxel_size_;
 }
 
-ShownSurface::Verdict ShownSurface::look(const Vector3d& at, const Vector3d& normal, double limit, double aligned,
-                                         Samples& samples) const {
+ShownSurface::Verdict ShownSurface::look(const Vector3d& at, const Vector3d& normal, double limit,
+                                         double aligned, Samples& samples) const {
   const openvdb::Coord cell = cell_of(at);
   bool with = true, against = true, inside_somewhere = false, outside_somewhere = false, hidden = false;
   // Most cells have all their corners in one leaf.
@@ -158,7 +164,8 @@ bool ShownSurface::is_all(bool inside, const Vector3d& at) const {
   return true;
 }
 
-bool ShownSurface::mesh_shows(const Vector3d& at, const Vector3d& normal, double limit, double aligned) const {
+bool ShownSurface::mesh_shows(const Vector3d& at, const Vector3d& normal, double limit,
+                              double aligned) const {
   if (!tree_) return false;
   bool shown = false;
   const Vector3d place = at + shift_, reach = Vector3d::Constant(limit);
@@ -190,7 +197,7 @@ void Near::add(const Vector3d& p, double distance) {
 }
 
 SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
-                              RunContext& context) {
+                                     RunContext& context) {
   struct Part {
     std::vector<LostPiece> lost, pierced;
     std::vector<ShownSurface::Verdict> verdicts;
@@ -198,13 +205,15 @@ SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface
   };
   std::vector<Part> parts = over_pieces<Part>(
       mesh, voxel_size, context, [&] { return shown.samples(); },
-      [&](Part& part, const Corners& piece, std::uint32_t t, const Vector3d& normal, ShownSurface::Samples& samples) {
+      [&](Part& part, const Corners& piece, std::uint32_t t, const Vector3d& normal,
+          ShownSurface::Samples& samples) {
         const Vector3d at = centre(piece);
         const double area = area_of(piece);
         part.area += area;
         part.verdicts.push_back(shown.look(at, normal, kShown, kAligned, samples));
         if (part.verdicts.back() == ShownSurface::Verdict::lost) part.lost.push_back({at, normal, t, area});
-        if (part.verdicts.back() == ShownSurface::Verdict::pierced) part.pierced.push_back({at, normal, t, area});
+        if (part.verdicts.back() == ShownSurface::Verdict::pierced)
+          part.pierced.push_back({at, normal, t, area});
       });
   SurfaceComparison all;
   for (Part& part : parts) {
@@ -216,8 +225,8 @@ SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface
   return all;
 }
 
-std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
-                                             const Near& around, RunContext& context) {
+std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
+                                             double voxel_size, const Near& around, RunContext& context) {
   using Part = std::vector<LostPiece>;
   const auto parts = over_pieces<Part>(
       mesh, voxel_size, context, [&] { return std::pair(shown.samples(), around.reader()); },

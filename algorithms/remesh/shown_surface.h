@@ -27,15 +27,16 @@ double area_of(const Corners& c);
 /// Returns the normal of unit length, or zero for a degenerate triangle.
 Eigen::Vector3d normal_of(const Corners& c);
 
-/// Cuts a triangle whose longest side is longer than `limit` into smaller ones, in a fixed order: in half from the vertex
-/// opposite that side, or into slices across it if the triangle is a sliver, of which halving would make many. Returns
-/// nothing for a triangle that is small enough.
+/// Cuts a triangle whose longest side is longer than `limit` into smaller ones, in a fixed order: in half
+/// from the vertex opposite that side, or into slices across it if the triangle is a sliver, of which halving
+/// would make many. Returns nothing for a triangle that is small enough.
 std::vector<Corners> cut(const Corners& c, double limit);
 
 /// Longest side of the pieces that are compared, about.
 inline constexpr double kPiece = 1.5;
 
-/// The triangles of polygons are compared in tasks of this size, which do not depend on the number of threads.
+/// The triangles of polygons are compared in tasks of this size, which do not depend on the number of
+/// threads.
 inline constexpr std::size_t kTrianglesPerTask = 1024;
 
 /// Calls f(piece) for the pieces of a triangle, in a fixed order.
@@ -58,24 +59,28 @@ class ShownSurface {
 
   enum class Verdict : std::uint8_t {
     shown,
-    pierced,  ///< shown, but an edge of the lattice with both ends outside passes through: a wall may have a hole here
+    pierced,  ///< shown, but an edge of the lattice with both ends outside passes through: a wall may have a
+              ///< hole here
     hidden,
     lost
   };
-  /// Returns `shown` if the solid has surface within `limit` of a position whose normal is parallel or opposite to a
-  /// normal of unit length to within a cosine of `aligned`, and `hidden` for a position inside the solid.
+  /// Returns `shown` if the solid has surface within `limit` of a position whose normal is parallel or
+  /// opposite to a normal of unit length to within a cosine of `aligned`, and `hidden` for a position inside
+  /// the solid.
   Verdict look(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, double limit, double aligned,
                Samples& samples) const;
 
-  /// Returns true if an edge of the cell around a position has both ends outside, on different sides of its plane.
+  /// Returns true if an edge of the cell around a position has both ends outside, on different sides of its
+  /// plane.
   bool is_pierced(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, Samples& samples) const;
 
   /// Returns true if all eight samples around a position are on the given side.
   bool is_all(bool inside, const Eigen::Vector3d& at) const;
 
-  /// Returns true if the uniform mesh has surface within `limit` whose normal is parallel or opposite to within a
-  /// cosine of `aligned`.
-  bool mesh_shows(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, double limit, double aligned) const;
+  /// Returns true if the uniform mesh has surface within `limit` whose normal is parallel or opposite to
+  /// within a cosine of `aligned`.
+  bool mesh_shows(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, double limit,
+                  double aligned) const;
 
  private:
   const openvdb::FloatGrid& grid_;
@@ -116,13 +121,14 @@ struct SurfaceComparison {
   std::vector<std::vector<ShownSurface::Verdict>> verdicts;
 };
 
-/// Compares polygons with the solid that their level set represents. A piece is shown by aligned surface within half a
-/// voxel.
-SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size, RunContext& context);
+/// Compares polygons with the solid that their level set represents. A piece is shown by aligned surface
+/// within half a voxel.
+SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
+                                     RunContext& context);
 
-/// Returns the pieces near some positions that a solid with a shell around thin parts does not show either, by surface
-/// at the distance of the shell. Pieces in filled gaps do not count.
-std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
-                                             const Near& around, RunContext& context);
+/// Returns the pieces near some positions that a solid with a shell around thin parts does not show either,
+/// by surface at the distance of the shell. Pieces in filled gaps do not count.
+std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
+                                             double voxel_size, const Near& around, RunContext& context);
 
 }  // namespace hermesh

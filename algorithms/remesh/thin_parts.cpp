@@ -38,7 +38,8 @@ constexpr double kLittleLost =
     0.01;                          ///< share of the area up to which it may be edges and tips that are lost
 constexpr double kParallel = 0.9;  ///< cosine up to which the sides of a wall count as parallel
 constexpr double kAlong = 0.7;     ///< the same for a sheet that goes on
-constexpr double kDeep = 0.74;  ///< a position one voxel from a wall as thick as rays reach is farther than this from it
+constexpr double kDeep =
+    0.74;  ///< a position one voxel from a wall as thick as rays reach is farther than this from it
 constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
 constexpr double kNoWall = 1e-3;  ///< a wall thinner than this has no thickness to speak of
 constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -98,7 +99,7 @@ class Thickening {
       else if (mode == Mode::rims)
         radius = std::max(radius, radius_at_rim(piece, within));
       result.radius = std::max(0.0, radius - 0.5 * wall);
-      // A wall that the samples could show, but that is no part of their solid, as between two open sheets.
+      // The wall is thick enough for the samples, but not part of the solid, e.g. between two open sheets.
       if (is_lost && !(result.radius > 0.0) && shown.is_all(false, at + within)) {
         result.radius = 0.5 * wall;
         result.inset = within.dot(normal);
@@ -112,9 +113,10 @@ class Thickening {
     return result;
   }
 
-  /// Returns true if a piece is part of a wall that is thinner than a voxel, or of a sheet if these count, and not near its
-  /// border.
-  bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle, bool sheets_count) const {
+  /// Returns true if a piece is part of a wall that is thinner than a voxel, or of a sheet if these count,
+  /// and not near its border.
+  bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle,
+                    bool sheets_count) const {
     const Vector3d inwards = -turn(triangle) * normal;
     const Opposite behind = across(at, inwards)[0];
     if (behind.faces_away && !(behind.slope > kParallel && behind.distance < 1.0)) return false;
@@ -183,18 +185,20 @@ class Thickening {
   /// 1 or −1, by which the normal of a triangle is turned outwards.
   double turn(std::uint32_t triangle) const { return orientation_.turns[triangle] < 0 ? -1.0 : 1.0; }
 
-  /// Returns true if the solid is thick on one side of a piece. The orientation of a part may be wrong, so both are tested.
+  /// Returns true if the solid is thick on one side of a piece. The orientation of a part may be wrong, so
+  /// both are tested.
   static bool is_thick(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) {
     return shown.is_all(true, at - normal) || shown.is_all(true, at + normal);
   }
 
-  /// Returns true if there are no polygons one voxel away on either side. That is not so of the boundary of a thick solid
-  /// near its edges, nor of the rim of a wall.
+  /// Returns true if there are no polygons one voxel away on either side. That is not so of the boundary of a
+  /// thick solid near its edges, nor of the rim of a wall.
   bool has_free_sides(const Vector3d& at, const Vector3d& normal) const {
     return is_free(at - normal, kDeep) && is_free(at + normal, kDeep);
   }
 
-  /// Returns true if a piece near a crease is part of a sheet: farther from the crease there is nothing on either side.
+  /// Returns true if a piece near a crease is part of a sheet: farther from the crease there is nothing on
+  /// either side.
   bool continues_a_sheet(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) const {
     constexpr double kOnSheet = 0.5;
     const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
@@ -208,7 +212,8 @@ class Thickening {
         const Vector3d there = closest_point(aside, c[0], c[1], c[2]).position, facing = normal_of(c);
         if (std::abs(facing.dot(normal)) < kAlong || is_thick(there, facing, shown)) continue;
         const auto [ahead, behind] = across(there, facing);
-        if (std::isinf(ahead.distance) && std::isinf(behind.distance) && has_free_sides(there, facing)) return true;
+        if (std::isinf(ahead.distance) && std::isinf(behind.distance) && has_free_sides(there, facing))
+          return true;
       }
     return false;
   }
@@ -365,7 +370,8 @@ class ShellMaker {
   const ShownSurface& shown_;
   Near::Reader around_;
   Thickening::Mode mode_;
-  const std::vector<ShownSurface::Verdict>& verdicts_;  ///< of the pieces, in the order in which they are added
+  const std::vector<ShownSurface::Verdict>&
+      verdicts_;  ///< of the pieces, in the order in which they are added
   std::size_t piece_ = 0;
   double voxel_size_;
   std::uint32_t triangle_ = 0;
@@ -384,7 +390,8 @@ LevelSet nothing_on(const openvdb::FloatGrid& distances) {
 /// Returns the lost pieces that are worth a shell. If more than kLittleLost of the area is lost, all are.
 /// Else those are that belong to a patch of lost pieces of which one is far from the solid's surface, or lies
 /// amid a wall, which has a hole there: what is left are the outermost parts of edges and tips.
-std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSurface& shown, const Thickening& thickening) {
+std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSurface& shown,
+                                     const Thickening& thickening) {
   double area = 0.0;
   for (const LostPiece& piece : all.lost) area += piece.area;
   if (area > kLittleLost * all.area) return all.lost;
@@ -471,7 +478,8 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   join();
   const std::size_t first = shell.size();
   const ShownSurface thicker(solid.level_set, solid.hermite, mesh.origin, context);
-  if (const auto still = lost_after_thickening(mesh, thicker, voxel_size, around_lost, context); !still.empty())
+  if (const auto still = lost_after_thickening(mesh, thicker, voxel_size, around_lost, context);
+      !still.empty())
     add(Near(still, kBeside), Mode::wires);
   if (const auto apart = crumbs(*solid.level_set.grid().grid); !apart.empty())
     add(Near(apart, kBesideCrumbs), Mode::rims);

@@ -37,10 +37,10 @@ struct PolygonSolid {
 
 /// Returns the solid of polygons with its exact Hermite data. With ThinRule::keep it is the union of the
 /// solid that the level set shows and a shell around those of the polygons that it does not show within half
-/// a voxel. Polygons within the solid do not count. Walls and sheets become at most 1.2 voxels thick where
-/// they are thinner, wires and specks 1.75; gaps that are thinner than a voxel and do not show are filled.
-/// Where the level set shows all polygons, the solid is the same as with ThinRule::drop. The bytes are the
-/// same for every number of threads.
+/// a voxel, or that have holes narrower than a voxel. Polygons within the solid do not count. Walls and
+/// sheets become at most 1.2 voxels thick where they are thinner, wires and specks 1.75; gaps that are
+/// thinner than a voxel and do not show are filled. Where the level set shows all polygons, the solid is the
+/// same as with ThinRule::drop. The bytes are the same for every number of threads.
 /// @param level_set with samples at multiples of the voxel size from the mesh's origin; distances without
 /// sign, of
 ///   polygons that enclose nothing, stand for an empty solid unless the rule is to drop

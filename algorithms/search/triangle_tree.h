@@ -56,13 +56,15 @@ class TriangleTree {
   /// Calls f(triangle) for the triangles whose boxes meet the box from `low` to `high` (index space).
   template <class F>
   void for_each_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, F&& f) const {
-    visit([&](const Eigen::Vector3d& lower,
-              const Eigen::Vector3d& upper) { return (lower.array() <= high.array()).all() && (upper.array() >= low.array()).all(); },
-          f);
+    visit(
+        [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
+          return (lower.array() <= high.array()).all() && (upper.array() >= low.array()).all();
+        },
+        f);
   }
 
-  /// Calls f(triangle) for the triangles whose boxes the segment meets (index space), and for some that it misses by
-  /// 1e-6 voxels.
+  /// Calls f(triangle) for the triangles whose boxes the segment meets (index space), and for some that it
+  /// misses by 1e-6 voxels.
   template <class F>
   void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, F&& f) const {
     constexpr double kMargin = 1e-6;
@@ -73,9 +75,12 @@ class TriangleTree {
           const Eigen::Vector3d c = middle - 0.5 * (lower + upper),
                                 e = 0.5 * (upper - lower) + Eigen::Vector3d::Constant(kMargin);
           if ((c.cwiseAbs().array() > (e + reach).array()).any()) return false;
-          return std::abs(half.y() * c.z() - half.z() * c.y()) <= e.y() * reach.z() + e.z() * reach.y() + kMargin &&
-                 std::abs(half.z() * c.x() - half.x() * c.z()) <= e.z() * reach.x() + e.x() * reach.z() + kMargin &&
-                 std::abs(half.x() * c.y() - half.y() * c.x()) <= e.x() * reach.y() + e.y() * reach.x() + kMargin;
+          return std::abs(half.y() * c.z() - half.z() * c.y()) <=
+                     e.y() * reach.z() + e.z() * reach.y() + kMargin &&
+                 std::abs(half.z() * c.x() - half.x() * c.z()) <=
+                     e.z() * reach.x() + e.x() * reach.z() + kMargin &&
+                 std::abs(half.x() * c.y() - half.y() * c.x()) <=
+                     e.x() * reach.y() + e.y() * reach.x() + kMargin;
         },
         f);
   }
@@ -108,7 +113,8 @@ class TriangleTree {
  private:
   void build_boxes();
 
-  /// Calls f(triangle) for the triangles for whose boxes, and the boxes above them, meets(lower, upper) is true.
+  /// Calls f(triangle) for the triangles for whose boxes, and the boxes above them, meets(lower, upper) is
+  /// true.
   template <class Meets, class F>
   void visit(const Meets& meets, F&& f) const {
     if (packs_.empty()) return;

@@ -15,8 +15,8 @@ class RightAnswersTest : public ProgramTest {
     return (std::filesystem::path(__FILE__).parent_path() / "inputs" / name).string();
   }
 
-  /// Remeshes an input to out.ply, expects success, and returns the document of --json with the validation report of
-  /// the mesh, which has to be watertight, as "mesh".
+  /// Remeshes an input to out.ply, expects success, and returns the document of --json with the validation
+  /// report of the mesh, which has to be watertight, as "mesh".
   Json remesh(const std::string& name, const Arguments& options) {
     Arguments arguments{"remesh", input(name), "out.ply", "--json"};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -67,8 +67,8 @@ TEST_F(RightAnswersTest, TurnedWallsThinnerThanVoxelsAreKept) {
 }
 
 TEST_F(RightAnswersTest, LossesOfThinPartsThatAreDroppedAreStated) {
-  const Outcome outcome =
-      run({"remesh", input("t67_plate_turned.obj"), "out.ply", "--voxel-size", "1.5", "--thin", "drop", "--json"});
+  const Outcome outcome = run({"remesh", input("t67_plate_turned.obj"), "out.ply", "--voxel-size", "1.5",
+                               "--thin", "drop", "--json"});
   EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
   const Json loss = Json::parse(outcome.out)["result"]["visible_loss"];
   EXPECT_GT(loss, 0.05);
@@ -77,7 +77,7 @@ TEST_F(RightAnswersTest, LossesOfThinPartsThatAreDroppedAreStated) {
 TEST_F(RightAnswersTest, SmallBodiesAreNotInsideOut) {
   const Json coarse = remesh("u33_octa_axis.obj", {"--resolution", "2"});
   EXPECT_GT(coarse["mesh"]["volume"], 0.0);
-  EXPECT_GT(coarse["result"]["visible_loss"], 0.1) << "a tetrahedron of one voxel is no octahedron";
+  EXPECT_GT(coarse["result"]["visible_loss"], 0.1) << "the output is a tetrahedron";
   const Json fine = remesh("u33_octa_axis.obj", {"--resolution", "20"});
   EXPECT_NEAR(fine["mesh"]["volume"].get<double>(), 4.0 / 3.0, 1e-3);
 }
@@ -91,7 +91,8 @@ TEST_F(RightAnswersTest, PinsOfAboutAVoxelAreKept) {
 }
 
 TEST_F(RightAnswersTest, AHeightFieldIsAShellWhicheverSideItFaces) {
-  const Json up = remesh("t41v_hill.obj", {"--resolution", "40"}), down = remesh("t41v_hill_down.obj", {"--resolution", "40"});
+  const Json up = remesh("t41v_hill.obj", {"--resolution", "40"}),
+             down = remesh("t41v_hill_down.obj", {"--resolution", "40"});
   for (const Json* hill : {&up, &down}) {
     EXPECT_EQ((*hill)["mesh"]["components"], 1);
     EXPECT_EQ((*hill)["mesh"]["genus"], 0);
@@ -113,8 +114,9 @@ TEST_F(RightAnswersTest, CubesOfOneVoxelAreThereOrTheirLossIsStated) {
 }
 
 TEST_F(RightAnswersTest, PiecesThatTouchAlongEdgesAreAccepted) {
-  for (const Arguments& arguments : {Arguments{input("lat007.off"), "lattice", "--cutters", "planes:3", "--resolution", "40"},
-                                     {input("checker-007.off"), "board", "--cutters", "voronoi:4", "--resolution", "40"}}) {
+  for (const Arguments& arguments :
+       {Arguments{input("lat007.off"), "lattice", "--cutters", "planes:3", "--resolution", "40"},
+        {input("checker-007.off"), "board", "--cutters", "voronoi:4", "--resolution", "40"}}) {
     Arguments all{"fracture", "--judge"};
     all.insert(all.end(), arguments.begin(), arguments.end());
     const Outcome outcome = run(all);
@@ -124,8 +126,8 @@ TEST_F(RightAnswersTest, PiecesThatTouchAlongEdgesAreAccepted) {
 
 TEST_F(RightAnswersTest, FractureKeepsTheVolumeAtAnyTolerance) {
   const auto volume = [&](const std::string& tolerance) {
-    const Outcome outcome = run({"fracture", input("selftube-004.off"), "pieces" + tolerance, "--cutters", "voronoi:12",
-                                 "--tolerance", tolerance, "--judge", "--resolution", "60"});
+    const Outcome outcome = run({"fracture", input("selftube-004.off"), "pieces" + tolerance, "--cutters",
+                                 "voronoi:12", "--tolerance", tolerance, "--judge", "--resolution", "60"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
     return Json::parse(read("pieces" + tolerance + "/pieces.json"))["pieces_volume"].get<double>();
   };

@@ -124,10 +124,12 @@ PolygonMesh remesh_all(const Paths& paths, const PolygonMesh& mesh, const Voxeli
     throw UsageError("-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
                      "--thin drop");
   const Options& options = chosen.options;
-  if (!made.thin && (options.is("hermite", "auto") || options.is("hermite", "exact") || options.is("crossings", "exact")))
-    if (const std::string note = missed_edges_note(made.solid.sampling); !note.empty()) session.context.note(note);
-  return extract(paths, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, chosen, extracting,
-                 session);
+  if (!made.thin &&
+      (options.is("hermite", "auto") || options.is("hermite", "exact") || options.is("crossings", "exact")))
+    if (const std::string note = missed_edges_note(made.solid.sampling); !note.empty())
+      session.context.note(note);
+  return extract(paths, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, chosen,
+                 extracting, session);
 }
 
 /// The share of the visible surface that may be lost. @throws UsageError

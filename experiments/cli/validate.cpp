@@ -145,7 +145,8 @@ void add_validate(CLI::App& app, Session& session) {
       ->transform(whole_number(1, 1'000'000'000));
   command
       ->add_option("--solid-samples", arguments->solid_samples,
-                   "Samples for the comparison of the solid with that of the --reference; 0: it is not compared (default: " +
+                   "Samples for the comparison of the solid with that of the --reference; 0: it is not "
+                   "compared (default: " +
                        std::to_string(arguments->solid_samples) + ")")
       ->transform(whole_number(0, 1'000'000'000));
   command->add_option(

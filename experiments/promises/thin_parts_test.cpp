@@ -185,7 +185,8 @@ TEST(Slow, ThinPartsAreKeptIn300PositionsEach) {
   const std::vector<double> thickness = {0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.2, 1.5, 2.0, 3.0};
   for (const Surface& surface : surfaces())
     for (std::uint64_t seed = 0; seed < 300; ++seed)
-      if (const double t = thickness[seed % thickness.size()]; is_possible(surface, t)) expect_kept(surface, t, 1000 + seed);
+      if (const double t = thickness[seed % thickness.size()]; is_possible(surface, t))
+        expect_kept(surface, t, 1000 + seed);
 }
 
 TEST(ThinParts, OfAPlateAreOneAndAFifthVoxelsThick) {

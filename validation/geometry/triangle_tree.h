@@ -67,8 +67,8 @@ class TriangleTree {
     return true;
   }
 
-  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more, until visit() returns false.
-  /// Returns true if it never did.
+  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more, until visit()
+  /// returns false. Returns true if it never did.
   template <class Visit>
   bool for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
     const Slabs slabs(from, to);
