@@ -12,7 +12,7 @@ using Arguments = std::vector<std::string>;
 class RightAnswersTest : public ProgramTest {
  protected:
   static std::string input(const std::string& name) {
-    return (std::filesystem::path(__FILE__).parent_path() / "inputs" / name).string();
+    return (std::filesystem::path(HERMESH_TEST_INPUTS) / name).string();
   }
 
   /// Remeshes an input to out.ply, expects success, and returns the document of --json with the validation
