@@ -19,7 +19,7 @@ elseif(status_failure STREQUAL "0")
 endif()
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[#include <optional>
 
-#include "experiments/harness/provenance.h"
+#include "experiments/provenance.h"
 
 namespace hermesh {
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Whether includes point the way that ARCHITECTURE.md says: experiments/check_arrows.sh; seconds, builds nothing.
-# Tests and what is there for them may include anything. Exits with 1 and names each include that points another way.
+# Checks the directions of includes that ARCHITECTURE.md specifies: experiments/check_arrows.sh; seconds, builds nothing. Tests and
+# their helpers may include anything. Exits with 1 and lists each include that points another way.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-find algorithms reference validation packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
-  grep -v -e '_test\.cpp$' -e '/test_' -e '_for_tests' | sort | xargs awk '
+find algorithms reference validation packages/cpp experiments -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \) -print |
+  grep -v -e '_test\.cpp$' -e '/test_' -e '_for_tests' -e '^experiments/promises/' -e '^experiments/bench/' | sort | xargs awk '
     BEGIN {
       may["core"] = ""
       may["lattice"] = may["search"] = "core"
@@ -19,9 +19,18 @@ find algorithms reference validation packages/cpp -name node_modules -prune -o \
       may["reference"] = may["fracture"] " fracture"
       may["validation"] = "core io"
       may["packages"] = may["thesis"] " thesis remesh variants validation hermesh"
+      # Within experiments; all of it may include algorithms, validation and reference.
+      may["experiments/stages"] = may["experiments/pictures"] = ""
+      may["experiments/cases"] = "experiments/stages"
+      may["experiments/harness"] = "experiments/stages experiments/cases experiments/pictures"
+      may["experiments/fracture"] = may["experiments/ablations"] = may["experiments/accuracy"] = may["experiments/harness"] " experiments/harness"
+      may["experiments/measurements"] = may["experiments/accuracy"] " experiments/accuracy experiments/ablations experiments/fracture"
+      may["experiments/cells"] = may["experiments/measurements"] " experiments/measurements"
+      may["experiments/cli"] = "experiments/stages experiments/fracture"
     }
     function room(path,    part) {
       split(path, part, "/")
+      if (part[1] == "experiments") return part[1] "/" (part[3] == "" ? "stages" : part[2])
       if (part[1] != "algorithms") return part[1]
       return part[2] ~ /^(variants|voxelizers)\./ ? "variants" : part[2]
     }
@@ -31,6 +40,7 @@ find algorithms reference validation packages/cpp -name node_modules -prune -o \
       to = room(quoted[2])
       # Who registers the grid types of OpenVDB has to know ours.
       if (FILENAME == "algorithms/core/level_set.cpp" && to == "hermite") next
+      if (from ~ /^experiments/ && to !~ /^experiments/) next
       if (from != to && (" " may[from] " ") !~ (" " to " ")) { print FILENAME " includes " quoted[2]; bad = 1 }
     }
     END { exit bad }'

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "algorithms/io/written_precision.h"
-#include "experiments/harness/measure.h"
+#include "experiments/measure.h"
 
 namespace hermesh {
 using validation::MeshReport;

@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Builds the paper from the rows of results/: build/paper/hermesh.pdf. Nothing of the program need be built. Called by
-# ./reproduce --paper; `paper/make_paper.sh --numbers` makes and checks the numbers alone, for which Python is enough.
+# Builds the paper from the rows of results/: build/paper/hermesh.pdf. It does not need the program. Called by
+# ./reproduce --paper; `paper/make_paper.sh --numbers` only makes and checks the numbers, without LaTeX.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . experiments/install_packages.sh
 
-paper_packages=(python3 texlive-latex-base texlive-latex-recommended texlive-fonts-recommended)
+paper_packages=(python3 python3-scipy texlive-latex-base texlive-latex-recommended texlive-fonts-recommended)
 out=build/paper
 mkdir -p "$out"
 
 if [ "${1:-}" = --numbers ]; then
-  exec python3 paper/paper_numbers.py --out "$out"
+  exec /usr/bin/python3 -m experiments.lab.paper --out "$out"
 fi
 install_packages "${paper_packages[@]}"
-python3 paper/paper_numbers.py --out "$out"
+/usr/bin/python3 -m experiments.lab.paper --out "$out"
 
 # The same bytes of the same commit: dates of the file are those of the commit.
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct 2>/dev/null || echo 0)
@@ -31,10 +31,10 @@ latex
 (cd "$out" && bibtex hermesh >bibtex.out) || { grep -v '^This is' "$out/bibtex.out" >&2; exit 1; }
 latex
 latex
-# What was typeset must still be what the rows give. A paper that is refused keeps another name, to be looked at.
-python3 paper/check_log.py "$out" && python3 paper/paper_numbers.py --verify "$out" || {
+# The typeset numbers must still be those of the rows. A paper that is refused is kept under another name.
+/usr/bin/python3 -m experiments.lab.paper --verify "$out" || {
   mv "$out/hermesh.pdf" "$out/refused.pdf"
-  echo "The paper is refused for what is said above; $out/refused.pdf shows it." >&2
+  echo "The paper is refused for the reasons above; see $out/refused.pdf." >&2
   exit 1
 }
 rm -f "$out/refused.pdf"

@@ -234,8 +234,9 @@ class BoundedRemesher {
     const auto view = view_of(hermite, context_);
     const FilePoints file(hermite.placement);
     UniformMesh uniform = uniform_mesh(view, {}, file, context_);
-    // Thin parts take about as long as three times the mesh.
-    count_work(double(uniform.points.size()) * (made.thin ? 3.0 : 1.0));
+    // Thin parts take about as long as three times the mesh, and as four vertices for each polygon.
+    count_work(double(uniform.points.size()) * (made.thin ? 3.0 : 1.0) +
+               (made.thin ? 4.0 * double(mesh_.triangle_count()) : 0.0));
     Attempt result{
         voxel_size,
         std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), keeps_thin ? std::span<const std::int8_t>() : turns_,

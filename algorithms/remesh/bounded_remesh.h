@@ -74,7 +74,7 @@ struct BoundedMesh {
   double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
   bool over_holes = false;        ///< as it was asked for
   double hole_area = 0.0;         ///< area of the caps that close holes, world units²
-  double work = 0.0;  ///< vertices of all meshes that were made, a measure of time for any machine
+  double work = 0.0;  ///< vertices of all meshes that were made and polygons of thin parts, a measure of time
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::optional<ThinParts> thin;  ///< what was thickened; none: nothing
   std::vector<UnmetPlace> unmet;  ///< the first of each kind, the most distant first

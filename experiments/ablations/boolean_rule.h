@@ -1,7 +1,7 @@
 // The measurement of eq. 7.1 against the rule of signs, for the table of measurements.
 #pragma once
 
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/measurement.h"
 
 namespace hermesh {
 

@@ -6,8 +6,8 @@
 #include "algorithms/core/quad_diagonals.h"
 #include "algorithms/remesh/bounded_remesh.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/measurement.h"
 #include "experiments/harness/run_cells.h"
-#include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
 
 namespace hermesh {

@@ -1,7 +1,7 @@
 // Orders of accuracy of extractors, voxelizers and codes of normals on shapes whose truth is known.
 #pragma once
 
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/measurement.h"
 
 namespace hermesh {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "experiments/harness/measure.h"
+#include "experiments/measure.h"
 
 namespace hermesh {
 Expectation expectation(const ExactShape& shape, bool keeps_creases) {

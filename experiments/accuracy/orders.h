@@ -8,7 +8,7 @@
 
 #include "experiments/accuracy/mesh_errors.h"
 #include "experiments/accuracy/slope_fit.h"
-#include "experiments/harness/columns.h"
+#include "experiments/harness/json_values.h"
 
 namespace hermesh {
 

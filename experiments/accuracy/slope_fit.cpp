@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "experiments/harness/measure.h"
+#include "experiments/measure.h"
 
 namespace hermesh {
 namespace {

@@ -7,11 +7,11 @@
 #include <map>
 #include <optional>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/quad_diagonals.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cases/case_file.h"
-#include "experiments/harness/sha256.h"
-#include "experiments/harness/shell.h"
+#include "experiments/cases/sha256.h"
+#include "experiments/cases/shell.h"
 #include "reference/agreed_faces.h"
 
 namespace hermesh {

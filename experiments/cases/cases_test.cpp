@@ -13,7 +13,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "experiments/cases/case_file.h"
 #include "experiments/cases/recipes.h"
-#include "experiments/harness/sha256.h"
+#include "experiments/cases/sha256.h"
 
 namespace hermesh {
 namespace {

@@ -11,7 +11,7 @@
 #include "experiments/cli/signals.h"
 #include "experiments/cli/validators.h"
 #include "experiments/cli/voxelizing.h"
-#include "experiments/harness/harness.h"
+#include "experiments/variants.h"
 #include "validation/visible_loss.h"
 
 namespace hermesh::cli {

@@ -3,11 +3,12 @@
 #include <iostream>
 #include <memory>
 
+#include "algorithms/hermite/samplers.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
-#include "algorithms/hermite/samplers.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
+#include "experiments/cli/pipeline/child_run.h"
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
@@ -32,6 +33,25 @@ struct FractureArguments {
   double least_volume = 27.0;
   bool no_split = false, no_picture = false, judge = false;
 };
+
+/// Has hermesh-lab, which has the libraries for pictures, draw the pieces. Without a picture, the fracture is
+/// as good.
+void draw_picture(const std::filesystem::path& made, Session& session) {
+  const Stage stage(session.context, "picture");
+  const std::filesystem::path program =
+      std::filesystem::canonical("/proc/self/exe").parent_path() / "hermesh-lab";
+  std::error_code error;
+  if (!std::filesystem::exists(program, error)) {
+    session.context.note("there is no picture of the pieces: hermesh-lab, which draws it, is not installed");
+    return;
+  }
+  ChildRun child(program, {"exploded", made});
+  while (!child.has_ended()) {
+    session.context.check();
+    ChildRun::wait_for_any({&child}, 100);
+  }
+  if (child.exit_code() != 0) session.context.note("there is no picture of the pieces: " + child.err());
+}
 
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
 
@@ -178,7 +198,7 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
     throw Error("'" + arguments.paths.in +
                 "' has no inside at this size of voxel, so there is nothing to break");
   const MadeCutters cutters = make_cutters(spec, object.hermite, arguments.choices, session.context);
-  FractureFolder folder(arguments.paths.out, bounds_of(object.hermite));
+  FractureFolder folder(arguments.paths.out);
   const FractureSummary summary = run_fracture(
       object, cutters, arguments.method,
       [&](PieceOutput&& piece) { folder.add(std::move(piece), session.context); }, session.context);
@@ -190,7 +210,9 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
       !arguments.judge || report_ledger(folder.judge(session.context, uncut_mesh(object, session.context),
                                                      reach_of_pieces(object, arguments.method, summary)),
                                         summary, session);
-  folder.commit(head_of(arguments, object), summary, !arguments.no_picture, session.context);
+  FractureFolder::Draw draw;
+  if (!arguments.no_picture) draw = [&](const std::filesystem::path& made) { draw_picture(made, session); };
+  folder.commit(head_of(arguments, object), summary, draw, session.context);
   work_is_finished();
   return balances ? kDone : kNotMet;
 }

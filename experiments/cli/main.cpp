@@ -9,9 +9,9 @@
 
 #include "algorithms/core/shown.h"
 #include "algorithms/io/mesh_file.h"
-#include "experiments/cases/cases.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/help/suggestions.h"
+#include "experiments/cli/laboratory.h"
 #include "experiments/cli/pipeline/batch.h"
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/pipeline/log_file.h"
@@ -19,7 +19,7 @@
 #include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/terminal_progress.h"
-#include "experiments/harness/provenance.h"
+#include "experiments/provenance.h"
 
 namespace hermesh::cli {
 namespace {
@@ -83,7 +83,6 @@ int run_command(Session& session, CommandFiles* files) {
 /// Exit code and sentence of what ended the command.
 std::pair<int, std::string> failure(const std::exception& error, const Session& session) {
   if (dynamic_cast<const UsageError*>(&error)) return {kUsage, session.named(error.what())};
-  if (dynamic_cast<const DataMissing*>(&error)) return {kNotMet, session.named(error.what())};
   if (dynamic_cast<const std::bad_alloc*>(&error))
     return {kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory"};
   return {kFailed, session.named(error.what())};
@@ -155,9 +154,9 @@ int run_program(int argc, char** argv) {
   session.context.cancel = &handle_signals();
   session.version = HERMESH_VERSION;
   CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
-  set_source_state(built_from());
-  app.set_version_flag("--version", [] { return "hermesh " HERMESH_VERSION "\n" + provenance_text(); },
-                       "Print the version, and what the program was built from and with, and exit");
+  app.set_version_flag(
+      "--version", [] { return "hermesh " HERMESH_VERSION "\n" + build_text(); },
+      "Print the version, and what the program was built from and with, and exit");
   app.set_help_flag("--help,-h", "Print this help and exit");
   add_common_options(app, session);
   add_list(app, session);
@@ -168,8 +167,7 @@ int run_program(int argc, char** argv) {
   add_fracture(app, session);
   add_validate(app, session);
   add_info(app, session);
-  add_experiments(app, session);
-  add_compare(app, session);
+  add_laboratory(app, session);
   add_help(app, session);
   if (const std::string sentence = misnamed_json_file({argv + 1, argv + argc}); !sentence.empty())
     return fail(kUsage, sentence + "; see hermesh --help");

@@ -75,8 +75,6 @@ void add_combine(CLI::App& app, Session& session);
 void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
-void add_experiments(CLI::App& app, Session& session);  ///< adds run, conform, report and claims
-void add_compare(CLI::App& app, Session& session);      ///< adds compare, accept and merge
 void add_help(CLI::App& app, Session& session);         ///< adds doctor, completion and man
 
 /// Registers the files of a command, for standard streams, batches and JSON. The variables must live as long as it does.

@@ -6,16 +6,16 @@
 #include <limits>
 #include <map>
 
+#include "algorithms/core/quad_diagonals.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/voxelization/outputs/lost_surface.h"
-#include "algorithms/core/quad_diagonals.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/help/suggestions.h"
 #include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/terminal_progress.h"
 #include "experiments/cli/validators.h"
-#include "experiments/harness/harness.h"
+#include "experiments/variants.h"
 
 namespace hermesh::cli {
 namespace {

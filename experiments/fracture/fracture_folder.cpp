@@ -1,30 +1,16 @@
 #include "experiments/fracture/fracture_folder.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/io/mesh_file.h"
-#include "experiments/pictures/render.h"
-#include "experiments/pictures/viewpoint.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 using Json = nlohmann::ordered_json;
-
-constexpr int kPixels = 900;
-/// Up to this number of triangles the pieces have few details, and a smaller picture shows them in half the time.
-constexpr std::size_t kFewTriangles = 20'000;
-constexpr int kFewPixels = 640;
-/// How many triangles are drawn as they are; the pieces beyond are sketched, so that a picture takes little
-/// memory.
-constexpr std::size_t kExact = 3'000'000;
-/// Pieces move this part of their way from the object's middle, away from it.
-constexpr double kExplosion = 0.5;
-constexpr double kCloseUp = 0.07;  // of the box, so that polygons of some hundred voxels a side are told apart
 
 Json json_of(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Json json_of(const Eigen::Matrix3d& m) {
@@ -67,36 +53,6 @@ Json json_of(const LabelledFracture& fracture) {
           {"small_pieces_kept", fracture.small_kept}, {"merged_slivers", std::move(merged)}};
 }
 
-/// The mesh with its points moved to the middles of cubes of that size, without the triangles that lose their area.
-PolygonMesh sketched(const PolygonMesh& mesh, double size) {
-  PolygonMesh result;
-  result.origin = mesh.origin;
-  struct Place {
-    std::array<std::int64_t, 3> cell;
-    std::uint32_t point;
-    bool operator<(const Place& other) const { return cell < other.cell; }
-  };
-  std::vector<Place> places(mesh.points.size());
-  for (std::uint32_t p = 0; p < places.size(); ++p) {
-    for (int a = 0; a < 3; ++a) places[p].cell[a] = std::llround(double(mesh.points[p][a]) / size);
-    places[p].point = p;
-  }
-  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return std::pair(a.cell, a.point) < std::pair(b.cell, b.point);
-  });
-  std::vector<std::uint32_t> number(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (i == 0 || places[i - 1] < places[i]) result.points.push_back(mesh.points[places[i].point]);
-    number[places[i].point] = static_cast<std::uint32_t>(result.points.size() - 1);
-  }
-  for (const Triangle& t : triangulated(mesh)) {
-    const Triangle moved{number[t[0]], number[t[1]], number[t[2]]};
-    if (moved[0] != moved[1] && moved[1] != moved[2] && moved[2] != moved[0])
-      result.triangles.push_back(moved);
-  }
-  return result;
-}
-
 void write_text(const std::filesystem::path& path, const std::string& text) {
   AtomicFile file(path);
   std::ofstream out(file.path(), std::ios::binary);
@@ -108,8 +64,7 @@ void write_text(const std::filesystem::path& path, const std::string& text) {
 
 }  // namespace
 
-FractureFolder::FractureFolder(const std::filesystem::path& target, const Bounds& object)
-    : folder_(target), object_(object) {}
+FractureFolder::FractureFolder(const std::filesystem::path& target) : folder_(target) {}
 
 std::string FractureFolder::file_name(std::uint32_t piece) {
   std::string digits = std::to_string(piece);
@@ -122,22 +77,12 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
   write_mesh(folder_.path() / file, piece.mesh, context);
   pieces_.push_back(json_of(piece, file));
   volume_ += piece.mass.volume;
-  drawn_triangles_ += piece.mesh.triangle_count();
-  const double pixel = (1.0 + kExplosion) * object_.size().maxCoeff() / kPixels;
-  if (drawn_triangles_ > kExact) piece.mesh = sketched(piece.mesh, 0.5 * pixel);
-  piece.mesh.attributes.clear();
-  // The centre of mass of a mesh that is not closed may lie anywhere; a picture has the piece where it belongs.
-  const Bounds box = bounds(piece.mesh);
-  const Vector3d& centre = piece.mass.centre;
-  const bool within = !box.empty() && (centre - box.lower).minCoeff() >= 0.0 && (box.upper - centre).minCoeff() >= 0.0;
-  const Vector3d place = within || box.empty() ? centre : Vector3d(0.5 * (box.lower + box.upper));
-  sketches_.push_back({std::move(piece.mesh), place});
 }
 
 validation::FractureLedger FractureFolder::judge(RunContext& context, const PolygonMesh& uncut,
                                                  double reach) const {
   std::vector<MeshFile> files;
-  for (std::uint32_t piece = 1; piece <= sketches_.size(); ++piece)
+  for (std::uint32_t piece = 1; piece <= pieces_.size(); ++piece)
     files.push_back(read_mesh_file(folder_.path() / file_name(piece), context, {.attributes = true}));
   const MeshFile surface = to_mesh_file(uncut);
   validation::ExpectedVolumes expected{.whole = {}, .pieces = {}, .surface = &surface, .reach = reach};
@@ -146,7 +91,8 @@ validation::FractureLedger FractureFolder::judge(RunContext& context, const Poly
   return validation::judge_fracture(files, context, expected);
 }
 
-void FractureFolder::commit(Json head, const FractureSummary& summary, bool picture, RunContext& context) {
+void FractureFolder::commit(Json head, const FractureSummary& summary, const Draw& draw,
+                            RunContext& context) {
   head["pieces_volume"] = volume_;
   if (summary.labelled) head["labels"] = json_of(*summary.labelled);
   Json cutters = Json::array();
@@ -164,36 +110,9 @@ void FractureFolder::commit(Json head, const FractureSummary& summary, bool pict
   head["cutters"] = std::move(cutters);
   head["pieces"] = std::move(pieces_);
   write_text(folder_.path() / "pieces.json", head.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  if (picture) draw(std::to_string(summary.pieces) + " pieces", context);
+  if (draw) draw(folder_.path());
   context.check();
   folder_.commit();
-}
-
-void FractureFolder::draw(const std::string& title, RunContext& context) const {
-  const Vector3d middle = 0.5 * (object_.lower + object_.upper);
-  Sheet sheet;
-  sheet.title = title;
-  sheet.cell_pixels = drawn_triangles_ <= kFewTriangles ? kFewPixels : kPixels;
-  const auto shift = [&](const Sketch& sketch) { return Vector3d(kExplosion * (sketch.centre - middle)); };
-  for (const Sketch& sketch : sketches_) {
-    const Bounds box = bounds(sketch.mesh);
-    if (box.empty()) continue;
-    sheet.frame.add(box.lower + shift(sketch));
-    sheet.frame.add(box.upper + shift(sketch));
-  }
-  PolygonMesh all;
-  all.origin = middle;
-  for (const Sketch& sketch : sketches_) {
-    const auto first = static_cast<std::uint32_t>(all.points.size());
-    for (std::size_t p = 0; p < sketch.mesh.points.size(); ++p)
-      all.points.push_back(Vector3d(sketch.mesh.world(p) + shift(sketch) - middle).cast<float>());
-    for (const Triangle& t : triangulated(sketch.mesh))
-      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-  }
-  sheet.viewpoint = open_viewpoint(all, context);
-  sheet.close_up = busy_close_up(all, sheet.frame, sheet.viewpoint, kCloseUp, context);
-  sheet.pictures.push_back({"exploded", {}, [&all] { return std::move(all); }});
-  render_sheet(folder_.path() / "exploded.png", sheet, context);
 }
 
 }  // namespace hermesh

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -18,14 +19,18 @@ namespace hermesh {
 class FractureFolder {
  public:
   /// @throws Error if the folder cannot be made, or is there already and not empty.
-  FractureFolder(const std::filesystem::path& target, const Bounds& object);
+  explicit FractureFolder(const std::filesystem::path& target);
 
   /// Writes one piece as piece_0001.ply and so on, and notes it for pieces.json. @throws Error if it cannot be written.
   void add(PieceOutput&& piece, RunContext& context);
 
-  /// Writes pieces.json and, with `picture`, exploded.png, and gives the folder its name. `head` is what pieces.json
-  /// begins with: how the fracture was made.
-  void commit(nlohmann::ordered_json head, const FractureSummary& summary, bool picture, RunContext& context);
+  /// Draws exploded.png into the directory that it is given.
+  using Draw = std::function<void(const std::filesystem::path&)>;
+
+  /// Writes pieces.json, calls `draw` if there is one, and renames the directory to its final name.
+  /// pieces.json begins with `head`, which states how the fracture was made.
+  void commit(nlohmann::ordered_json head, const FractureSummary& summary, const Draw& draw,
+              RunContext& context);
 
   /// Reads the pieces' files back and judges them, also against the volumes that were recorded when they
   /// were added, and against the uncut object's mesh if it is given. `reach` is how far from that the
@@ -37,19 +42,9 @@ class FractureFolder {
   static std::string file_name(std::uint32_t piece);
 
  private:
-  void draw(const std::string& title, RunContext& context) const;
-
   AtomicFolder folder_;
-  Bounds object_;
   nlohmann::ordered_json pieces_ = nlohmann::ordered_json::array();
   double volume_ = 0.0;
-  /// A piece as the picture shows it; where there are many triangles, with points snapped to half a pixel.
-  struct Sketch {
-    PolygonMesh mesh;
-    Eigen::Vector3d centre;
-  };
-  std::vector<Sketch> sketches_;
-  std::size_t drawn_triangles_ = 0;
 };
 
 }  // namespace hermesh

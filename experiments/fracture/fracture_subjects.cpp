@@ -2,8 +2,8 @@
 
 #include "algorithms/hermite/samplers.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/pipeline.h"
 
 namespace hermesh {

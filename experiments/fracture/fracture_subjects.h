@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "experiments/fracture/fracture_run.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/measurement.h"
 
 namespace hermesh {
 

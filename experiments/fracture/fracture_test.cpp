@@ -22,9 +22,9 @@
 #include "experiments/fracture/fracture_run.h"
 #include "experiments/fracture/fracture_tags.h"
 #include "experiments/fracture/fracture_trials.h"
-#include "experiments/harness/harness.h"
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
+#include "experiments/variants.h"
 #include "validation/fracture_ledger.h"
 
 namespace hermesh {

@@ -1,10 +1,10 @@
 #include "experiments/harness/cell.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
-
-#include "experiments/harness/provenance.h"
 
 namespace hermesh {
 
@@ -43,13 +43,19 @@ void mark_absent(Json& row, const std::string& reason) {
   row["promise_verdict"] = "absent: " + reason;
 }
 
-Timing::Timing(const Tier& tier, double first_seconds, StageSeconds first_stages) {
-  contender.budget_seconds = tier.seconds_per_variant;
-  contender.repetitions = tier.repetitions;
-  warm = first_seconds < tier.seconds_per_variant;
+Timing::Timing(const GroupJob& job, double first_seconds, StageSeconds first_stages) {
+  contender.budget_seconds = job.seconds_per_variant;
+  contender.repetitions = job.repetitions;
+  warm = first_seconds < job.seconds_per_variant;
   if (warm) return;
   contender.seconds = {first_seconds};
   stages = {std::move(first_stages)};
+}
+
+Json load_averages() {
+  std::array<double, 3> load{};
+  if (getloadavg(load.data(), 3) != 3) return nullptr;
+  return {load[0], load[1], load[2]};
 }
 
 void race_cells(std::vector<Racer> racers) {

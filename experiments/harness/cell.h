@@ -7,10 +7,8 @@
 #include <vector>
 
 #include "algorithms/core/run_context.h"
-#include "experiments/cases/cases.h"
-#include "experiments/harness/columns.h"
-#include "experiments/harness/experiment_file.h"
-#include "experiments/harness/measure.h"
+#include "experiments/harness/job.h"
+#include "experiments/measure.h"
 
 namespace hermesh {
 
@@ -21,19 +19,6 @@ RunContext child_context(const RunContext& context, bool with_progress);
 /// The sentence of what went wrong, if anything did. Being cancelled and data that are not there are no failures of a
 /// variant. @throws Cancelled; DataMissing.
 std::optional<std::string> attempt(const std::function<void()>& work);
-
-/// Somebody who wants to know which cell is worked on, since the process may not live to tell the end.
-struct CellWatch {
-  std::function<void(const Json& row)> planned = {};         ///< gets each cell's row as far as it is known beforehand
-  std::function<void(const std::string& label)> at = {};     ///< is called before each step of a cell's work
-
-  void plan(const Json& row) const {
-    if (planned) planned(row);
-  }
-  void step(const Json& row) const {
-    if (at) at(text_at(row, "/variant/label"));
-  }
-};
 
 /// Says in the row that its cell failed, and why.
 void mark_failed(Json& row, const std::string& sentence);
@@ -48,8 +33,11 @@ struct Timing {
   std::vector<double> cpu_seconds;
   bool warm = true;
 
-  Timing(const Tier& tier, double first_seconds, StageSeconds first_stages);
+  Timing(const GroupJob& job, double first_seconds, StageSeconds first_stages);
 };
+
+/// Returns the load averages over 1, 5 and 15 minutes, null if the system does not provide them.
+Json load_averages();
 
 /// A cell that takes part in a race.
 struct Racer {

@@ -25,8 +25,8 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/variants.h"
-#include "experiments/harness/measure.h"
-#include "experiments/harness/shell.h"
+#include "experiments/cases/shell.h"
+#include "experiments/measure.h"
 #include "experiments/pipeline.h"
 
 namespace hermesh {

@@ -3,8 +3,8 @@
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
+#include "experiments/cases/sha256.h"
 #include "experiments/harness/level_set_facts.h"
-#include "experiments/harness/sha256.h"
 
 namespace hermesh {
 namespace {

@@ -9,7 +9,6 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/command_extractor.h"
 #include "experiments/harness/digest.h"
-#include "experiments/harness/provenance.h"
 #include "experiments/pipeline.h"
 #include "validation/geometry/distance.h"
 #include "validation/report_json.h"
@@ -39,26 +38,27 @@ std::optional<std::int64_t> peak_of_command(const RunContext& child) {
 
 class Group {
  public:
-  Group(const GroupInput& group, RunContext& context)
-      : in_(group),
+  Group(const GroupJob& job, const LoadedCase& input, const Tables& tables, const CellWatch& watch,
+        RunContext& context)
+      : job_(job),
+        input_(input),
+        tables_(tables),
+        watch_(watch),
         context_(context),
-        name_(file_name(in_.input.name) + "-" + std::to_string(in_.resolution)),
-        recipe_{.chosen = choose(in_.tables.voxelizers, in_.voxelizer.name, in_.voxelizer.options),
-                .resolution = double(group.resolution)},
-        voxel_size_(voxel_size_of(recipe_, group.input.mesh)) {
-    if (in_.experiment.voxelizers.size() > 1) name_.append("-").append(file_name(in_.voxelizer.label));
-  }
+        recipe_{.chosen = choose(tables.voxelizers, job.voxelizer.name, job.voxelizer.options),
+                .resolution = double(job.resolution.value())},
+        voxel_size_(voxel_size_of(recipe_, input.mesh)) {}
 
   std::vector<Json> run() {
-    for (const VariantEntry& variant : in_.variants) {
+    for (const VariantEntry& variant : job_.variants) {
       cells_.push_back(make_cell(variant));
-      in_.watch.plan(cells_.back().row);
+      watch_.plan(cells_.back().row);
     }
     const auto failed = attempt([&] { voxelize(); });
-    source_ = to_mesh_file(in_.input.mesh);
+    source_ = to_mesh_file(input_.mesh);
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       cells_[i].row["voxelization"] = voxelization_;
-      in_.watch.step(cells_[i].row);
+      watch_.step(cells_[i].row);
       const auto sentence = failed ? failed : attempt([&] {
         try {
           extract_and_judge(cells_[i], i);
@@ -72,20 +72,19 @@ class Group {
     time_all();
     std::vector<Json> rows;
     for (Cell& cell : cells_) rows.push_back(cell.row);
-    add_time_ratios(rows);
-    if (in_.tier.pixels > 0) picture(rows);
+    if (job_.pixels > 0) picture(rows);
     return rows;
   }
 
  private:
   Cell make_cell(const VariantEntry& variant) const {
     Cell cell;
-    cell.recipe.chosen = choose(in_.tables.extractors, variant.name, variant.options);
-    cell.row = in_.head;
-    cell.row["case"] = case_json(in_.input);
-    cell.row["resolution"] = in_.resolution;
+    cell.recipe.chosen = choose(tables_.extractors, variant.name, variant.options);
+    cell.row = job_.head;
+    cell.row["case"] = case_json(input_);
+    cell.row["resolution"] = *job_.resolution;
     cell.row["voxel_size"] = voxel_size_;
-    cell.row["samples"] = in_.tier.samples;
+    cell.row["samples"] = job_.samples;
     cell.row["variant"] = variant_json(variant, cell.recipe.chosen.options);
     cell.uniform = variant.uniform;
     cell.row["variant"]["promises"] = promise_words(cell.recipe.chosen.extractor.promises);
@@ -98,10 +97,10 @@ class Group {
   }
 
   void voxelize() {
-    voxelization_ = variant_json(in_.voxelizer, recipe_.chosen.options);
+    voxelization_ = variant_json(job_.voxelizer, recipe_.chosen.options);
     const auto once = [&](bool with_progress, std::optional<StageSeconds>* stages) {
       RunContext child = child_context(context_, with_progress);
-      const double seconds = timed([&] { level_set_ = hermesh::voxelize(in_.input.mesh, recipe_, child); });
+      const double seconds = timed([&] { level_set_ = hermesh::voxelize(input_.mesh, recipe_, child); });
       if (stages) *stages = child.stage_seconds;
       return seconds;
     };
@@ -110,8 +109,8 @@ class Group {
     const double first = once(true, &stages);
     voxelization_["peak_bytes"] = optional_json(memory.bytes());
     if (!level_set_ || level_set_.active_voxels() == 0)
-      throw Error("the voxelizer " + in_.voxelizer.label + " gave a level set without active voxels");
-    Timing timing(in_.tier, first, *stages);
+      throw Error("the voxelizer " + job_.voxelizer.label + " gave a level set without active voxels");
+    Timing timing(job_, first, *stages);
     timing.contender.run = [&] {
       const double seconds = once(false, &stages);
       timing.stages.push_back(*stages);
@@ -123,13 +122,13 @@ class Group {
     voxelization_["digest"] = digest(level_set_);
     voxelization_["active_voxels"] = level_set_.active_voxels();
     voxelization_["memory_bytes"] = level_set_.memory_bytes();
-    const LostSurface lost = find_lost_surface(in_.input.mesh, level_set_,
+    const LostSurface lost = find_lost_surface(input_.mesh, level_set_,
                                                leaves_out_inner_polygons(recipe_.chosen.voxelizer), context_);
     voxelization_["lost_surface"] = {{"share", lost.share()}, {"thickness", lost.thickness}};
   }
 
   PolygonMesh extract(const Cell& cell, RunContext& child) const {
-    return hermesh::extract(level_set_, &in_.input.mesh, cell.recipe, child).mesh;
+    return hermesh::extract(level_set_, &input_.mesh, cell.recipe, child).mesh;
   }
 
   void extract_and_judge(Cell& cell, std::size_t number) {
@@ -142,12 +141,13 @@ class Group {
       const auto peak = peak_of_command(child) ? peak_of_command(child) : memory.bytes();
       cell.row["peak_bytes"] = optional_json(peak);
       if (peak) cell.row["bytes_per_active_voxel"] = static_cast<double>(*peak) / level_set_.active_voxels();
-      cell.timing.emplace(in_.tier, seconds, child.stage_seconds);
+      cell.timing.emplace(job_, seconds, child.stage_seconds);
     }
     cell.row["triangle_count"] = mesh.triangle_count();
     cell.row["digest"] = digest(mesh);
     if (mesh.empty()) throw Error("the mesh is empty");
-    const std::filesystem::path folder = in_.out / "meshes" / (in_.experiment.name + "-" + name_);
+    const std::filesystem::path folder =
+        job_.out / "meshes" / (job_.head.value("experiment", "") + "-" + job_.files);
     std::filesystem::create_directories(folder);
     cell.mesh_file =
         folder / (std::to_string(number + 1) + "-" + file_name(cell.row["variant"]["label"]) + ".ply");
@@ -162,13 +162,13 @@ class Group {
   void judge_file(Cell& cell) {
     RunContext child = child_context(context_, true);
     validation::JudgeOptions options;
-    options.self_intersections = in_.tier.self_intersections;
+    options.self_intersections = job_.self_intersections;
     options.reference = &source_;
-    options.samples = in_.tier.samples;
+    options.samples = job_.samples;
     options.voxel_size = voxel_size_;
-    if (in_.experiment.features) {
+    if (job_.features) {
       options.features = &source_;
-      options.dihedral_degrees = *in_.experiment.features;
+      options.dihedral_degrees = *job_.features;
     }
     const Promises& promises = cell.recipe.chosen.extractor.promises;
     MeshFile mesh;
@@ -198,8 +198,10 @@ class Group {
     if (other == cells_.end() || other->mesh_file.empty()) return;
     const MeshFile uniform = read_mesh_file(other->mesh_file, child);
     const validation::TriangleSoup ours(mesh), theirs(uniform);
-    const auto add = [&](const char* key, const validation::TriangleSoup& from, const validation::TriangleSoup& to) {
-      const auto found = validation::sampled_distances(from, validation::TriangleTree(to), in_.tier.samples, child);
+    const auto add = [&](const char* key, const validation::TriangleSoup& from,
+                         const validation::TriangleSoup& to) {
+      const auto found =
+          validation::sampled_distances(from, validation::TriangleTree(to), job_.samples, child);
       cell.row[key] = {{"rms", found.rms}, {"max", found.max}};
     };
     add("to_uniform", ours, theirs);
@@ -208,7 +210,7 @@ class Group {
 
   double repeat(Cell& cell) {
     context_.check();
-    in_.watch.step(cell.row);
+    watch_.step(cell.row);
     RunContext child = child_context(context_, false);
     std::optional<PolygonMesh> mesh;
     const double seconds = own_seconds(timed([&] { mesh.emplace(extract(cell, child)); }), child);
@@ -230,13 +232,13 @@ class Group {
 
   void picture(const std::vector<Json>& rows) {
     Sheet sheet;
-    sheet.title = in_.input.name + " at resolution " + std::to_string(in_.resolution);
-    sheet.subtitle = in_.input.origin + ", sha256 " + in_.input.sha256.substr(0, 12) + "; voxelizer " +
-                     in_.voxelizer.label;
-    sheet.frame = bounds(in_.input.mesh);
-    sheet.close_up = in_.entry.close_up;
-    sheet.viewpoint = in_.entry.viewpoint;
-    sheet.cell_pixels = in_.tier.pixels;
+    sheet.title = input_.name + " at resolution " + std::to_string(*job_.resolution);
+    sheet.subtitle =
+        input_.origin + ", sha256 " + input_.sha256.substr(0, 12) + "; voxelizer " + job_.voxelizer.label;
+    sheet.frame = bounds(input_.mesh);
+    sheet.close_up = job_.close_up;
+    sheet.viewpoint = job_.viewpoint;
+    sheet.cell_pixels = job_.pixels;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       std::string size = readable(rows[i].value("triangle_count", 0.0)) + " triangles";
       if (rows[i].contains("seconds"))
@@ -253,12 +255,14 @@ class Group {
                                   return file.empty() ? PolygonMesh{} : read_mesh(file, child);
                                 }});
     }
-    render_sheet(in_.out / (name_ + ".png"), std::move(sheet), context_);
+    render_sheet(job_.out / (job_.files + ".png"), std::move(sheet), context_);
   }
 
-  const GroupInput& in_;
+  const GroupJob& job_;
+  const LoadedCase& input_;
+  const Tables& tables_;
+  const CellWatch& watch_;
   RunContext& context_;
-  std::string name_;
   VoxelizeRecipe recipe_;
   double voxel_size_;
   LevelSet level_set_;
@@ -269,8 +273,9 @@ class Group {
 
 }  // namespace
 
-std::vector<Json> run_group(const GroupInput& group, RunContext& context) {
-  return Group(group, context).run();
+std::vector<Json> run_group(const GroupJob& job, const LoadedCase& input, const Tables& tables,
+                            const CellWatch& watch, RunContext& context) {
+  return Group(job, input, tables, watch, context).run();
 }
 
 }  // namespace hermesh

@@ -1,5 +1,6 @@
 #include "experiments/harness/run_voxelizers.h"
 
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,13 +10,21 @@
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"
 #include "experiments/harness/level_set_facts.h"
-#include "experiments/harness/provenance.h"
 #include "experiments/pipeline.h"
 #include "reference/level_set_judge.h"
 #include "validation/report_json.h"
 
 namespace hermesh {
 namespace {
+
+struct VoxelizerInput {
+  const GroupJob& job;
+  const LoadedCase &input, &solid;
+  double voxel_size;
+  const Tables& tables;
+  const CellWatch& watch;
+  Json head;  ///< the first keys of all rows
+};
 
 Json places_json(const std::vector<VoxelFinding>& places) {
   Json list = Json::array();
@@ -60,27 +69,45 @@ Json to_json(const SignReport& report) {
           {"places", places_json(report.places)}};
 }
 
+/// Returns what all rows of the group begin with.
+Json head_of(const GroupJob& job, const LoadedCase& input, double voxel_size) {
+  Json head = job.head;
+  head["case"] = case_json(input);
+  if (job.resolution)
+    head["resolution"] = *job.resolution;
+  else
+    head["nominal_voxel_size"] = *job.voxel_size;
+  head["voxel_size"] = voxel_size;
+  if (job.published_seconds) head["published_seconds"] = *job.published_seconds;
+  if (job.sweep) head["sweep"] = {{"parameter", job.sweep->parameter}, {"value", job.sweep->value}};
+  constexpr std::array kSigns = {"none", "parity", "unanimous parity", "winding number"};
+  if (job.judged.signs != JudgedBy::Signs::kNone)
+    head["judged_by"] = {{"signs", kSigns[std::size_t(job.judged.signs)]},
+                         {"solid", job.judged.solid.empty() ? job.input : job.judged.solid}};
+  return head;
+}
+
 /// The truths about an input, as far as the entry asks for them.
 class Truths {
  public:
-  Truths(const VoxelizerGroupInput& group, RunContext& context) : in_(group) {
-    const JudgedBy& judged = group.entry.judged;
+  Truths(const VoxelizerInput& in, RunContext& context) : in_(in) {
+    const JudgedBy& judged = in.job.judged;
     if (!judged.distances && judged.signs == JudgedBy::Signs::kNone) return;
     const Stage stage(context, "truth");
     // The samples are those of the input's frame, whatever the solid's is.
-    PolygonMesh solid = group.solid.mesh;
-    const Eigen::Vector3d shift = solid.origin - group.input.mesh.origin;
+    PolygonMesh solid = in.solid.mesh;
+    const Eigen::Vector3d shift = solid.origin - in.input.mesh.origin;
     for (Eigen::Vector3f& point : solid.points) point = (point.cast<double>() + shift).cast<float>();
-    solid_ = std::make_unique<DistanceOracle>(triangles_in_voxels(solid, group.voxel_size));
+    solid_ = std::make_unique<DistanceOracle>(triangles_in_voxels(solid, in.voxel_size));
     winding_ = std::make_unique<WindingOracle>(*solid_);
     VoxelSelection selection;
-    selection.band = std::max(group.experiment.exterior_band, group.experiment.interior_band);
+    selection.band = std::max(in.job.exterior_band, in.job.interior_band);
     if (judged.distances) {
       // An input's triangles are split down to this where they dive into the solid, in voxels.
       constexpr double kFinest = 0.05;
-      surface_ = std::make_unique<DistanceOracle>(
-          judged.to_boundary ? solid_boundary(*solid_, *winding_, kFinest, context)
-                             : triangles_in_voxels(group.input.mesh, group.voxel_size));
+      surface_ = std::make_unique<DistanceOracle>(judged.to_boundary
+                                                      ? solid_boundary(*solid_, *winding_, kFinest, context)
+                                                      : triangles_in_voxels(in.input.mesh, in.voxel_size));
       selection.samples = *judged.distances;
       distances_.emplace(*surface_, *winding_, selection, context);
     }
@@ -96,14 +123,13 @@ class Truths {
   void judge(const LevelSet& level_set, Json& row, RunContext& context) const {
     const Stage stage(context, "judge");
     if (distances_)
-      row["accuracy"] =
-          to_json(distances_->judge(level_set, in_.input.mesh.origin, in_.experiment.exterior_band,
-                                    in_.experiment.interior_band, context));
+      row["accuracy"] = to_json(distances_->judge(level_set, in_.input.mesh.origin, in_.job.exterior_band,
+                                                  in_.job.interior_band, context));
     if (signs_) row["signs"] = to_json(signs_->judge(level_set));
   }
 
  private:
-  const VoxelizerGroupInput& in_;
+  const VoxelizerInput in_;
   std::unique_ptr<DistanceOracle> surface_, solid_;
   std::unique_ptr<WindingOracle> winding_;
   std::optional<DistanceTruth> distances_;
@@ -119,10 +145,10 @@ struct VoxelizerCell {
 
 class VoxelizerGroup {
  public:
-  VoxelizerGroup(const VoxelizerGroupInput& group, RunContext& context) : in_(group), context_(context) {}
+  VoxelizerGroup(const VoxelizerInput& in, RunContext& context) : in_(in), context_(context) {}
 
   std::vector<Json> run() {
-    for (const VariantEntry& variant : in_.voxelizers) {
+    for (const VariantEntry& variant : in_.job.variants) {
       cells_.push_back(make_cell(variant));
       in_.watch.plan(cells_.back().row);
     }
@@ -141,7 +167,6 @@ class VoxelizerGroup {
     time_all();
     std::vector<Json> rows;
     for (VoxelizerCell& cell : cells_) rows.push_back(std::move(cell.row));
-    add_voxelizer_ratios(rows);
     return rows;
   }
 
@@ -150,8 +175,8 @@ class VoxelizerGroup {
     VoxelizerCell cell;
     cell.recipe = {.chosen = choose(in_.tables.voxelizers, variant.name, variant.options),
                    .voxel_size = in_.voxel_size,
-                   .exterior_band = in_.experiment.exterior_band,
-                   .interior_band = in_.experiment.interior_band};
+                   .exterior_band = in_.job.exterior_band,
+                   .interior_band = in_.job.interior_band};
     const Options& options = cell.recipe.chosen.options;
     cell.row = in_.head;
     cell.row["variant"] = variant_json(variant, options);
@@ -184,7 +209,7 @@ class VoxelizerGroup {
     const PeakMemory memory;
     const Once first = once(cell, true);
     cell.row["peak_bytes"] = optional_json(memory.bytes());
-    cell.timing.emplace(in_.tier, first.seconds, first.stages);
+    cell.timing.emplace(in_.job, first.seconds, first.stages);
     if (!cell.timing->warm) cell.timing->cpu_seconds = {first.cpu_seconds};
     cell.row["notes"] = first.notes;
     describe(cell, first.level_set);
@@ -194,7 +219,7 @@ class VoxelizerGroup {
       if (const auto solid = compare_surface(first.level_set, in_.input.mesh, child))
         cell.row["report"]["solid"] = validation::to_json(*solid);
     }
-    if (in_.tier.components) {
+    if (in_.job.components) {
       RunContext child = child_context(context_, true);
       cell.row["surface_components"] = count_surface_components(first.level_set, child);
     }
@@ -245,15 +270,19 @@ class VoxelizerGroup {
     }
   }
 
-  const VoxelizerGroupInput& in_;
+  const VoxelizerInput in_;
   RunContext& context_;
   std::vector<VoxelizerCell> cells_;
 };
 
 }  // namespace
 
-std::vector<Json> run_voxelizers(const VoxelizerGroupInput& group, RunContext& context) {
-  return VoxelizerGroup(group, context).run();
+std::vector<Json> run_voxelizers(const GroupJob& job, const LoadedCase& input, const LoadedCase& solid,
+                                 double voxel_size, const Tables& tables, const CellWatch& watch,
+                                 RunContext& context) {
+  return VoxelizerGroup({job, input, solid, voxel_size, tables, watch, head_of(job, input, voxel_size)},
+                        context)
+      .run();
 }
 
 }  // namespace hermesh

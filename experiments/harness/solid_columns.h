@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "algorithms/io/mesh_file.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/measurement.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh {

@@ -1,45 +1,72 @@
-"""python3 -m experiments.lab NAME: runs a benchmark and prints its table."""
+"""python3 -m experiments.lab COMMAND: the laboratory, which `hermesh run`, `report`, `claims` and others start."""
 
 import argparse
+import json
+import os
 import pathlib
 import sys
 
-from . import benchmark, corpus
+from . import baseline, benchmark, claims, compare, driver, listing, merge, tables
+from .rows import LabError
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+# Options that hermesh passes to each command; commands that do no work of their own ignore them.
+COMMON = {"--threads": {"type": int, "help": "number of threads (default: all of the machine)"},
+          "--quiet": {"action": "store_true", "help": "print only results and errors"},
+          "--log": {"metavar": "FILE", "help": "append a log to a file"}}
 
 
-def main():
-    parser = argparse.ArgumentParser(prog="python3 -m experiments.lab", description="Runs a benchmark, prints its table.")
-    parser.add_argument("experiment", help="name in experiments/lab/questions, or a TOML file")
-    parser.add_argument("--out", type=pathlib.Path, help="directory of the rows (default: results/local/EXPERIMENT)")
-    parser.add_argument("--hermesh", default=str(ROOT / "build/release/hermesh"), help="the program that validates")
-    parser.add_argument("--program", action="append", default=[], metavar="NAME=FILE",
-                        help="also run this program with the first method's arguments, such as another version of it")
-    parser.add_argument("--models", type=int, help="size of the sample instead of the experiment's")
-    arguments = parser.parse_args()
-    file = pathlib.Path(arguments.experiment)
-    if not file.suffix:
-        file = ROOT / "experiments/lab/questions" / f"{arguments.experiment}.toml"
-    say = lambda text: print(text, file=sys.stderr, flush=True)
+class Parser(argparse.ArgumentParser):
+    """Reports a mistake in one line, as all commands of hermesh do."""
+
+    def error(self, message):
+        self.exit(2, f"hermesh: {message}; see {self.prog} --help\n")
+
+
+def print_options(commands):
+    """Prints the options of all commands as JSON, for the manual and the completion of shells."""
+    listed = {}
+    for name, parser in commands.choices.items():
+        listed[name] = [{"names": action.option_strings, "place": "" if action.option_strings else action.metavar or action.dest,
+                         "help": (action.help or "").replace("%%", "%"), "takes_value": action.nargs != 0,
+                         "required": action.required, "choices": list(map(str, action.choices or []))}
+                        for action in parser._actions if action.help != argparse.SUPPRESS]
+    print(json.dumps(listed))
+    return 0
+
+
+def check_log(parser, arguments):
+    """Exits if the log would be appended to a file that the command reads."""
+    log = getattr(arguments, "log", None)
+    others = [str(value) for name, value in vars(arguments).items() if name != "log" and isinstance(value, (str, pathlib.Path))]
+    if log and os.path.exists(log) and any(os.path.exists(each) and os.path.samefile(log, each) for each in others):
+        parser.error(f"--log '{log}' is a file that the command reads; choose another name")
+
+
+def main(words=None):
+    parser = Parser(prog="hermesh", description="Runs experiments and reads their rows.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for module in (driver, tables, claims, compare, baseline, merge, listing, benchmark):
+        module.add_command(commands)
+    for command in commands.choices.values():
+        for option, settings in COMMON.items():
+            if option not in command._option_string_actions:
+                command.add_argument(option, **settings)
+    commands.add_parser("options").set_defaults(function=lambda arguments: print_options(commands))
+    arguments = parser.parse_args(words)
+    check_log(parser, arguments)
     try:
-        experiment = benchmark.read_experiment(file)
-        for program in arguments.program:
-            name, _, path = program.partition("=")
-            request = [path if word == "{hermesh}" else word for word in experiment["method"][0]["request"]]
-            experiment["method"].append({"name": name, "request": request})
-        entries = corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
-        entries = corpus.sample(entries, arguments.models or experiment["models"], experiment["seed"])
-        cache = corpus.cache_directory()
-        corpus.fetch(entries, cache, say)
-        run = benchmark.Benchmark(experiment, arguments.hermesh, arguments.out or ROOT / "results/local" / file.stem, say)
-        rows = run.run(entries, cache)
-        print(benchmark.table(rows, [m["name"] for m in experiment["method"]]))
-    except (benchmark.ExperimentError, corpus.CorpusError, OSError) as error:
-        sys.exit(f"error: {error}")
+        status = arguments.function(arguments)
+        sys.stdout.flush()
+        return status
+    except (LabError, OSError) as error:
+        if isinstance(error, BrokenPipeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has seen enough
+            return 1
+        print(f"hermesh: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
-        sys.exit(130)
+        return 130
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

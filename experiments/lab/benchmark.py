@@ -17,15 +17,18 @@ Meshes are validated with `hermesh validate`, which shares no code with the meth
 """
 
 import collections
+import functools
 import json
 import pathlib
 import statistics
+import sys
 import tempfile
 import tomllib
 
 from scipy.stats import binomtest
 
 from . import child, corpus
+from .rows import ROOT, LabError
 
 CLASSES = ["clean solid", "closed, self-intersecting", "closed, non-manifold or doubled", "few holes", "open sheets",
            "flat", "no mesh"]
@@ -35,19 +38,15 @@ LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, abov
 VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
 
 
-class ExperimentError(Exception):
-    """The experiment file is invalid; the message says where and why."""
-
-
 def read_experiment(path):
     with open(path, "rb") as file:
         experiment = tomllib.load(file)
     required = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
     if difference := required ^ experiment.keys():
-        raise ExperimentError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
+        raise LabError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
     for method in experiment["method"]:
         if method.keys() != {"name", "request"}:
-            raise ExperimentError(f"{path}: each [[method]] has a name and a request")
+            raise LabError(f"{path}: each [[method]] has a name and a request")
     return experiment
 
 
@@ -181,3 +180,33 @@ def table(rows, methods):
                 f"{statistics.median(ratios):.2f}" if ratios else "–",
                 f"{statistics.median(r['peak_mib'] for r in made):.0f}" if made else "–"]) + " |")
     return "\n".join(lines)
+
+
+def add_command(subparsers):
+    parser = subparsers.add_parser("benchmark", help="run programs on a corpus of models and print their success rates")
+    parser.add_argument("experiment", help="name in experiments/lab/questions, or a TOML file")
+    parser.add_argument("--out", type=pathlib.Path, help="directory of the rows (default: results/local/EXPERIMENT)")
+    parser.add_argument("--hermesh", default=str(ROOT / "build/release/hermesh"), help="the program that validates")
+    parser.add_argument("--program", action="append", default=[], metavar="NAME=FILE",
+                        help="also run this program with the first method's arguments, e.g. another version of it")
+    parser.add_argument("--models", type=int, help="size of the sample instead of the experiment's")
+    parser.set_defaults(function=run)
+
+
+def run(arguments):
+    file = pathlib.Path(arguments.experiment)
+    if not file.suffix:
+        file = ROOT / "experiments/lab/questions" / f"{arguments.experiment}.toml"
+    experiment = read_experiment(file)
+    for program in arguments.program:
+        name, _, path = program.partition("=")
+        request = [path if word == "{hermesh}" else word for word in experiment["method"][0]["request"]]
+        experiment["method"].append({"name": name, "request": request})
+    entries = corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
+    entries = corpus.sample(entries, arguments.models or experiment["models"], experiment["seed"])
+    cache = corpus.cache_directory()
+    say = functools.partial(print, file=sys.stderr, flush=True)
+    corpus.fetch(entries, cache, say)
+    rows = Benchmark(experiment, arguments.hermesh, arguments.out or ROOT / "results/local" / file.stem, say).run(entries, cache)
+    print(table(rows, [method["name"] for method in experiment["method"]]))
+    return 0

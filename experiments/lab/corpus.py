@@ -19,9 +19,7 @@ import tarfile
 import tempfile
 import zipfile
 
-
-class CorpusError(Exception):
-    """A file of the corpus is not available; the message says which one and why."""
+from .rows import LabError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +65,7 @@ def location(entry, cache):
 def fetch(entries, cache, say):
     """Downloads and unpacks the entries that are not in the cache yet; `say` is called with progress messages.
 
-    Raises CorpusError if a package cannot be downloaded, or a file differs from the corpus.
+    Raises LabError if a package cannot be downloaded, or a file differs from the corpus.
     """
     missing = [e for e in entries if not location(e, cache).exists()]
     for package in sorted({e.package for e in missing}):
@@ -83,10 +81,10 @@ def _download(package, work, say):
         say(f"downloading {package}, {size / 2**20:.0f} MiB")
         got = subprocess.run(["apt-get", "download", package], cwd=work, capture_output=True, text=True)
     except FileNotFoundError:
-        raise CorpusError(f"apt is required to download the package {package}") from None
+        raise LabError(f"apt is required to download the package {package}") from None
     found = sorted(pathlib.Path(work).glob("*.deb"))
     if got.returncode or not found:
-        raise CorpusError(f"{package}: apt-get download failed: {got.stderr.strip() or 'no package'}; try apt-get update")
+        raise LabError(f"{package}: apt-get download failed: {got.stderr.strip() or 'no package'}; try apt-get update")
     return found[0]
 
 
@@ -119,9 +117,9 @@ def _unpack(deb, entries, cache, work):
         try:
             content = package.read(entry.path)
         except (KeyError, AttributeError):
-            raise CorpusError(f"{deb.name} has no file {entry.path}") from None
+            raise LabError(f"{deb.name} has no file {entry.path}") from None
         if hashlib.sha256(content).hexdigest() != entry.sha256:
-            raise CorpusError(f"{deb.name}: the SHA-256 of {entry.path} differs from the corpus, which is of version "
+            raise LabError(f"{deb.name}: the SHA-256 of {entry.path} differs from the corpus, which is of version "
                               f"{entry.version}")
         target = location(entry, cache)
         target.parent.mkdir(parents=True, exist_ok=True)

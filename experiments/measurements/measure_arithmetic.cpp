@@ -14,10 +14,10 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/normal_codes/thesis.h"
 #include "experiments/cases/cases.h"
-#include "experiments/harness/cell.h"
 #include "experiments/cases/random_normals.h"
-#include "experiments/harness/measure.h"
+#include "experiments/harness/cell.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
 

@@ -8,8 +8,8 @@
 
 #include "experiments/cases/cases.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
 

@@ -6,9 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "experiments/harness/experiment_file.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/cells/serve.h"
 
 namespace hermesh {
 namespace {
@@ -16,12 +14,9 @@ namespace {
 /// The rows that a measurement gives with some parameters, as far as the filter leaves them.
 std::vector<Json> rows_of(const std::string& measurement,
                           const std::map<std::string, std::string>& parameters, const std::string& filter) {
-  Experiment experiment;
-  experiment.measurement = measurement;
-  Tier tier;
-  tier.parameters = parameters;
   RunContext context;
-  return run_measurement(experiment, tier, all_tables(), {}, filter, Json::object(), context);
+  return run_measurement({.name = measurement, .parameters = parameters, .filter = filter}, all_tables(),
+                         context);
 }
 
 double value(const Json& row, const std::string& column) { return number_at(row, "/values/" + column); }

@@ -6,13 +6,14 @@
 #include <optional>
 #include <sstream>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/fracture/scatter.h"
-#include "experiments/harness/cell.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/fracture/fracture_folder.h"
 #include "experiments/fracture/fracture_subjects.h"
 #include "experiments/fracture/fracture_tags.h"
+#include "experiments/harness/cell.h"
 #include "experiments/measurements/measurements.h"
+#include "experiments/pictures/exploded.h"
 
 namespace hermesh {
 namespace {
@@ -126,7 +127,7 @@ class FractureBooks {
     std::ranges::replace(name, ' ', '-');
     if (tolerance > 0) name += "-" + readable(tolerance);
     std::filesystem::remove_all(input_.out / name);
-    FractureFolder folder(input_.out / name, bounds_of(object.hermite));
+    FractureFolder folder(input_.out / name);
     Range conversion, csg, extraction;
     double volume = 0.0;
     // Displaced walls are known only where they are sought; those of plain cells in closed form.
@@ -147,7 +148,9 @@ class FractureBooks {
         child, uncut_, reach_of_pieces(object, {.tolerance = tolerance, .options = {}}, summary));
     // The printed pieces are kept, too, for their picture.
     if (method == "labelled" || (method == "thesis" && named.rule == ThesisFractureOptions::Rule::printed))
-      folder.commit({{"object", subject.source}, {"seed", input_.seed}}, summary, true, child);
+      folder.commit(
+          {{"object", subject.source}, {"seed", input_.seed}}, summary,
+          [&](const std::filesystem::path& made) { draw_exploded(made, child); }, child);
     Json& values = row.values;
     values = {{"pieces", ledger.pieces},
               {"triangles", ledger.triangles},

@@ -158,7 +158,7 @@ class FractureGuarantee {
       CutterChoices choices;
       choices.seed = seed;
       const MadeCutters made = make_cutters(parse_cutters(cutters), subject.object.hermite, choices, child);
-      FractureFolder folder(input_.out / "pieces", bounds_of(subject.object.hermite));  // removed with it
+      FractureFolder folder(input_.out / "pieces");  // removed with it
       const FractureMethod method;
       const FractureSummary summary = run_fracture(
           subject.object, made, method, [&](PieceOutput&& piece) { folder.add(std::move(piece), child); },

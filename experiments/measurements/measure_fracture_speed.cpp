@@ -2,9 +2,9 @@
 // alike.
 #include <algorithm>
 
-#include "experiments/harness/cell.h"
 #include "experiments/fracture/fracture_subjects.h"
-#include "experiments/harness/measure.h"
+#include "experiments/harness/cell.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {

@@ -17,15 +17,15 @@
 #include <tuple>
 #include <utility>
 
+#include "experiments/cases/sha256.h"
+#include "experiments/cases/test_volumes.h"
 #include "experiments/harness/cell.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/harness/solid_columns.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/guarantee_columns.h"
-#include "experiments/harness/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/harness/sha256.h"
-#include "experiments/harness/solid_columns.h"
-#include "experiments/cases/test_volumes.h"
 #include "validation/solid_comparison.h"
 
 namespace hermesh {
@@ -47,15 +47,16 @@ constexpr int kFinestCertified = 200;
 /// Volumes of noise and patterns up to so many samples along a side.
 constexpr int kLargestCertified = 32;
 
-struct Contender {
+struct GuaranteedMethod {
   const char* name;
   GivenOptions options;
 };
-const std::vector<Contender>& others() {
-  static const std::vector<Contender> table = {{"adaptive-dual-contouring", {{"threshold", "0.1"}, {"representation", "sparse-float"}}},
-                                               {"dual-contouring", {}},
-                                               {"marching-cubes", {}},
-                                               {"openvdb", {{"adaptivity", "0.1"}}}};
+const std::vector<GuaranteedMethod>& others() {
+  static const std::vector<GuaranteedMethod> table = {
+      {"adaptive-dual-contouring", {{"threshold", "0.1"}, {"representation", "sparse-float"}}},
+      {"dual-contouring", {}},
+      {"marching-cubes", {}},
+      {"openvdb", {{"adaptivity", "0.1"}}}};
   return table;
 }
 
@@ -254,17 +255,17 @@ class SubjectMeasurement {
     Overview overview{subject};
     for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
       const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
-      Contender ours = {judged_name(input_),
-                        {{"tolerance", readable_exactly(tolerance)},
-                         {"placement", input_.parameters.text("placement")},
-                         {"representation", input_.parameters.text("representation")}}};
+      GuaranteedMethod ours = {judged_name(input_),
+                               {{"tolerance", readable_exactly(tolerance)},
+                                {"placement", input_.parameters.text("placement")},
+                                {"representation", input_.parameters.text("representation")}}};
       if (is_octree(input_))
         ours.options["largest_cube"] = input_.parameters.text("largest_cube");
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
     if (judged_ && input_.parameters.is("others", "yes"))
-      for (const Contender& other : others())
+      for (const GuaranteedMethod& other : others())
         overview.add_other(other.name, add_row(subject, other, std::nullopt).values);
     rows.push_back(overview.row(judged_));
     source_.reset();
@@ -279,7 +280,7 @@ class SubjectMeasurement {
     return text.str();
   }
 
-  const MeasuredRow& add_row(const Subject& subject, const Contender& contender,
+  const MeasuredRow& add_row(const Subject& subject, const GuaranteedMethod& contender,
                              std::optional<double> tolerance) {
     MeasuredRow row{"meshes", subject.label, {{"resolution", subject.resolution}}};
     row.values["extractor"] = contender.name;
@@ -295,7 +296,7 @@ class SubjectMeasurement {
   }
 
   /// What it breaks of the promises.
-  std::vector<std::string> fill(Json& values, const Subject& subject, const Contender& contender,
+  std::vector<std::string> fill(Json& values, const Subject& subject, const GuaranteedMethod& contender,
                                 std::optional<double> tolerance) {
     RunContext child = child_context(input_.context, false);
     Outcome outcome = run(job_of(subject, contender, tolerance), child);
@@ -309,7 +310,8 @@ class SubjectMeasurement {
     return outcome.judgement.promises.broken;
   }
 
-  Job job_of(const Subject& subject, const Contender& contender, std::optional<double> tolerance) const {
+  Job job_of(const Subject& subject, const GuaranteedMethod& contender,
+             std::optional<double> tolerance) const {
     Job job{.source = {.polygons = subject.source, .volume = &subject.level_set},
             .extract = {.chosen = choose(input_.tables.extractors, contender.name, contender.options)},
             .format = ".ply"};

@@ -6,10 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "experiments/harness/experiment_file.h"
-#include "experiments/harness/harness.h"
+#include "experiments/harness/job.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/harness/run_cells.h"
+#include "experiments/variants.h"
 
 namespace hermesh {
 namespace {
@@ -27,12 +26,8 @@ std::vector<Json> rows_of(const std::map<std::string, std::string>& parameters,
   tables.measurements = {guarantee_measurement()};
   RunContext context;
   context.cancel = cancel;
-  Experiment experiment;
-  experiment.measurement = "guarantee";
-  experiment.seed = 5;
-  Tier tier;
-  tier.parameters = parameters;
-  return run_measurement(experiment, tier, tables, {}, filter, Json::object(), context, keep);
+  return run_measurement({.name = "guarantee", .parameters = parameters, .seed = 5, .filter = filter}, tables,
+                         context, keep);
 }
 
 TEST(GuaranteeMeasurement, FindsNoViolation) {

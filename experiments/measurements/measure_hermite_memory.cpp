@@ -4,14 +4,14 @@
 #include <optional>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/measure.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
-#include "experiments/harness/run_cells.h"
 
 namespace hermesh {
 namespace {

@@ -12,10 +12,10 @@
 #include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
-#include "experiments/harness/measure.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
-#include "experiments/harness/run_cells.h"
 
 namespace hermesh {
 namespace {

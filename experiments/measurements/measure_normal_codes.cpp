@@ -11,7 +11,7 @@
 #include "algorithms/hermite/normal_code.h"
 #include "algorithms/hermite/with_normal_code.h"
 #include "experiments/cases/random_normals.h"
-#include "experiments/harness/measure.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "experiments/harness/cell.h"
-#include "experiments/harness/measure.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pictures/render.h"
 #include "experiments/pipeline.h"

@@ -1,17 +1,13 @@
 #include "experiments/measurements/measurements.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
-#include "experiments/harness/experiment_file.h"
-#include "experiments/harness/harness.h"
-#include "experiments/harness/run_cells.h"
+#include "experiments/harness/job.h"
+#include "experiments/variants.h"
 
 namespace hermesh {
 namespace {
@@ -52,133 +48,63 @@ Measurement toy() {
 
 class Measurements : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() / ("hermesh-measurements-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_);
-    tables_.measurements = {toy()};
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void SetUp() override { tables_.measurements = {toy()}; }
 
-  int run(const std::string& tier, const std::string& more = "", const std::string& filter = "") {
-    std::ofstream(folder_ / "x.toml")
-        << "kind = \"measurement\"\nmeasurement = \"toy\"\nquestion = \"why?\"\n" + more + "\n[quick]\n" +
-               tier;
-    said_.str("");
-    return run_experiment({folder_ / "x.toml", "quick", folder_ / "out", filter}, tables_, context_, said_);
+  std::vector<Json> run(const std::map<std::string, std::string>& parameters, const std::string& filter = "",
+                        const std::set<std::string>& done = {}) {
+    return run_measurement(
+        {.name = "toy", .parameters = parameters, .seed = 7, .filter = filter, .done = done}, tables_,
+        context_, [this](const Json& row) { kept_.push_back(row); });
   }
-  std::string complaint(const std::string& tier, const std::string& more = "") {
-    try {
-      run(tier, more);
-      return "";
-    } catch (const Error& error) {
-      return error.what();
-    }
-  }
-  std::string report(const std::string& format) const {
-    std::ostringstream out;
-    write_report(folder_ / "out", format, out);
-    return out.str();
-  }
-  std::vector<Json> rows() const { return read_rows(folder_ / "out"); }
 
-  std::filesystem::path folder_;
   Tables tables_;
   RunContext context_;
-  std::ostringstream said_;
+  std::vector<Json> kept_;
 };
 
-TEST_F(Measurements, ARowSaysWhatWasMeasuredAndWhereItComesFrom) {
-  EXPECT_EQ(run("base = 3", "seed = 7"), 0);
-  ASSERT_EQ(rows().size(), 7u);
-  const Json row = rows()[1];
-  for (const char* key : {"experiment", "tier", "question", "run", "commit", "machine", "libraries", "load"})
-    EXPECT_TRUE(row.contains(key)) << key;
-  EXPECT_EQ(row["kind"], "measurement");
-  EXPECT_EQ(row["measurement"]["parameters"], "base=3 mode=fine");
-  EXPECT_EQ(row["measurement"]["seed"], 7);
-  EXPECT_EQ(row["values"], (Json{{"exponent", 1}, {"power", 3.0}, {"word", "p1"}}));
-}
-
-TEST_F(Measurements, TablesHaveTheirOwnColumnsAndLegend) {
-  run("");
-  EXPECT_NE(said_.str().find("### powers: what they are\n"), std::string::npos) << said_.str();
-  EXPECT_NE(said_.str().find("| which |   n | power [1] | word |"), std::string::npos) << said_.str();
-  EXPECT_NE(said_.str().find("| odd   |   3 |         8 |    – |"), std::string::npos) << said_.str();
-  EXPECT_NE(said_.str().find("Columns: *n* the exponent; *power [1]* the base to the n; *word* its name."),
-            std::string::npos);
-  EXPECT_EQ(said_.str().find("drawn only"), std::string::npos);
-  EXPECT_NE(report("md").find("| odd   |   3 |         8 |    – |"), std::string::npos);
-  EXPECT_NE(report("tex").find("which & n & power [1] & word"), std::string::npos) << report("tex");
-  const std::string csv = report("csv");
-  EXPECT_NE(csv.substr(0, csv.find('\n')).find(",failed,exponent,power,word"), std::string::npos) << csv;
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 8);
-}
-
-TEST_F(Measurements, PlotsTakeATableAndItsColumns) {
-  const auto plot = [](const std::string& label) {
-    return R"(plots = [{ name = "p", title = "t", case = "powers", x = "exponent", y = ["power"], x_label = "n", )"
-           "y_label = \"" +
-           label + "\" }]";
-  };
-  EXPECT_NE(complaint("", plot("")).find("\"y_label\" must be a text"), std::string::npos);
-  run("", plot("2ⁿ"));
-  std::ifstream stream(folder_ / "out" / "x-p.dat");
-  const std::string data{std::istreambuf_iterator<char>(stream), {}};
-  EXPECT_EQ(data, "# all\n0 1\n1 2\n2 4\n3 8\n\n\n# odd\n1 2\n3 8\n\n\n");
-  EXPECT_NE(report("plots").find("x-p"), std::string::npos);
-}
-
-TEST_F(Measurements, MistakesInTheFileNameTheirLine) {
-  EXPECT_EQ(complaint("points = 3"), "x.toml:6: unknown key \"points\" in [quick]; it takes mode, base");
-  EXPECT_EQ(complaint("base = 11").substr(0, 8), "x.toml:5");
-  EXPECT_NE(complaint("", "columns = [\"seconds\"]").find("x.toml:4: \"columns\" has no place"),
-            std::string::npos);
-  EXPECT_NE(complaint("", R"(plots = [{ name = "p", title = "t", case = "roots" }])")
-                .find("there is no case \"roots\""),
-            std::string::npos);
+TEST_F(Measurements, ARowHasItsValuesItsTableAndItsParameters) {
+  const std::vector<Json> rows = run({{"base", "3"}});
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(kept_, rows);
+  EXPECT_EQ(rows[1]["measurement"]["parameters"], "base=3 mode=fine");
+  EXPECT_EQ(rows[1]["measurement"]["seed"], 7);
+  EXPECT_EQ(rows[1]["values"], (Json{{"exponent", 1}, {"power", 3.0}, {"word", "p1"}}));
+  EXPECT_EQ(rows[1]["table"]["title"], "what they are");
+  EXPECT_EQ(rows[6]["table"]["printed"], false);
 }
 
 TEST_F(Measurements, WhatWasNotDeclaredIsAnError) {
-  EXPECT_EQ(complaint("mode = \"stray\""),
-            "the measurement toy gave a row of powers with an unknown column \"logarithm\"");
+  EXPECT_THROW(run({{"mode", "stray"}}), Error);
+  EXPECT_THROW(run({{"exponent", "2"}}), Error);
+  EXPECT_THROW(run({{"base", "11"}}), Error);
 }
 
 TEST_F(Measurements, AFailureIsARow) {
-  EXPECT_EQ(run("mode = \"fail\""), 1);
-  ASSERT_EQ(rows().size(), 1u);
-  EXPECT_EQ(rows()[0]["failed"], "the toy fell apart");
-  EXPECT_NE(said_.str().find("FAILED: toy on toy: the toy fell apart"), std::string::npos) << said_.str();
+  const std::vector<Json> rows = run({{"mode", "fail"}});
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0]["failed"], "the toy fell apart");
 }
 
-TEST_F(Measurements, WhatDoesNotHoldMakesTheExitCode3) { EXPECT_EQ(run("mode = \"broken\""), 3); }
-
-TEST_F(Measurements, TheFilterChoosesRows) {
-  run("", "", "powers/odd");
-  EXPECT_EQ(rows().size(), 2u);
+TEST_F(Measurements, ABrokenExpectationIsInTheRow) {
+  EXPECT_EQ(run({{"mode", "broken"}}).back()["broken"].size(), 1u);
 }
 
-TEST_F(Measurements, WhatIsSetComesBeforeTheFile) {
-  run("base = 3");
-  RunSettings settings{folder_ / "x.toml", "quick", folder_ / "out", ""};
-  settings.overrides.parameters = {{"base", "5"}};
-  EXPECT_EQ(run_experiment(settings, tables_, context_, said_), 0);
-  EXPECT_EQ(rows().back()["measurement"]["parameters"], "base=5 mode=fine");
-  settings.overrides.parameters = {{"base", "11"}};
-  EXPECT_THROW(run_experiment(settings, tables_, context_, said_), Error);
-  settings.overrides.parameters = {{"exponent", "2"}};
-  EXPECT_THROW(run_experiment(settings, tables_, context_, said_), Error);
+TEST_F(Measurements, TheFilterAndExistingRowsLeaveRowsOut) {
+  EXPECT_EQ(run({}, "powers/odd").size(), 2u);
+  EXPECT_EQ(run({}, "", {"powers/all"}).size(), 3u);
 }
 
 TEST(NormalCodesMeasurement, GivesWhatItDeclares) {
   Tables tables;
   tables.measurements = {normal_codes_measurement()};
   RunContext context;
-  Experiment experiment;
-  experiment.measurement = "normal-codes";
-  Tier tier;
-  tier.parameters = {
-      {"points", "20000"}, {"normals", "1000"}, {"repetitions", "1"}, {"bins", "10"}, {"directions", "4"}};
-  const std::vector<Json> rows = run_measurement(experiment, tier, tables, {}, "", Json::object(), context);
+  const std::vector<Json> rows = run_measurement({.name = "normal-codes",
+                                                  .parameters = {{"points", "20000"},
+                                                                 {"normals", "1000"},
+                                                                 {"repetitions", "1"},
+                                                                 {"bins", "10"},
+                                                                 {"directions", "4"}}},
+                                                 tables, context);
   ASSERT_EQ(rows.size(), 5u * (1 + 10 + 1));
   double shares = 0.0;
   for (const Json& row : rows) {
@@ -214,10 +140,9 @@ TEST(AllMeasurements, DoNoWorkForRowsThatTheFilterThrowsAway) {
   };
   for (const Measurement& each : all_measurements()) {
     tables.measurements = {each};
-    Experiment experiment;
-    experiment.measurement = each.name;
     RunContext context;
-    const std::vector<Json> rows = run_measurement(experiment, {}, tables, {}, "no such row", Json::object(), context);
+    const std::vector<Json> rows =
+        run_measurement({.name = each.name, .filter = "no such row"}, tables, context);
     EXPECT_TRUE(rows.empty()) << each.name << ": " << rows.front().dump();
   }
 }

@@ -6,8 +6,11 @@
 
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <set>
 
+#include "algorithms/io/mesh_file.h"
+#include "experiments/pictures/exploded.h"
 #include "experiments/pictures/ray_scene.h"
 
 namespace hermesh {
@@ -163,6 +166,30 @@ TEST_F(Sheets, NoEndOfACaptionIsLost) {
 TEST_F(Sheets, UnwritablePathIsAnErrorAndLeavesNothing) {
   EXPECT_THROW(render_sheet(folder_ / "missing" / "a.png", sheet_, context_), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+/// Two cubes that touch, in a directory as a fracture writes it.
+TEST_F(Sheets, PiecesOfAFractureAreMovedApart) {
+  PolygonMesh second = cube();
+  second.origin.x() += 2;
+  write_mesh(folder_ / "1.ply", cube(), context_);
+  write_mesh(folder_ / "2.ply", second, context_);
+  const auto picture = [&](const nlohmann::json& centre_of_first, const nlohmann::json& centre_of_second) {
+    const nlohmann::json pieces = {{{"file", "1.ply"}, {"centre_of_mass", centre_of_first}},
+                                   {{"file", "2.ply"}, {"centre_of_mass", centre_of_second}}};
+    std::ofstream(folder_ / "pieces.json") << nlohmann::json{{"pieces", pieces}};
+    draw_exploded(folder_, context_);
+    return bytes("exploded.png");
+  };
+  const nlohmann::json first = {11, 21, 31}, middle = {12, 21, 31}, far = {99, 21, 31},
+                       none = {nullptr, nullptr, nullptr};
+  const std::string apart = picture(first, {13, 21, 31});
+  EXPECT_TRUE(apart.starts_with("\x89PNG\r\n"));
+  // A centre of mass in the middle of the object leaves a piece unmoved.
+  EXPECT_NE(picture(middle, middle), apart);
+  // Pieces that are not closed have none, or one outside of their boxes; the box's centre replaces it.
+  EXPECT_EQ(picture(none, far), apart);
+  EXPECT_THROW(draw_exploded(folder_ / "missing", context_), Error);
 }
 
 }  // namespace

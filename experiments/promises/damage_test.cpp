@@ -1,4 +1,6 @@
 // Volumes and experiment files that something has damaged: an answer or a short sentence, never a crash, a hang or gigabytes.
+#include "experiments/promises/damage.h"
+
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -11,20 +13,17 @@
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/extraction/volume_ends.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/io/grid_frame.h"
 #include "algorithms/io/import/files_for_tests.h"
 #include "algorithms/io/import/import_volume.h"
-#include "algorithms/io/grid_frame.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cases/cases.h"
-#include "experiments/harness/columns.h"
-#include "experiments/promises/damage.h"
-#include "experiments/harness/experiment_file.h"
-#include "experiments/harness/harness.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/measurement.h"
+#include "experiments/variants.h"
 
 namespace hermesh {
 namespace {
@@ -60,7 +59,6 @@ class Damage : public testing::Test {
   void hermite(int count);
   void nifti(int count);
   void raw(int count);
-  void toml(int count);
 
   fs::path folder;
   // Child processes have no threads but the one that made them.
@@ -268,26 +266,7 @@ void Damage::raw(int count) {
   });
 }
 
-void Damage::toml(int count) {
-  Files whole;
-  for (const auto& entry : fs::recursive_directory_iterator(experiments_folder() / "questions"))
-    if (entry.path().extension() == ".toml") whole.push_back(bytes_of(entry.path()));
-  std::ranges::sort(whole);  // a folder has no order
-  ASSERT_GE(whole.size(), 10u);
-  std::vector<std::string> cases;
-  for (const CaseInfo& info : list_cases()) cases.push_back(info.name);
-  const std::vector<Extractor> extractors = all_extractors();
-  const std::vector<Voxelizer> voxelizers = all_voxelizers();
-  const Vocabulary words{extractors, voxelizers, cases, column_names(), all_measurements()};
-  expect_answers(count, [&](int i) {
-    const fs::path path = put("a.toml", Mutator(std::uint64_t(i))(whole, /*text=*/true));
-    read_head(path);
-    read_experiment(path, words);
-  });
-}
-
 TEST_F(Damage, Volumes) { foreign(150), own(60), hermite(80), nifti(100), raw(100); }
-TEST_F(Damage, Experiments) { toml(100); }
 
 constexpr int kMany = 5000;
 TEST_F(Slow, ForeignVolumes) { foreign(kMany); }
@@ -295,7 +274,6 @@ TEST_F(Slow, OwnVolumes) { own(kMany); }
 TEST_F(Slow, HermiteData) { hermite(kMany); }
 TEST_F(Slow, Nifti) { nifti(kMany); }
 TEST_F(Slow, RawSamples) { raw(kMany); }
-TEST_F(Slow, Experiments) { toml(kMany); }
 
 }  // namespace
 }  // namespace hermesh

@@ -15,8 +15,8 @@
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/variants.h"
-#include "experiments/harness/harness.h"
 #include "experiments/pipeline.h"
+#include "experiments/variants.h"
 
 namespace hermesh {
 namespace {

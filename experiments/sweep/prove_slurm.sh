@@ -59,7 +59,7 @@ scancel "$job"
 echo "cancelled job $job of shard 1 after $had_1 of $(planned 1) cells"
 had_2=$(in_the_middle 2)
 # The program itself, neither the shell above it nor its child for the cells.
-process=$(pgrep -f -- "$program run .* --out $out/sweep/shards/2\$") || fail "shard 2 has no process"
+process=$(pgrep -f -- "experiments.lab run .* --out $out/sweep/shards/2\$") || fail "shard 2 has no process"
 kill -9 "$process"
 echo "killed process $process of shard 2 (job $(job_of 2)) after $had_2 of $(planned 2) cells"
 [ "$had_1" -lt "$(planned 1)" ] && [ "$had_2" -lt "$(planned 2)" ] || fail "a shard was done before it could be killed"

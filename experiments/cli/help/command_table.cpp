@@ -1,10 +1,12 @@
 #include "experiments/cli/help/command_table.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "experiments/cli/cli11.h"
-#include "experiments/harness/harness.h"
+#include "experiments/cli/laboratory.h"
+#include "experiments/variants.h"
 
 namespace hermesh::cli {
 namespace {
@@ -61,6 +63,22 @@ void add_options(const CLI::App& command, std::vector<OptionEntry>& entries) {
     add_options(*group, entries);
 }
 
+/// Adds the options of commands that the laboratory runs.
+void add_options_of_laboratory(std::vector<CommandEntry>& table) {
+  const auto output = laboratory_output({"options"});
+  if (!output) return;
+  const auto listed = nlohmann::json::parse(*output);
+  for (CommandEntry& command : table)
+    if (const auto options = listed.find(command.name); options != listed.end() && command.options.empty())
+      for (const auto& option : *options)
+        command.options.push_back({.names = option.at("names"),
+                                   .place = option.at("place"),
+                                   .help = option.at("help"),
+                                   .takes_value = option.at("takes_value"),
+                                   .required = option.at("required"),
+                                   .choices = option.at("choices")});
+}
+
 }  // namespace
 
 std::vector<CommandEntry> command_table(const CLI::App& app) {
@@ -74,6 +92,7 @@ std::vector<CommandEntry> command_table(const CLI::App& app) {
   for (const CLI::App* command :
        app.get_subcommands([](const CLI::App* one) { return !one->get_group().empty(); }))
     if (!command->get_name().empty()) add(*command, command->get_name());
+  add_options_of_laboratory(table);
   return table;
 }
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "experiments/cases/cases.h"
+#include "experiments/cli/laboratory.h"
 
 namespace hermesh::cli {
 namespace {
@@ -37,9 +37,9 @@ Check of_data() {
 }
 
 Check of_experiments() {
-  Check check{"run, conform, report, claims", "the folder of experiments", "",
+  Check check{"run, report, claims and other commands of the laboratory", "the directory of experiments", "",
               "export HERMESH_EXPERIMENTS=CHECKOUT/experiments, from a clone of the project"};
-  const fs::path folder = experiments_folder();
+  const fs::path folder = experiments_directory();
   std::error_code error;
   if (fs::exists(folder / "questions", error)) check.found = folder.string();
   return check;
@@ -63,8 +63,8 @@ std::vector<Check> all_checks() {
       of_experiments(),
       of_data(),
       of_program("fetching models, peers in JavaScript", "npm", "npm"),
-      of_program("plots of run, report and reproduce", "gnuplot", "gnuplot-nox"),
-      of_program("peers and examples in Python", "python3", "python3"),
+      of_program("the laboratory (run, report, claims, compare), peers in Python", "python3",
+                 "python3 python3-scipy python3-matplotlib python3-jinja2"),
       of_program("commits in rows, rows that are kept", "git", "git"),
       of_program("./reproduce --paper", "pdflatex",
                  "texlive-latex-base texlive-latex-recommended texlive-fonts-recommended"),

@@ -117,16 +117,14 @@ TEST_F(HelpTest, TheDoctorNamesWhatIsMissingAndItsRemedy) {
   std::filesystem::create_directory(path("bin"));
   const Outcome bare = run_shell("PATH=$PWD/bin HERMESH_DATA=$PWD/none $H doctor");
   EXPECT_EQ(bare.exit_code, 0);
-  EXPECT_NE(bare.out.find(
-                "missing  gnuplot, for plots of run, report and reproduce: apt-get install gnuplot-nox\n"),
+  EXPECT_NE(bare.out.find("missing  pdflatex, for ./reproduce --paper: apt-get install texlive-latex-base"),
             std::string::npos)
       << bare.out;
   EXPECT_NE(bare.out.find("which is no folder"), std::string::npos) << bare.out;
-  write("bin/gnuplot", "#!/bin/sh\n");
-  std::filesystem::permissions(path("bin/gnuplot"), std::filesystem::perms::owner_all);
+  write("bin/pdflatex", "#!/bin/sh\n");
+  std::filesystem::permissions(path("bin/pdflatex"), std::filesystem::perms::owner_all);
   const Outcome with = run_shell("PATH=$PWD/bin HERMESH_DATA=$PWD $H doctor");
-  EXPECT_NE(with.out.find("ok       gnuplot, for plots of run, report and reproduce: "), std::string::npos)
-      << with.out;
+  EXPECT_NE(with.out.find("ok       pdflatex, for ./reproduce --paper: "), std::string::npos) << with.out;
   EXPECT_NE(with.out.find("ok       the folder $HERMESH_DATA"), std::string::npos) << with.out;
   const Json json = Json::parse(run({"doctor", "--json"}).out).at("result");
   std::size_t missing = 0;
