@@ -1,7 +1,7 @@
 """Programs that run as child processes under limits of time and memory, and end when the laboratory does.
 
 run() starts any program. work() starts one that works on a job: it reads the job, a line of JSON, from its
-standard input and writes its answers, lines of JSON, to file descriptor 3 (experiments/harness/job.h lists
+standard input and writes its answers, lines of JSON, to file descriptor 3 (experiments/cells/serve.h lists
 them). Its standard output is our standard error.
 """
 

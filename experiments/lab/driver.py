@@ -332,8 +332,8 @@ class Run:
             groups = [{"name": self.name + "/"}]
             if self.kind != "measurement":
                 groups = experiment.groups_of(self.experiment, self.tier, self.arguments.filter)
-            self._check_any(groups)
-            self.out.mkdir(parents=True, exist_ok=True)
+            if groups or self.arguments.shard:
+                self.out.mkdir(parents=True, exist_ok=True)
             if self.arguments.shard:
                 groups = self._own_groups(groups)
             self._read_existing()
@@ -341,16 +341,13 @@ class Run:
                 self.position = f"[{done + 1}/{len(groups)}] {group['name'][:-1]}"
                 self.rows += self._measure() if self.kind == "measurement" else self._run_group(group)
                 self._say_done(done + 1, len(groups))
-            self._check_any(self.rows)
+            if not self.rows and not self.arguments.shard:
+                raise LabError(f"no cell of {self.name} has \"{self.arguments.filter}\" in its "
+                               "case/resolution/variant")
             return exit_code(self.rows), self._summary()
         finally:
             if not self.arguments.quiet:
                 sys.stderr.write("".join(f"note: {note}\n" for note in self.notes))
-
-    def _check_any(self, found):
-        if not found and not self.arguments.shard:
-            raise LabError(f"no cell of {self.name} has \"{self.arguments.filter}\" in its "
-                           "case/resolution/variant")
 
     def _say_done(self, done, groups):
         """Prints a line for each finished group, unless a terminal shows the progress, and logs it."""

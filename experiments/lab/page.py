@@ -13,8 +13,8 @@ import zlib
 import numpy
 
 from . import child, experiment, plots, program, tables
-from .rows import (ROOT, LabError, cell_text, find, latest_groups, number_at, own_columns, read_rows,
-                   readable, text_at, to_json, value_of)
+from .rows import (LabError, cell_text, find, latest_groups, number_at, own_columns, read_rows, readable,
+                   text_at, to_json, value_of)
 
 PARTS = pathlib.Path(__file__).parent / "page"
 USUAL_MESHES = 10

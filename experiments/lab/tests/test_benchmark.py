@@ -27,7 +27,8 @@ class Child(unittest.TestCase):
             self.assertEqual(child.run(command, limits).status, status, command)
 
     def test_figures(self):
-        ended = child.run([sys.executable, "-c", "x = bytearray(100 * 2**20)\nfor _ in range(10**6): pass"], LIMITS)
+        script = "x = bytearray(100 * 2**20)\nfor _ in range(10**6): pass"
+        ended = child.run([sys.executable, "-c", script], LIMITS)
         self.assertGreater(ended.peak_mib, 100)
         self.assertGreater(ended.cpu_seconds, 0.01)
 
@@ -35,8 +36,8 @@ class Child(unittest.TestCase):
 class Rates(unittest.TestCase):
     def test_classes(self):
         box = {"lower": [0, 0, 0], "upper": [1, 1, 1]}
-        report = {"triangles": 100, "quads": 0, "boundary_edges": 0, "non_manifold_edges": 0, "duplicate_polygons": 0,
-                  "inconsistent_edges": 0, "self_intersecting_pairs": 0}
+        report = {"triangles": 100, "quads": 0, "boundary_edges": 0, "non_manifold_edges": 0,
+                  "duplicate_polygons": 0, "inconsistent_edges": 0, "self_intersecting_pairs": 0}
         for change, bounds, expected in (
                 ({}, box, "clean solid"),
                 ({"self_intersecting_pairs": 1}, box, "closed, self-intersecting"),
@@ -70,7 +71,8 @@ class Benchmark(unittest.TestCase):
             path.parent.mkdir(parents=True)
             path.write_text(CUBE)
             experiment = {"question": "", "resolution": 20, "seconds": 30, "memory_mib": 4096, "method": [
-                {"name": "remesh", "request": ["{hermesh}", "remesh", "{input}", "{output}", "--resolution", "{resolution}"]},
+                {"name": "remesh",
+                 "request": ["{hermesh}", "remesh", "{input}", "{output}", "--resolution", "{resolution}"]},
                 {"name": "no mesh", "request": ["cp", "{input}", "{output}"]},
                 {"name": "nothing", "request": ["true"]},
                 {"name": "refuses", "request": ["false"]}]}

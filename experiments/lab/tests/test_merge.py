@@ -24,7 +24,8 @@ class Merge(unittest.TestCase):
             (shard / "meshes").mkdir(parents=True)
             (shard / "meshes" / f"{number}.ply").write_text("ply")
             self.write_manifest(shard)
-            append_rows(shard / "rows.jsonl", [row | {"run": f"run {number}"} for row in self.rows[number - 1::3]])
+            own = self.rows[number - 1::3]
+            append_rows(shard / "rows.jsonl", [row | {"run": f"run {number}"} for row in own])
 
     def write_manifest(self, shard, **changes):
         (shard / "shard.json").write_text(json.dumps(self.manifest | {"shard": int(shard.name)} | changes))
@@ -70,8 +71,8 @@ class Merge(unittest.TestCase):
         self.assertEqual(len(self.merged()), 12)
 
     def test_the_last_row_of_the_shards_program_counts(self):
-        later = [self.rows[0] | {"digest": "later"}, self.rows[0] | {"digest": "of another", "binary": "ffff"}]
-        append_rows(self.shards[0] / "rows.jsonl", later)
+        changes = {"digest": "later"}, {"digest": "of another", "binary": "ffff"}
+        append_rows(self.shards[0] / "rows.jsonl", [self.rows[0] | change for change in changes])
         self.assertEqual(self.merged()[0]["digest"], "later")
 
     def test_a_cell_in_two_shards_must_have_the_same_values(self):
@@ -88,7 +89,7 @@ class Merge(unittest.TestCase):
 
     def test_refuses_parts_of_different_wholes(self):
         for change in [{"experiment": "other"}, {"tier": "other"}, {"binary": "ffff"}, {"commit": "ffff"},
-                       {"file_sha256": "ffff"}, {"threads": 999}, {"of": 4}, {"cells": self.manifest["cells"][:-1]}]:
+                       {"file_sha256": "ffff"}, {"threads": 999}, {"of": 4}, {"cells": []}]:
             self.write_manifest(self.shards[2], **change)
             self.assert_refused("different")
         for torn in ('{"experiment": "x"}', '{"experiment": '):

@@ -22,9 +22,10 @@ HOSTILE = "</script><img src=x onerror=alert(1)><!-- \u2028 & \" ' {{ 1 }} {% ra
 
 def row_of(run="1", label="a", triangles=100, rms=0.25, seconds=(0.3, 0.1, 0.2), **changes):
     """Returns a row with voxel size 0.5 and distances in world units."""
-    return {"experiment": "toy", "tier": "quick", "question": "why?", "run": run, "commit": f"{run}23456789abcdef",
+    return {"experiment": "toy", "tier": "quick", "question": "why?", "run": run, "commit": "0123456789abcdef",
             "date": f"2026-01-0{run}T00:00:00Z", "columns": ["triangles", "seconds", "to_rms"],
-            "case": {"name": "ball", "origin": "generated", "sha256": "abcdef"}, "resolution": 40, "voxel_size": 0.5,
+            "case": {"name": "ball", "origin": "generated", "sha256": "abcdef"},
+            "resolution": 40, "voxel_size": 0.5,
             "variant": {"name": label.split()[0], "label": label, "options": ""},
             "voxelization": {"label": "openvdb", "active_voxels": 1000}, "triangle_count": triangles,
             "report": {"to_reference": {"rms": rms}},
@@ -58,11 +59,12 @@ class Page(unittest.TestCase):
         policy = re.search('http-equiv="Content-Security-Policy" content="([^"]*)"', html)[1]
         self.assertTrue(policy.startswith("default-src 'none'; "))
         self.assertNotRegex(policy, "http|unsafe")
-        for kind, element in (("script", "</script>\n<script>(.*?)</script>"), ("style", "<style>(.*?)</style>")):
+        for kind, element in (("script", "</script>\n<script>(.*?)</script>"),
+                              ("style", "<style>(.*?)</style>")):
             text = re.search(element, html, re.DOTALL)[1]
             digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
             self.assertIn(f"{kind}-src 'sha256-{digest}'", policy)
-        self.assertNotRegex(html, r" src=|@import|url\(|fetch\(|XMLHttpRequest|innerHTML|insertAdjacentHTML|document.write")
+        self.assertNotRegex(html, r" src=|@import|url\(|fetch\(|XMLHttpRequest|innerHTML|AdjacentHTML|document.write")
 
     def test_colours_are_those_of_the_plots(self):
         colours = tuple(re.findall(r"--c\d: (#\w+);", page._part("page.css")))
@@ -93,9 +95,11 @@ class Figures(unittest.TestCase):
         rows = [row_of(label="b 0", rms=0.25), row_of(label="b 0.1", triangles=50, rms=0.5, seconds=[0.4])]
         error, = titled(rows, "Triangles and distance")
         self.assertTrue(error["log_x"] and error["log_y"] and error["front"])
-        self.assertEqual(points_of(error), {"b 0": [[0, 100, 0.5, None, None]], "b 0.1": [[1, 50, 1, None, None]]})
+        self.assertEqual(points_of(error),
+                         {"b 0": [[0, 100, 0.5, None, None]], "b 0.1": [[1, 50, 1, None, None]]})
         times, = titled(rows, "Time, ")
-        self.assertEqual(points_of(times), {"b 0": [[0, 0.2, 0, 0.1, 0.3]], "b 0.1": [[1, 0.4, 0, None, None]]})
+        self.assertEqual(points_of(times),
+                         {"b 0": [[0, 0.2, 0, 0.1, 0.3]], "b 0.1": [[1, 0.4, 0, None, None]]})
         self.assertEqual(titled(rows, "Time and size"), [])
         for figure in (error, times):  # a label has one style
             self.assertEqual([series["style"] for series in figure["series"]], [0, 1])
@@ -107,7 +111,7 @@ class Figures(unittest.TestCase):
         self.assertEqual(points_of(figure), {"a": [[1, 1000, 0.2, 0.1, 0.3], [0, 4000, 2, None, None]]})
 
     def test_plots_of_the_rows_replace_those_of_their_kind(self):
-        plot = {"name": "p", "title": "asked", "x": "triangles", "y": ["to_rms"], "x_label": "x", "y_label": "y"}
+        plot = {"name": "p", "title": "asked", "x": "triangles", "y": ["to_rms"], "x_label": "", "y_label": ""}
         rows = [row_of(label="b", triangles=50), row_of(plots=[plot])]
         figure, = titled(rows, "asked")
         self.assertEqual(points_of(figure)["a"], [[1, 100, 0.5, None, None]])
@@ -139,8 +143,8 @@ def unpacked(head, packed):
                 if data[at - 1] < 128:
                     break
             values[-1].append((values[-1] or [0])[-1] + (-(code >> 1) - 1 if code & 1 else code >> 1))
-    rest = data[at:]
-    distances = [(256 * rest[i] + rest[len(rest) // 2 + i]) / 65535 * head["largest"] for i in range(len(rest) // 2)]
+    half = (len(data) - at) // 2
+    distances = [(256 * data[at + i] + data[at + half + i]) / 65535 * head["largest"] for i in range(half)]
     return numpy.array(values[:3]).T, values[3], distances
 
 
@@ -159,7 +163,8 @@ class Meshes(unittest.TestCase):
         header += "".join(f"property {kind} {axis}\n" for axis in "xyz")
         header += "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
         points = numpy.array([[0, 0, 0.25], [1, 0, 0.25], [1, 1, 0.25], [0, 1, 0.25]], scalar)
-        faces = b"".join(bytes([len(face)]) + numpy.array(face, "<i4").tobytes() for face in ([2, 1, 0], [0, 1, 2, 3]))
+        faces = b"".join(bytes([len(face)]) + numpy.array(face, "<i4").tobytes()
+                         for face in ([2, 1, 0], [0, 1, 2, 3]))
         file.write_bytes(header.encode() + points.tobytes() + faces)
         return file
 
@@ -176,7 +181,8 @@ class Meshes(unittest.TestCase):
         for voxel_size, far in ((0.5, random.random(300)), (1e-4, None)):
             head, packed = page.pack_mesh(points, triangles, quads, voxel_size, far)
             steps, corners, distances = unpacked(head, packed)
-            self.assertLessEqual(abs(head["lower"] + steps * head["step"] - points).max(), head["step"] * 0.5001)
+            errors = abs(head["lower"] + steps * head["step"] - points)
+            self.assertLessEqual(errors.max(), head["step"] * 0.5001)
             self.assertEqual(corners, [*triangles.ravel(), *quads.ravel()])
             for distance, expected in zip(distances, [] if far is None else far / voxel_size, strict=True):
                 self.assertAlmostEqual(distance, expected, delta=2 / 65535)
@@ -215,8 +221,8 @@ class Meshes(unittest.TestCase):
                 self.square(f"toy-{case}-40/{number}-{label}.ply")
         self.square("toy-x-40/10-c.ply")
         groups = page._mesh_files(self.directory, rows)
-        self.assertEqual([[(file.name[0], row) for file, row in group] for group in groups], [
-            [("1", 0), ("2", 1), ("3", 2)], [("1", 3), ("2", 4), ("3", 5)], [("1", 6), ("2", 7), ("3", 8), ("1", 8)]])
+        self.assertEqual([[row for _, row in group] for group in groups], [[0, 1, 2], [3, 4, 5], [6, 7, 8, 8]])
+        self.assertEqual([file.name for file, _ in groups[2]], ["1-a.ply", "2-b.ply", "3-c.ply", "10-c.ply"])
         for count, expected in ((0, []), (2, [0, 1]), (5, [0, 1, 2]), (7, [0, 1, 2, 3, 4, 5]),
                                 (10, [0, 1, 2, 3, 4, 5, 6, 7, 8, 8])):
             chosen, total = page._chosen_meshes(groups, count)
@@ -256,7 +262,8 @@ class Meshes(unittest.TestCase):
         append_rows(self.directory / "rows.jsonl", [own])
         self.assertEqual(len(self.written(self.directory)["rows"]), 1)
         baselines.mkdir()
-        append_rows(baselines / "rows.jsonl", [row_of("1", triangles=30), row_of("1", experiment="another"), own])
+        another = row_of("1", experiment="another")
+        append_rows(baselines / "rows.jsonl", [row_of("1", triangles=30), another, own])
         data = self.written(self.directory / "rows.jsonl")
         self.assertEqual([row["run"] for row in data["rows"]], ["1", "2"])
         table, = data["tables"]

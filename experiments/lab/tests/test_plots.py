@@ -20,13 +20,16 @@ def row_of(label, x, share, **changes):
 def measured(x, **values):
     names = ["swept", "cost", "cost_low", "cost_high"]
     columns = [{"name": name, "header": name, "meaning": name} for name in names]
-    return row_of("a", x, 0, measurement={"name": "m"}, table={"columns": columns}, values={"swept": x, **values})
+    return row_of("a", x, 0, measurement={"name": "m"}, table={"columns": columns},
+                  values={"swept": x, **values})
 
 
 def curves(rows, **changes):
     """Returns {label: [(x, y, low, high)]}; ends that are missing are left out."""
-    return {curve.label: [tuple(value for value in (point.x, point.y, point.low, point.high) if value is not None)
-                          for point in curve.points]
+    def values(point):
+        return tuple(each for each in (point.x, point.y, point.low, point.high) if each is not None)
+
+    return {curve.label: list(map(values, curve.points))
             for curve in plots.curves_of(experiment.PLOT | PLOT | changes, rows)}
 
 
@@ -53,10 +56,12 @@ class Curves(unittest.TestCase):
         self.assertEqual(curves(rows, y=["cost"], percent=False), {"a": [(1, 5, 4.5, 7), (2, 6)]})
         timed = row_of("a", 1, 0, seconds={"median": 2.0, "all": [3.0, 1.5, 2.0]})
         once = row_of("b", 1, 0, seconds={"median": 4.0, "all": [4.0]})
-        self.assertEqual(curves([timed, once], y=["seconds"], percent=False), {"a": [(1, 2, 1.5, 3)], "b": [(1, 4)]})
+        self.assertEqual(curves([timed, once], y=["seconds"], percent=False),
+                         {"a": [(1, 2, 1.5, 3)], "b": [(1, 4)]})
 
     def test_categories_are_numbered_by_x(self):
-        rows = [row_of(*each) for each in (("late", 9, 0.5), ("first", 1, 0.25), ("mid", 5, 0.75), ("late", 8, 1))]
+        given = ("late", 9, 0.5), ("first", 1, 0.25), ("mid", 5, 0.75), ("late", 8, 1)
+        rows = [row_of(*each) for each in given]
         found, = curves(rows, categories=True).values()
         self.assertEqual(found, [(0, 25), (1, 75), (2, 50), (2, 100)])
 
@@ -125,7 +130,7 @@ class Figures(unittest.TestCase):
         self.assertEqual(math.gcd(len(plots.COLOURS), len(plots.MARKS)), 1)
 
     def test_emphasised_curves_are_thick_and_below_and_labels_are_in_the_legend_once(self):
-        rows = [row_of("peer", 1, 0.5), row_of("ours, fast", 1, 0.25), row_of("ours, fast", 2, 0.3), row_of("ours2", 1, 0.2)]
+        rows = [row_of(label, x, 0.5) for label in ("peer", "ours, fast", "ours2") for x in (1, 2)]
         axes, legend = self.drawn(rows, emphasised=["ours"])
         self.assertEqual(legend, ["ours, fast", "peer", "ours2"])
         ours, peer, other = (line.get_linewidth() for line in axes.lines)

@@ -1,4 +1,4 @@
-"""A program that takes jobs as `hermesh-lab cell` does (child.py); its variants crash, hang and eat memory."""
+"""Takes jobs as `hermesh-lab cell` does (child.py); its variants crash, hang and eat memory."""
 
 import hashlib
 import json
@@ -28,7 +28,8 @@ def load(name, require_data):
     if content.endswith(".off"):
         send(error=f"the case {name} cannot be read: there is no such file", unreadable=True)
         sys.exit()
-    return {"name": name, "origin": "stand-in: toy" if name == "brick" else "file", "sha256": digest_of(content)}
+    origin = "stand-in: toy" if name == "brick" else "file"
+    return {"name": name, "origin": origin, "sha256": digest_of(content)}
 
 
 def misbehave(name):
