@@ -14,7 +14,7 @@ build() {  # folder, then options of CMake
   shift
   cmake -S . -B "$folder" -G Ninja -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF \
     -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 "$@" > "$folder.log"
-  cmake --build "$folder" --target hermesh -j "$jobs" >> "$folder.log" 2>&1 || { tail -40 "$folder.log"; exit 1; }
+  cmake --build "$folder" --target hermesh hermesh-lab -j "$jobs" >> "$folder.log" 2>&1 || { tail -40 "$folder.log"; exit 1; }
 }
 
 # A class or an enumeration at the scope of a namespace that has a name, defined in two files. Files with a main() or
