@@ -9,8 +9,8 @@
 //   "done", "head"
 //
 // Answers are objects with one of these keys:
-//   planned   the row of a cell as far as it is known before the work on it begins
-//   at        label of the cell that is worked on from now on
+//   planned   the keys of a row that are known before its cell is run
+//   at        label of the cell that runs next
 //   row       a finished row
 //   input     name, origin, sha256 and size of an input
 //   distances of the vertices of one mesh file, world units

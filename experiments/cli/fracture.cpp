@@ -42,7 +42,8 @@ void draw_picture(const std::filesystem::path& made, Session& session) {
       std::filesystem::canonical("/proc/self/exe").parent_path() / "hermesh-lab";
   std::error_code error;
   if (!std::filesystem::exists(program, error)) {
-    session.context.note("there is no picture of the pieces: hermesh-lab, which draws it, is not installed");
+    session.context.note(
+        "exploded.png was not drawn: hermesh-lab is not installed; install it or pass --no-picture");
     return;
   }
   ChildRun child(program, {"exploded", made});
@@ -50,7 +51,7 @@ void draw_picture(const std::filesystem::path& made, Session& session) {
     session.context.check();
     ChildRun::wait_for_any({&child}, 100);
   }
-  if (child.exit_code() != 0) session.context.note("there is no picture of the pieces: " + child.err());
+  if (child.exit_code() != 0) session.context.note("exploded.png was not drawn: " + child.err());
 }
 
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }

@@ -27,8 +27,9 @@ constexpr std::array<std::pair<const char*, const char*>, 8> kCommands = {{
     {"benchmark", "Run programs on a corpus of models and print their success rates"},
 }};
 
-/// Prepares the environment of the laboratory and returns its command line. -P: a directory `experiments`
-/// where the user works must not be taken for it. @throws Error if there is no laboratory.
+/// Prepares the environment of the laboratory and returns its command line. Option -P keeps the working
+/// directory, which may have a directory `experiments` of its own, out of Python's path. @throws Error if the
+/// laboratory is not installed.
 std::vector<std::string> laboratory_command(const std::vector<std::string>& words) {
   const std::filesystem::path directory = experiments_directory();
   std::error_code error;

@@ -22,8 +22,8 @@ std::filesystem::path experiments_directory();
 /// laboratory unread, so that its help and its messages are those of the command.
 void add_laboratory(CLI::App& app, Session& session);
 
-/// Returns the output of a laboratory command, nothing if there is no laboratory. @throws Error if the
-/// command fails.
+/// Returns the output of a laboratory command, or std::nullopt if the laboratory is not installed. @throws
+/// Error if the command fails.
 std::optional<std::string> laboratory_output(const std::vector<std::string>& words);
 
 }  // namespace hermesh::cli

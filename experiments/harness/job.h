@@ -100,8 +100,7 @@ class CaseUnreadable : public Error {
 
 /// Receives the progress of the cells of a group, in case the process does not live to return their rows.
 struct CellWatch {
-  std::function<void(const Json& row)> planned =
-      {};  ///< gets each cell's row as far as it is known beforehand
+  std::function<void(const Json& row)> planned = {};  ///< gets the keys of each row that are known in advance
   std::function<void(const std::string& label)> at = {};  ///< is called before each step of a cell's work
   void plan(const Json& row) const {
     if (planned) planned(row);

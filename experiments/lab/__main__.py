@@ -1,4 +1,6 @@
-"""python3 -m experiments.lab COMMAND: the laboratory, which `hermesh run`, `report`, `claims` and others start."""
+"""python3 -m experiments.lab COMMAND: the laboratory, which `hermesh run`, `report`, `claims` and others
+start.
+"""
 
 import argparse
 import json

@@ -12,8 +12,8 @@ memory_mib  limit of address space per run
 [[method]]  name, and request: the program and its arguments. {hermesh}, {input}, {output}, {resolution} and {voxel} (the
             voxel size in the units of the file) are replaced
 
-Each run is a process of its own. Its row is on disk when it ends, and the same command continues after an interruption.
-Meshes are validated with `hermesh validate`, which shares no code with the methods.
+Each run is a process of its own. Its row is on disk when it ends, and the same command continues after an
+interruption. Meshes are validated with `hermesh validate`, which shares no code with the methods.
 """
 
 import collections

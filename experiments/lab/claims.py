@@ -1,4 +1,5 @@
-"""Claims of the thesis, and the verdict of the rows of results/ on each: reproduced, reproduced in shape, contradicted,
+"""Claims of the thesis, and the verdict of the rows of results/ on each: reproduced, reproduced in shape,
+contradicted,
 or untestable. Only the rules are typed by hand (paper/claims.toml, whose head explains the keys)."""
 
 import dataclasses
@@ -51,7 +52,8 @@ def read_toml(path):
 
 
 def read_claims(path):
-    """Returns the claims of a file. Raises LabError for a mistake in it, e.g. a claim that no rule decides."""
+    """Returns the claims of a file. Raises LabError for a mistake in it, e.g. a claim that no rule decides.
+    """
     claims = experiment.read_table(read_toml(path), path.name, {"claim": experiment.list_of(_claim)})["claim"]
     ids = [claim.id for claim in claims]
     if twice := [each for each in ids if ids.count(each) > 1]:

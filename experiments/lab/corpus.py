@@ -1,8 +1,9 @@
 """Corpora of mesh files that are published in Debian packages.
 
-A corpus is a table of tab-separated values in experiments/data, one file per line: package, version, path, sha256, format,
-bytes, licence. A path has the form ARCHIVE!MEMBER if the file is inside an archive of the package. Nothing is installed:
-packages are downloaded with apt, and the required files are unpacked into the cache.
+A corpus is a table of tab-separated values in experiments/data, one file per line: package, version, path,
+sha256, format, bytes, licence. A path has the form ARCHIVE!MEMBER if the file is inside an archive of the
+package. Nothing is installed: packages are downloaded with apt, and the required files are unpacked into the
+cache.
 """
 
 import csv
@@ -58,12 +59,15 @@ def cache_directory():
 
 
 def location(entry, cache):
-    """Returns where an entry is, or will be, in the cache. The directory also holds the buffers that it refers to."""
+    """Returns where an entry is, or will be, in the cache. The directory also holds the buffers that it
+    refers to.
+    """
     return cache / entry.sha256[:16] / entry.name
 
 
 def fetch(entries, cache, say):
-    """Downloads and unpacks the entries that are not in the cache yet; `say` is called with progress messages.
+    """Downloads and unpacks the entries that are not in the cache yet; `say` is called with progress
+    messages.
 
     Raises LabError if a package cannot be downloaded, or a file differs from the corpus.
     """

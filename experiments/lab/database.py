@@ -1,4 +1,5 @@
-"""Rows as tables of SQL, so that a claim or a number of the text is a query that anyone can read and repeat."""
+"""Rows as tables of SQL, so that a claim or a number of the text is a query that anyone can read and repeat.
+"""
 
 import pathlib
 import re
@@ -24,10 +25,11 @@ class _Median:
 class RowDatabase:
     """An SQLite database in memory. Each directory of rows is a table with its name.
 
-    Of cells that ran several times, a table has the last run (latest_groups). Its columns are the common ones of
-    columns.toml, stand_in, broken (number of broken guarantees) and row (all of it as JSON), then the columns of reports
-    that some row has, then those that measurements bring along; a measurement's column replaces one of the same name.
-    Missing values are NULL, true is 1. In addition to SQLite's functions there is the aggregate median().
+    Of cells that ran several times, a table has the last run (latest_groups). Its columns are the common ones
+    of columns.toml, stand_in, broken (number of broken guarantees) and row (all of it as JSON), then the
+    columns of reports that some row has, then those that measurements bring along; a measurement's column
+    replaces one of the same name. Missing values are NULL, true is 1. In addition to SQLite's functions there
+    is the aggregate median().
     """
 
     def __init__(self):

@@ -1,4 +1,5 @@
-"""Numbers of the text that come from rows: markers of pages are filled from the rows and checked against them.
+"""Numbers of the text that come from rows: markers of pages are filled from the rows and checked against
+them.
 
   <!--=NAME-->8.9 to 10.8<!--/-->                   the number or the table NAME of paper/numbers.toml
   <!--=table DIR SUBJECT [RESOLUTION]-->…<!--/-->   the tables of results/DIR with that case (or table)
@@ -29,9 +30,9 @@ MARKER = re.compile(r"<!--=(?P<name>[^<>]*)-->(?P<content>(?:(?!<!--=).)*?)<!--/
 def check(root):
     """Returns a sentence for each problem.
 
-    Problems are pages and tables that differ from the rows, numbers in the text of a page without a marker, rows that
-    differ from results/SHA256SUMS, inputs of rows whose hash is not in cases.toml, and rows of ablations whose
-    prediction was not committed before them.
+    Problems are pages and tables that differ from the rows, numbers in the text of a page without a marker,
+    rows that differ from results/SHA256SUMS, inputs of rows whose hash is not in cases.toml, and rows of
+    ablations whose prediction was not committed before them.
     """
     pages = Pages(root)
     found = [problem for page in pages.names for problem in pages.problems_of(page)]
@@ -55,7 +56,9 @@ def fill(root):
 
 
 def read_numbers(path):
-    """Returns the lists and tables of numbers.toml, whose head explains them. Raises LabError for a mistake in it."""
+    """Returns the lists and tables of numbers.toml, whose head explains them. Raises LabError for a mistake
+    in it.
+    """
     phrases = experiment.list_of(experiment.text)
     keys = {"pages": phrases, "numbers": table_of(query_and_format), "tables": table_of(experiment.text),
             "plain": table_of(phrases)}
@@ -72,7 +75,8 @@ def table_of(check_value):
 
 
 def query_and_format(entry, where):
-    """Checks a number; returns its query and its printf format, where "" stands for three significant digits."""
+    """Checks a number; returns its query and its printf format, where "" stands for three significant digits.
+    """
     entry = {"query": entry} if isinstance(entry, str) else entry
     text = experiment.text
     read = {"format": ""} | experiment.read_table(entry, where, {"query": text}, {"format": text})
@@ -95,7 +99,8 @@ def rows_of_query(query, rows):
 
 
 def number_text(query, form, rows, write=formatted):
-    """Returns the text of a number: "8.9", or "8.9 to 10.8" for a query with two columns. `write` formats one value.
+    """Returns the text of a number: "8.9", or "8.9 to 10.8" for a query with two columns. `write` formats one
+    value.
 
     Raises LabError if the query returns no row, or NULL.
     """
@@ -114,7 +119,9 @@ def table_text(query, rows):
 
 
 def markers(text, page):
-    """Returns the matches of MARKER. Raises LabError for a marker that does not end before the next one begins."""
+    """Returns the matches of MARKER. Raises LabError for a marker that does not end before the next one
+    begins.
+    """
     found = list(MARKER.finditer(text))
     starts = [start.start() for start in re.finditer("<!--=", text)]
     if unended := sorted(set(starts) - {marker.start() for marker in found}):
@@ -127,7 +134,9 @@ def line_of(text, at):
 
 
 def typed_numbers(text, hidden, number):
-    """Returns [(line, number)] for the matches of `number` in a text, except years and in matches of `hidden`."""
+    """Returns [(line, number)] for the matches of `number` in a text, except years and in matches of
+    `hidden`.
+    """
     for pattern in hidden:
         text = re.sub(pattern, lambda match: re.sub(r"[^\n]", " ", match[0]), text, flags=re.DOTALL)
     return [(line_of(text, found.start()), found[0]) for found in re.finditer(number, text)
@@ -135,7 +144,8 @@ def typed_numbers(text, hidden, number):
 
 
 def orphans(text, plain):
-    """Returns [(line, number)] for each number of a page that is in no marker, code, link, or phrase of `plain`.
+    """Returns [(line, number)] for each number of a page that is in no marker, code, link, or phrase of
+    `plain`.
 
     Years, and numbers of chapters, sections, tables, figures, equations and algorithms, do not count.
     """
@@ -149,7 +159,9 @@ def hash_line(root, table):
 
 
 class Pages:
-    """The pages of a checkout with the sources of their numbers: paper/numbers.toml, paper/claims.toml and results/."""
+    """The pages of a checkout with the sources of their numbers: paper/numbers.toml, paper/claims.toml and
+    results/.
+    """
 
     def __init__(self, root):
         self.root = pathlib.Path(root)
@@ -213,7 +225,9 @@ class Pages:
         return re.sub(r"### ([^\n]*)", r"**\1**", "".join(map(tables.markdown_table, groups))).rstrip("\n")
 
     def _contents(self, page):
-        """Returns the text of a page, and (its marker, "page:line", what belongs into it or the error) for each."""
+        """Returns the text of a page, and (its marker, "page:line", what belongs into it or the error) for
+        each.
+        """
         text, found = self.read(page), []
         if text is None:
             raise LabError(f"there is no page {page}, which paper/numbers.toml lists")
@@ -237,7 +251,9 @@ class Pages:
         return result + text[done:]
 
     def problems_of(self, page):
-        """Returns a sentence for each marker of a page that differs from the rows, and for each number without one."""
+        """Returns a sentence for each marker of a page that differs from the rows, and for each number
+        without one.
+        """
         text, contents = self._contents(page)
         found = []
         for marker, where, right in contents:
@@ -252,7 +268,9 @@ class Pages:
                         "paper/numbers.toml" for line, number in orphans(text, plain)]
 
     def problems_of_rows(self):
-        """Returns sentences on inputs that cases.toml does not list, and on predictions made after their rows."""
+        """Returns sentences on inputs that cases.toml does not list, and on predictions made after their
+        rows.
+        """
         cases = claims.read_toml(self.root / "experiments/cases.toml")["case"]
         known = {entry.get("sha256") for case in cases for entry in [case, *case.get("files", [])]} - {None}
         found = set()

@@ -1,4 +1,5 @@
-"""Makes the paper's numbers and tables from the rows of results/, and refuses those that do not come from them.
+"""Makes the paper's numbers and tables from the rows of results/, and refuses those that do not come from
+them.
 
   python3 -m experiments.lab.paper --out DIR     checks the text, writes DIR/numbers.tex and DIR/tables/*.tex
   python3 -m experiments.lab.paper --verify DIR  lists differences of DIR from the rows, and complaints of LaTeX
@@ -58,7 +59,8 @@ def head_of(text, numeric):
 
 
 def changes(lines):
-    """Returns the indices of the lines before which the first column changes, and clears its repeated cells."""
+    """Returns the indices of the lines before which the first column changes, and clears its repeated cells.
+    """
     rules = [i for i in range(2, len(lines)) if lines[i][0] != lines[i - 1][0]]
     for i in range(2, len(lines)):
         lines[i][0] = lines[i][0] if i in rules else ""
@@ -131,7 +133,8 @@ class Paper:
         self.numbers = self.pages.numbers | own
 
     def sources(self):
-        """Returns {name: text} of the files of the paper: the frame, and each section that paper.toml lists."""
+        """Returns {name: text} of the files of the paper: the frame, and each section that paper.toml lists.
+        """
         names = ["paper/hermesh.tex"] + [f"paper/sections/{name}.tex" for name in self.settings["sections"]]
         texts = {name: self.pages.read(name) for name in names}
         for name in names:
@@ -140,7 +143,9 @@ class Paper:
         return texts
 
     def asked(self):
-        """Returns {"N": {name: position}, "T": …}: the numbers and tables of the text, and where each is first."""
+        """Returns {"N": {name: position}, "T": …}: the numbers and tables of the text, and where each is
+        first.
+        """
         found = {"N": {}, "T": {}}
         for name, text in self.sources().items():
             for at, line in enumerate(text.splitlines(), 1):
@@ -205,7 +210,8 @@ class Paper:
         return result
 
     def number(self, name):
-        """Returns the text of a number: one of paper.toml or numbers.toml, "claim ID VALUE", "count" (of claims),
+        """Returns the text of a number: one of paper.toml or numbers.toml, "claim ID VALUE", "count" (of
+        claims),
         "count_VERDICT", "ablations", or "ablations_VERDICT" (predictions with that verdict)."""
         if name in self.numbers:
             self.trust(self.numbers[name][0])
@@ -245,7 +251,8 @@ class Paper:
         return tabular(columns, lines, changes(lines) if entry.get("groups") else ())
 
     def answer(self, entry):
-        """Returns the heads and rows of a table's query, or of one for each directory that matches `folders`."""
+        """Returns the heads and rows of a table's query, or of one for each directory that matches `folders`.
+        """
         queries = [entry["query"]]
         if "folders" in entry:
             queries = [entry["query"].replace("{folder}", f'"{table}"')
@@ -298,7 +305,9 @@ class Paper:
     # ---- Files
 
     def files(self):
-        """Returns {path below the output: text}. Raises LabError for a number or table that the rows do not give."""
+        """Returns {path below the output: text}. Raises LabError for a number or table that the rows do not
+        give.
+        """
         made = {}
         for kind, names in self.asked().items():
             for name, where in names.items():
@@ -313,7 +322,9 @@ class Paper:
         return {name: sealed(text) for name, text in files.items()}
 
     def write(self, out):
-        """Writes the files. Raises LabError if there is one that was edited, or if the text has typed numbers."""
+        """Writes the files. Raises LabError if there is one that was edited, or if the text has typed
+        numbers.
+        """
         out = pathlib.Path(out)
         for path in sorted(out.glob("**/*.tex")):
             text = path.read_text()
@@ -343,7 +354,8 @@ class Paper:
 
 
 def changed_since(root, rows):
-    """Returns [(experiment, commit, labels)]: the variants that an experiment's file has changed since its rows.
+    """Returns [(experiment, commit, labels)]: the variants that an experiment's file has changed since its
+    rows.
 
     Skips rows whose commit git does not have, or whose experiment has no file.
     """

@@ -1,4 +1,6 @@
-"""Rows of results: one JSON object per cell of an experiment, and the columns that are read from them (columns.toml)."""
+"""Rows of results: one JSON object per cell of an experiment, and the columns that are read from them
+(columns.toml).
+"""
 
 import dataclasses
 import functools
@@ -155,7 +157,9 @@ def drop_torn_row(file):
 
 @dataclasses.dataclass
 class RowGroup:
-    """The rows of one table: same experiment, tier, run, case, resolution and voxelizer, in the variants' order."""
+    """The rows of one table: same experiment, tier, run, case, resolution and voxelizer, in the variants'
+    order.
+    """
 
     rows: list
     earlier_runs: int = 0  # number of groups that differ from this one only in the run, and are not part of it

@@ -139,7 +139,8 @@ class Files(Reads):
             ('"level"', '"points"', "plots[0].x")])
 
     def assert_mistakes(self, valid, mistakes):
-        """Checks that each replacement, of an old by a new text, raises an error that names file and place."""
+        """Checks that each replacement, of an old by a new text, raises an error that names file and place.
+        """
         for old, new, place in mistakes:
             self.assertIn(old, valid)
             with self.subTest(old=old, new=new), self.assertRaises(LabError) as caught:

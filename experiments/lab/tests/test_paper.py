@@ -23,7 +23,9 @@ query = "SELECT label FROM headline WHERE subject = 'nobody'"
 
 
 class Case(Directory):
-    """A copy of the paper's sources with only the rows of `headline`, and a text with one number and one table."""
+    """A copy of the paper's sources with only the rows of `headline`, and a text with one number and one
+    table.
+    """
 
     def setUp(self):
         super().setUp()
