@@ -1,16 +1,16 @@
 #include "algorithms/variants.h"
 
-#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
-#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/extraction/certified_octree/certified_octree.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 
 namespace hermesh {
 
 std::span<const Extractor> our_extractors() {
-  // Promises are what the harness holds against every mesh of a variant: a promise that is missing here is a property
-  // that the method does not have, for the reason in its header.
+  // Promises are what the harness holds against every mesh of a variant: a promise that is missing here is a
+  // property that the method does not have, for the reason in its header.
   static const std::vector<Extractor> table = {
       {.name = "marching-cubes",
        .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, "
@@ -25,22 +25,26 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},
-      // Chapter 6 with its faults: regions of several sheets share a point, too (trap T5), and crossings that its 10-byte
-      // data lose leave holes (trap T2), so that it promises nothing. With other data it is closed and oriented.
+      // Chapter 6 with its faults: regions of several sheets share a point, too (trap T5), and crossings that
+      // its 10-byte data lose leave holes (trap T2), so that it promises nothing. With other data it is
+      // closed and oriented.
       {.name = "adaptive-dual-contouring",
-       .summary = "cells merged into 2³, 4³ and 8³ regions within each block, of 10-byte data, as printed (Aldén 2011, "
+       .summary = "cells merged into 2³, 4³ and 8³ regions within each block, of 10-byte data, as printed "
+                  "(Aldén 2011, "
                   "chapters 4 and 6)",
        .promises = {},
        .options = adaptive_dual_contouring_options(),
        .extract = adaptive_dual_contouring},
       // The only one whose mesh is proved free of self-intersection.
       {.name = "manifold-dual-contouring",
-       .summary = "adaptive dual contouring within a stated tolerance: closed, manifold, free of self-intersection, sharp",
+       .summary = "adaptive dual contouring within a stated tolerance: closed, manifold, free of "
+                  "self-intersection, sharp",
        .promises = {.closed = true, .manifold = true, .oriented = true, .no_self_intersection = true},
        .options = manifold_dual_contouring_options(),
        .extract = manifold_dual_contouring},
       {.name = "certified-octree",
-       .summary = "the same promises many times as fast, with more polygons: cubes of up to 8³ cells become one point each",
+       .summary = "the same promises many times as fast, with more polygons: cubes of up to 8³ cells become "
+                  "one point each",
        .promises = {.closed = true, .manifold = true, .oriented = true, .no_self_intersection = true},
        .options = certified_octree_options(),
        .extract = certified_octree},

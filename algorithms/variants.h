@@ -1,5 +1,5 @@
-// THE table of our own variants. Adding one is an entry in variants.cpp, of a voxelizer in voxelizers.cpp, and its sources
-// in algorithms/CMakeLists.txt.
+// THE table of our own variants. Adding one is an entry in variants.cpp, of a voxelizer in voxelizers.cpp,
+// and its sources in algorithms/CMakeLists.txt.
 #pragma once
 
 #include <span>

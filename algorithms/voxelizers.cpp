@@ -1,4 +1,5 @@
-// The voxelizers' part of THE table (variants.h), in a source of its own so that the library that voxelizes needs no extractor.
+// The voxelizers' part of THE table (variants.h), in a source of its own so that the library that voxelizes
+// needs no extractor.
 #include "algorithms/thesis/thesis_voxelizer.h"
 #include "algorithms/variants.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
@@ -6,7 +7,8 @@
 namespace hermesh {
 
 std::span<const Voxelizer> our_voxelizers() {
-  // The order is that of lists and tables: ours first, then the thesis's as printed, which is kept for comparison.
+  // The order is that of lists and tables: ours first, then the thesis's as printed, which is kept for
+  // comparison.
   static const std::vector<Voxelizer> table = {
       {.name = "hermesh",
        .summary = "exact distances in the whole band, vectorised; signs by flooding or winding numbers",

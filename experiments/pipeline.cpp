@@ -25,7 +25,8 @@ double voxel_size_of(const VoxelizeRecipe& recipe, const PolygonMesh& mesh) {
   return recipe.voxel_size ? *recipe.voxel_size : bounds(mesh).size().maxCoeff() / recipe.resolution;
 }
 
-VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunContext& context) {
+VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeRecipe& recipe,
+                                     RunContext& context) {
   return {.mesh = mesh,
           .voxel_size = voxel_size_of(recipe, mesh),
           .exterior_band = recipe.exterior_band,
@@ -38,7 +39,8 @@ LevelSet voxelize(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunCont
   return recipe.chosen.voxelizer.voxelize(voxelization_input(mesh, recipe, context));
 }
 
-EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe, RunContext& context) {
+EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe,
+                  RunContext& context) {
   const ExtractionInput input = {.level_set = volume,
                                  .isovalue = recipe.isovalue,
                                  .source = source,
@@ -72,14 +74,15 @@ namespace {
 
 std::string counted(std::int64_t count, const char* what) { return std::to_string(count) + " " + what; }
 
-void check_bound(const Circumstances::Bound& bound, const MeshReport& report, std::vector<std::string>& broken) {
-  // In voxels: what is promised beyond the tolerance, by how much the certified distance may exceed the true one
-  // (certify_gap), and what single precision in the file moves points by.
+void check_bound(const Circumstances::Bound& bound, const MeshReport& report,
+                 std::vector<std::string>& broken) {
+  // In voxels: what is promised beyond the tolerance, by how much the certified distance may exceed the true
+  // one (certify_gap), and what single precision in the file moves points by.
   constexpr double kSlack = 0.005 + 0.001 + 1e-4;
   const auto certify = [&](const std::optional<validation::HausdorffBound>& distance, const char* way) {
     if (distance && distance->upper / bound.voxel_size > bound.tolerance + kSlack)
-      broken.push_back("tolerance (up to " + std::to_string(distance->upper / bound.voxel_size) + " voxels " + way +
-                       " the uniform mesh)");
+      broken.push_back("tolerance (up to " + std::to_string(distance->upper / bound.voxel_size) + " voxels " +
+                       way + " the uniform mesh)");
   };
   certify(report.certified_from_reference, "from");
   certify(report.certified_to_reference, "to");
@@ -99,7 +102,8 @@ std::vector<std::string> promise_words(const Promises& promises) {
   return words;
 }
 
-PromiseCheck check_promises(const Promises& promises, const MeshReport& report, const Circumstances& circumstances) {
+PromiseCheck check_promises(const Promises& promises, const MeshReport& report,
+                            const Circumstances& circumstances) {
   PromiseCheck check;
   if (promises.closed && !report.closed() && !circumstances.cut_open)
     check.broken.push_back("closed (" + counted(report.boundary_edges, "boundary edges)"));
@@ -110,9 +114,10 @@ PromiseCheck check_promises(const Promises& promises, const MeshReport& report, 
   if (promises.oriented && !report.oriented())
     check.broken.push_back("oriented (" + counted(report.inconsistent_edges, "inconsistent edges)"));
   // A component all of whose polygons are flipped has no inconsistent edge, but its volume is then negative.
-  // Components of a mesh that may intersect itself have no inside of their own, and only the whole is looked at.
-  const bool inside_out = (promises.no_self_intersection && !report.faces_outwards()) ||
-                          (report.closed() && report.volume < 0.0);
+  // Components of a mesh that may intersect itself have no inside of their own, and only the whole is looked
+  // at.
+  const bool inside_out =
+      (promises.no_self_intersection && !report.faces_outwards()) || (report.closed() && report.volume < 0.0);
   if (promises.oriented && report.oriented() && inside_out && !circumstances.encloses_the_outside)
     check.broken.push_back("oriented (inside out, the volume is negative)");
   if (promises.no_self_intersection) {
@@ -121,7 +126,8 @@ PromiseCheck check_promises(const Promises& promises, const MeshReport& report, 
     else if (report.self_intersections->pairs > 0)
       check.broken.push_back("no self-intersection (" + counted(report.self_intersections->pairs, "pairs)"));
     if (report.degenerate_polygons + report.duplicate_polygons > 0)
-      check.broken.push_back("no self-intersection (" + counted(report.degenerate_polygons, "degenerate and ") +
+      check.broken.push_back("no self-intersection (" +
+                             counted(report.degenerate_polygons, "degenerate and ") +
                              counted(report.duplicate_polygons, "duplicate polygons)"));
   }
   if (circumstances.bound) check_bound(*circumstances.bound, report, check.broken);
@@ -176,7 +182,8 @@ Outcome run(const Job& job, RunContext& context) {
   if (mesh.empty()) return result;
   Circumstances circumstances = job.circumstances;
   circumstances.cut_open |= recipe.ends == Ends::open && result.made.ends.any();
-  result.judgement = judge(result.written, recipe.chosen.extractor.promises, *job.judge, context, circumstances);
+  result.judgement =
+      judge(result.written, recipe.chosen.extractor.promises, *job.judge, context, circumstances);
   return result;
 }
 

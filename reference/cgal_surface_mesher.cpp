@@ -12,8 +12,8 @@
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
-#include "reference/meshing_frame.h"
 #include "reference/isosurface_seeds.h"
+#include "reference/meshing_frame.h"
 
 namespace hermesh {
 namespace {
@@ -215,18 +215,22 @@ PolygonMesh cgal_surface_mesher(const ExtractionInput& input) {
     Triangulation triangulation;
     insert_seeds(triangulation, grid, frame, input);
     if (triangulation.number_of_vertices() > 0 && triangulation.dimension() < 3)
-      throw Error("cgal-surface-mesher: the surface crosses the grid's edges in too few points; try smaller voxels, or "
-                  "another extractor");
+      throw Error(
+          "cgal-surface-mesher: the surface crosses the grid's edges in too few points; try smaller voxels, "
+          "or "
+          "another extractor");
     if (triangulation.number_of_vertices() == 0) return mesh;
     Complex complex(triangulation);
     Mesher mesher(complex, surface, oracle, criteria);
     refine(mesher, triangulation, input);
     mesh = to_mesh(complex, field);
-    // Its facets are those that a segment between two cells' centres pierces once; both ends of such a segment lie
-    // outside where the solid is thin against the distances of the points.
+    // Its facets are those that a segment between two cells' centres pierces once; both ends of such a
+    // segment lie outside where the solid is thin against the distances of the points.
     if (mesh.triangles.empty())
-      throw Error("cgal-surface-mesher: none of its triangles separates inside from outside: the solid is thinner than "
-                  "its points are apart; try -o seed_spacing=1 and a smaller facet_size, or another extractor");
+      throw Error(
+          "cgal-surface-mesher: none of its triangles separates inside from outside: the solid is thinner "
+          "than "
+          "its points are apart; try -o seed_spacing=1 and a smaller facet_size, or another extractor");
   } catch (const CGAL::Failure_exception& failure) {
     std::string reason = failure.message();
     reason.resize(reason.find_last_not_of(". \n") + 1);

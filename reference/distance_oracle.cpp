@@ -264,8 +264,8 @@ void spread(const std::array<double, kBlockVoxels>& distance, int seed, bool sig
       for (const int step : {-1, 1}) {
         const int along = (i / stride) % 8 + step;
         const int j = i + step * stride;
-        // Two balls free of surface that overlap cover the edge between their centres, and that between the places of
-        // their sides.
+        // Two balls free of surface that overlap cover the edge between their centres, and that between the
+        // places of their sides.
         if (along < 0 || along > 7 || known[std::size_t(j)] ||
             distance[std::size_t(i)] + distance[std::size_t(j)] <= 1.0 + kSure)
           continue;
@@ -305,8 +305,7 @@ std::bitset<kBlockVoxels> block_inside(const std::array<int, 3>& origin,
                    [&](int a, int b) { return distances[std::size_t(a)] > distances[std::size_t(b)]; });
   std::bitset<kBlockVoxels> known, inside;
   for (const int i : order)
-    if (!known[std::size_t(i)])
-      spread(distances, i, is_inside(block_side_place(origin, i)), known, inside);
+    if (!known[std::size_t(i)]) spread(distances, i, is_inside(block_side_place(origin, i)), known, inside);
   return inside;
 }
 

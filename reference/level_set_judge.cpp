@@ -291,8 +291,8 @@ SignTruth::SignTruth(const DistanceOracle& surface, const WindingOracle& winding
   tbb::parallel_for(std::size_t(0), origins.size(), [&](std::size_t i) {
     context.check();
     const auto distances = block_distances(surface, origins[i], block_reach(selection.band));
-    const auto inside = block_inside(
-        origins[i], distances, [&](const Vector3d& place) { return surface.parity(place).inside(); });
+    const auto inside = block_inside(origins[i], distances,
+                                     [&](const Vector3d& place) { return surface.parity(place).inside(); });
     for (int v = 0; v < kBlockVoxels; ++v) {
       const auto at = std::size_t(v);
       if (!keep(distances[at])) continue;

@@ -90,7 +90,8 @@ enum class SignOracle {
 };
 
 struct SignReport {
-  std::int64_t inside = 0, outside = 0;  ///< voxels truly on that side and farther than kNear from the surface
+  std::int64_t inside = 0,
+               outside = 0;  ///< voxels truly on that side and farther than kNear from the surface
   std::int64_t wrong_inside = 0, wrong_outside = 0;  ///< those of them that have the other sign
   std::int64_t undecided = 0;                        ///< voxels whose rays disagree
   std::vector<VoxelFinding> places;  ///< the first ten wrong ones; the truth is negative inside

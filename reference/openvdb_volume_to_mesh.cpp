@@ -37,8 +37,8 @@ PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   }
   mesh.triangles.reserve(triangles);
   mesh.quads.reserve(quads);
-  // OpenVDB winds its polygons clockwise seen from outside, whatever the transform: they are read backwards, from the
-  // first corner on, which keeps the diagonal, unless the transform mirrors.
+  // OpenVDB winds its polygons clockwise seen from outside, whatever the transform: they are read backwards,
+  // from the first corner on, which keeps the diagonal, unless the transform mirrors.
   const bool mirrors = grid.transform().baseMap()->determinant() < 0.0;
   for (std::size_t i = 0; i < mesher.polygonPoolListSize(); ++i) {
     const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[i];

@@ -33,12 +33,23 @@ class Maker {
     double resolution = 12.0 * std::pow(33.0, uniform());
     constexpr const char* kNames[] = {"triangles", "balls", "boxes", "tori", "spikes", "sheets"};
     switch (kind) {
-      case 0: make_triangles(triangles); break;
-      case 1: make_balls(triangles); break;
-      case 2: make_boxes(triangles); break;
-      case 3: make_tori(triangles); break;
-      case 4: make_spikes(triangles); break;
-      default: make_sheets(triangles, resolution);
+      case 0:
+        make_triangles(triangles);
+        break;
+      case 1:
+        make_balls(triangles);
+        break;
+      case 2:
+        make_boxes(triangles);
+        break;
+      case 3:
+        make_tori(triangles);
+        break;
+      case 4:
+        make_spikes(triangles);
+        break;
+      default:
+        make_sheets(triangles, resolution);
     }
     const double extent = bounds(soup_.mesh).size().maxCoeff();
     constexpr double kMostArea = 1e6;  // in voxels, which OpenVDB needs seconds for
@@ -121,7 +132,8 @@ class Maker {
   void make_spikes(double count) {
     const double width = std::pow(10.0, between(-2.5, -0.5));
     for (int i = 0; i < count / 4; ++i) {
-      const Vector3d way = direction(), u = way.unitOrthogonal(), v = way.cross(u), tip = way * between(0.3, 1.0);
+      const Vector3d way = direction(), u = way.unitOrthogonal(), v = way.cross(u),
+                     tip = way * between(0.3, 1.0);
       Vector3d foot[3];
       for (int k = 0; k < 3; ++k)
         foot[k] = 0.1 * way + width * (std::cos(kTurn * k / 3) * u + std::sin(kTurn * k / 3) * v);

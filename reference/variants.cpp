@@ -82,12 +82,14 @@ std::span<const Voxelizer> reference_voxelizers() {
        .summary = "brute-force distances with a CGAL tree and signs by rays: the oracle for small grids",
        .options = {{.name = "signs",
                     .fallback = "parity",
-                    .help = "inside is where rays cross the polygons an odd number of times, for closed surfaces that do "
+                    .help = "inside is where rays cross the polygons an odd number of times, for closed "
+                            "surfaces that do "
                             "not meet; or what the polygons wind around, for parts that overlap or touch",
                     .choices = {"parity", "winding-number"}}},
        .voxelize = exact_voxelizer},
       {.name = "pseudo-normals",
-       .summary = "exact distances, signs from angle-weighted pseudo-normals (Bærentzen & Aanæs 2005), for clean models",
+       .summary = "exact distances, signs from angle-weighted pseudo-normals (Bærentzen & Aanæs 2005), for "
+                  "clean models",
        .options = {},
        .voxelize = pseudo_normal_voxelizer},
   }};

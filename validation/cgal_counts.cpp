@@ -7,8 +7,8 @@
 
 #include <boost/container/small_vector.hpp>
 
-#include "validation/library_counts.h"
 #include "validation/geometry/triangle_soup.h"
+#include "validation/library_counts.h"
 
 namespace hermesh::validation {
 namespace {
@@ -66,7 +66,8 @@ Mesh::Halfedge_index fan_start(const Mesh& mesh, const MeshFile& file, Mesh::Fac
   const std::size_t polygon = std::size_t(f);
   const auto first = mesh.halfedge(f);
   if (polygon < file.triangles.size()) return first;
-  const Quad quad = cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given);
+  const Quad quad =
+      cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given);
   for (const auto h : CGAL::halfedges_around_face(first, mesh))
     if (std::size_t(mesh.target(h)) == quad[0]) return h;
   return first;
@@ -96,7 +97,8 @@ LibraryFindings count(Mesh& mesh, const MeshFile& file) {
 
 }  // namespace
 
-LibraryCounts count_with_cgal(const MeshFile& file, const MeshReport& ours, RunContext& context, double unit) {
+LibraryCounts count_with_cgal(const MeshFile& file, const MeshReport& ours, RunContext& context,
+                              double unit) {
   const std::vector<Polygon> soup = polygon_soup(file);
   if (!PMP::is_polygon_soup_a_polygon_mesh(soup)) {
     context.check();

@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_soup.h"
 #include "validation/geometry/triangle_tree.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 

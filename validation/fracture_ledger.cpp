@@ -165,8 +165,8 @@ class Ledger {
                         entries_[i].piece != entries_[i + 1].piece;
       if (end - i > 1 && !seam) {
         ledger_.repeated_triangles += static_cast<std::int64_t>(end - i);
-        say("a triangle stands in " + name_of(entries_[i].piece) + " and in " + name_of(entries_[i + 1].piece) +
-                " but is no seam",
+        say("a triangle stands in " + name_of(entries_[i].piece) + " and in " +
+                name_of(entries_[i + 1].piece) + " but is no seam",
             middle(entries_[i]));
       }
       for (std::size_t k = i; k < end; ++k) {

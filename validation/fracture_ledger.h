@@ -6,16 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/io/mesh_file.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 
 /// What the pieces are compared with, as far as it is known (world units).
 struct ExpectedVolumes {
-  std::optional<double> whole;  ///< volume of the uncut object's mesh
-  std::vector<double> pieces;   ///< recorded volume of each piece; empty if there are no records
+  std::optional<double> whole;        ///< volume of the uncut object's mesh
+  std::vector<double> pieces;         ///< recorded volume of each piece; empty if there are no records
   const MeshFile* surface = nullptr;  ///< the uncut object's mesh
   double reach =
       0.0;  ///< how far the original surface of a piece may be from `surface`; 0 if that is not known
@@ -60,8 +60,7 @@ struct FractureLedger {
   bool is_consistent() const {
     return pieces > 0 && gaps_can_be_judged && unmatched_cut == 0 && matched_original == 0 &&
            repeated_triangles == 0 && rest_open_edges == 0 && intersecting_pairs == 0 &&
-           nested_components == 0 && broken_pieces == 0 && volume_difference() <= 1e-9 &&
-           wrong_records == 0;
+           nested_components == 0 && broken_pieces == 0 && volume_difference() <= 1e-9 && wrong_records == 0;
   }
   bool balances() const { return is_consistent() && !lost_a_piece(); }
   std::vector<std::string> sentences() const;  ///< what does not balance, in words, or that all does

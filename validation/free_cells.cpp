@@ -14,7 +14,8 @@ FreeCells::FreeCells(const TriangleTree& tree) {
   const Box& box = tree.bounds();
   const Eigen::Vector3d size = box.upper - box.lower;
   cell_ = size.maxCoeff() / kCells;
-  // Two layers of cells about the box: triangles in its sides block the first, and in the second the flood begins.
+  // Two layers of cells about the box: triangles in its sides block the first, and in the second the flood
+  // begins.
   lower_ = box.lower - Eigen::Vector3d::Constant(2.0 * cell_);
   for (int axis = 0; axis < 3; ++axis) size_[axis] = 5 + int(size[axis] / cell_);
   state_.assign(std::size_t(size_.x()) * std::size_t(size_.y()) * std::size_t(size_.z()), kUnseen);

@@ -1,9 +1,9 @@
 // The one-sided Hausdorff distance between two surfaces, bracketed with certainty.
 #pragma once
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_soup.h"
 #include "validation/geometry/triangle_tree.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 
@@ -20,9 +20,9 @@ namespace hermesh::validation {
 ///
 /// The bracket holds always; it is wider than `gap` only where 65536 triangles of the mesh came to more than
 /// four million pieces, or a piece to more than forty levels. For rounding it is widened on both sides by
-/// 1e-7 of the larger diagonal and 1e-15 of the largest coordinate: the plane of a needle that is 1e8 times as
-/// long as it is high, the thinnest that counts as having one, is known to some 1e-8, and so is the distance
-/// to it.
+/// 1e-7 of the larger diagonal and 1e-15 of the largest coordinate: the plane of a needle that is 1e8 times
+/// as long as it is high, the thinnest that counts as having one, is known to some 1e-8, and so is the
+/// distance to it.
 /// @throws Cancelled.
 HausdorffBound certified_distance(const TriangleSoup& from, const TriangleTree& to, double gap,
                                   RunContext& context);

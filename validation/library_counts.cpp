@@ -3,8 +3,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "validation/topology.h"
 #include "validation/geometry/triangle_soup.h"
+#include "validation/topology.h"
 
 namespace hermesh::validation {
 namespace {

@@ -21,10 +21,10 @@ struct LibraryFindings {
 /// are the mesh's coordinates times `unit`.
 /// @throws Cancelled.
 LibraryCounts count_with_openmesh(const MeshFile& mesh, const MeshReport& ours, RunContext& context,
-                                double unit = 1.0);
+                                  double unit = 1.0);
 /// Counts by CGAL, in all else as count_with_openmesh().
 LibraryCounts count_with_cgal(const MeshFile& mesh, const MeshReport& ours, RunContext& context,
-                                double unit = 1.0);
+                              double unit = 1.0);
 
 /// Compares the findings of a library that loaded the mesh with `ours`; both functions above end with this.
 LibraryCounts library_loaded(const std::string& library, const LibraryFindings& theirs, const MeshFile& mesh,

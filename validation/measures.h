@@ -1,8 +1,8 @@
 // What is measured on the triangles of a mesh: area, volume, shape, and triangles of no area.
 #pragma once
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_soup.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 

@@ -75,16 +75,18 @@ struct SolidComparison {
   enum class Verdict { same, differs, unknown };
   Verdict verdict = Verdict::unknown;
   Estimate mesh_volume, reference_volume;  ///< volume of what is inside for certain
-  Estimate difference;            ///< volume of the symmetric difference; the upper end includes `unknown_volume`
-  Estimate unknown_volume;        ///< volume of what is neither inside nor outside for certain
-  Estimate unexplained;           ///< the part of `difference` beyond `explained` from either boundary
+  Estimate difference;      ///< volume of the symmetric difference; the upper end includes `unknown_volume`
+  Estimate unknown_volume;  ///< volume of what is neither inside nor outside for certain
+  Estimate unexplained;     ///< the part of `difference` beyond `explained` from either boundary
   double mesh_area = 0.0, reference_area = 0.0;  ///< areas of the mesh, and of what bounds the reference
-  double possible_area = 0.0;  ///< area of the reference's polygons that bound it by one rule and not by another
+  double possible_area =
+      0.0;  ///< area of the reference's polygons that bound it by one rule and not by another
   std::int64_t mesh_components = 0, reference_components = 0;  ///< components of these two surfaces
   Estimate false_area, lost_area;  ///< area of the mesh, of the reference, beyond `explained` from the other
   double explained = 0.0;          ///< the distance that discretisation explains
   std::int64_t samples = 0;
-  std::optional<Eigen::Vector3d> false_place, lost_place, unexplained_place;  ///< the first sample of each kind
+  std::optional<Eigen::Vector3d> false_place, lost_place,
+      unexplained_place;  ///< the first sample of each kind
   bool reference_closed = true, reference_oriented = true;
 };
 
@@ -94,11 +96,13 @@ inline std::string verdict_word(const SolidComparison& solid) {
   return solid.verdict == Verdict::same ? "same" : solid.verdict == Verdict::differs ? "differs" : "unknown";
 }
 
-/// How much of the visible surface of a model a mesh does not show (visible_loss.h). Shares with their 95 % intervals.
+/// How much of the visible surface of a model a mesh does not show (visible_loss.h). Shares with their 95 %
+/// intervals.
 struct VisibleLoss {
-  Estimate lost, vanished, filled;  ///< shares of the visible area of the model; lost is the sum of the other two
-  Estimate invented;                ///< share of the mesh's area
-  double visible_area = 0.0, invented_area = 0.0;  ///< world units²
+  Estimate lost, vanished,
+      filled;         ///< shares of the visible area of the model; lost is the sum of the other two
+  Estimate invented;  ///< share of the mesh's area
+  double visible_area = 0.0, invented_area = 0.0;        ///< world units²
   std::optional<Eigen::Vector3d> place, invented_place;  ///< the first sample that vanished, that is invented
   std::int64_t samples = 0;                              ///< on each surface
 };
@@ -154,13 +158,14 @@ struct JudgeOptions {
   /// How the reference's quads are cut: as_given for a mesh about which something was proved with its quads
   /// as they are cut, such as an extractor's own uniform one.
   QuadRule reference_quads = QuadRule::better;
-  std::int64_t samples = 200'000;       ///< on each surface, by area, besides every point of it
-  bool certify = false;                 ///< certified Hausdorff bound, both ways
+  std::int64_t samples = 200'000;        ///< on each surface, by area, besides every point of it
+  bool certify = false;                  ///< certified Hausdorff bound, both ways
   std::int64_t solid_samples = 100'000;  ///< to compare the solid with the reference's; 0 = not at all
-  std::int64_t visible_samples = 20'000;  ///< to measure the visible loss if `voxel_size` is known; 0 = not at all
-  double voxel_size = 0.0;              ///< world units, of the volume that the mesh was made from; 0 = unknown
-  double certify_gap = 0.0;             ///< world units; 0 = 1e-4 of the reference's diagonal
-  const MeshFile* features = nullptr;   ///< reference for the sharp features
+  std::int64_t visible_samples =
+      20'000;                ///< to measure the visible loss if `voxel_size` is known; 0 = not at all
+  double voxel_size = 0.0;   ///< world units, of the volume that the mesh was made from; 0 = unknown
+  double certify_gap = 0.0;  ///< world units; 0 = 1e-4 of the reference's diagonal
+  const MeshFile* features = nullptr;  ///< reference for the sharp features
   double dihedral_degrees = 30.0;
 };
 

@@ -44,7 +44,8 @@ NormalAngles sampled_normal_angles(const TriangleSoup& from, const TriangleTree&
     for (std::int64_t i = range.begin(); i < range.end(); ++i) {
       const ClosestHit hit = to.closest(surface[i], guess);
       guess = hit.slot;
-      const Eigen::Vector3d own = normal_of(from.corners(surface.triangle(i))), other = normal_of(to.corners(hit.slot));
+      const Eigen::Vector3d own = normal_of(from.corners(surface.triangle(i))),
+                            other = normal_of(to.corners(hit.slot));
       if (!(own.norm() > 0.0) || !(other.norm() > 0.0)) continue;
       // The tangent of the angle from both products is exact for small and for large angles.
       sums.add(std::atan2(own.cross(other).norm(), own.dot(other)) * (180.0 / std::numbers::pi));

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "validation/library_counts.h"
 #include "validation/geometry/triangle_soup.h"
+#include "validation/library_counts.h"
 
 namespace hermesh::validation {
 namespace {
@@ -32,7 +32,8 @@ std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext
     const PolygonCorners corners = polygon_corners(file, p);
     // add_face() takes it for granted that the corners differ.
     if (repeats_corner(corners))
-      return "OpenMesh cannot hold " + describe_polygon(file, p, unit) + ", which has one point at two corners.";
+      return "OpenMesh cannot hold " + describe_polygon(file, p, unit) +
+             ", which has one point at two corners.";
     handles.clear();
     for (int k = 0; k < corners.count; ++k) handles.emplace_back(int(corners.points[k]));
     if (!mesh.add_face(handles).is_valid())
@@ -90,7 +91,8 @@ std::vector<Eigen::Vector3d> fan(const Mesh& mesh, const MeshFile& file, Mesh::F
   const std::size_t polygon = std::size_t(f.idx());
   const bool quad = polygon >= file.triangles.size();
   const std::uint32_t first =
-      quad ? cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given)[0] : 0;
+      quad ? cut_from_first(file.points, file.quads[polygon - file.triangles.size()], QuadRule::as_given)[0]
+           : 0;
   for (auto it = mesh.cfv_ccwbegin(f); it.is_valid(); ++it) {
     if (quad && std::uint32_t(it->idx()) == first) start = corners.size();
     corners.push_back(position(mesh, *it));
@@ -122,7 +124,8 @@ LibraryFindings count(const Mesh& mesh, const MeshFile& file) {
 
 }  // namespace
 
-LibraryCounts count_with_openmesh(const MeshFile& file, const MeshReport& ours, RunContext& context, double unit) {
+LibraryCounts count_with_openmesh(const MeshFile& file, const MeshReport& ours, RunContext& context,
+                                  double unit) {
   // Its complaints about polygons that it refuses go into the report rather than to the terminal.
   omerr().disable();
   Mesh mesh;

@@ -206,7 +206,8 @@ class Verdict {
     if (v.lost.value == 0.0 && v.invented.value == 0.0)
       return say("All of the visible surface of the reference is shown, and none was added (" +
                  std::to_string(v.samples) + " samples on each)");
-    std::string text = percent(v.lost) + " of the visible surface of the reference is not shown within half a voxel";
+    std::string text =
+        percent(v.lost) + " of the visible surface of the reference is not shown within half a voxel";
     if (v.filled.value > 0.0) text += ", of it " + percent(v.filled) + " where gaps are filled";
     if (v.place) text += "; the first at " + describe_point(*v.place);
     if (v.invented.value > 0.0)
@@ -215,8 +216,8 @@ class Verdict {
     say(text);
   }
   static std::string percent(const Estimate& share) {
-    return number(100.0 * share.value) + " % (" + number(100.0 * share.lower) + " to " + number(100.0 * share.upper) +
-           ")";
+    return number(100.0 * share.value) + " % (" + number(100.0 * share.lower) + " to " +
+           number(100.0 * share.upper) + ")";
   }
 
   void solid(const SolidComparison& s) {

@@ -9,7 +9,9 @@ using Json = nlohmann::json;
 
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json vector(const Eigen::Vector3d& v) { return Json::array({finite_or_null(v.x()), finite_or_null(v.y()), finite_or_null(v.z())}); }
+Json vector(const Eigen::Vector3d& v) {
+  return Json::array({finite_or_null(v.x()), finite_or_null(v.y()), finite_or_null(v.z())});
+}
 
 Json distances(const Distances& d) {
   return {{"max", finite_or_null(d.max)},
@@ -68,16 +70,23 @@ Json features(const FeatureDistances& f) {
           {"corner_to_mesh", distances(f.corner_to_mesh)}};
 }
 
-Json bound(const HausdorffBound& b) { return {{"lower", finite_or_null(b.lower)}, {"upper", finite_or_null(b.upper)}}; }
+Json bound(const HausdorffBound& b) {
+  return {{"lower", finite_or_null(b.lower)}, {"upper", finite_or_null(b.upper)}};
+}
 
 Json estimate(const Estimate& e) {
-  return {{"value", finite_or_null(e.value)}, {"lower", finite_or_null(e.lower)}, {"upper", finite_or_null(e.upper)}};
+  return {{"value", finite_or_null(e.value)},
+          {"lower", finite_or_null(e.lower)},
+          {"upper", finite_or_null(e.upper)}};
 }
 
 Json visible_loss(const VisibleLoss& v) {
-  return {{"lost_share", estimate(v.lost)},         {"vanished_share", estimate(v.vanished)},
-          {"filled_share", estimate(v.filled)},     {"invented_share", estimate(v.invented)},
-          {"visible_area", finite_or_null(v.visible_area)}, {"invented_area", finite_or_null(v.invented_area)},
+  return {{"lost_share", estimate(v.lost)},
+          {"vanished_share", estimate(v.vanished)},
+          {"filled_share", estimate(v.filled)},
+          {"invented_share", estimate(v.invented)},
+          {"visible_area", finite_or_null(v.visible_area)},
+          {"invented_area", finite_or_null(v.invented_area)},
           {"samples", v.samples}};
 }
 

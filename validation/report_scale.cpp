@@ -16,7 +16,8 @@ class Unscaler {
   // Step by step, for the square of the unit may be beyond what its product with the value is.
   void area(double& value) const { value = value * unit_ * unit_; }
   void volume(double& value) const { value = value * unit_ * unit_ * unit_; }
-  // Of a figure that is too small for double precision 0 would be as wrong as infinity of one that is too large.
+  // Of a figure that is too small for double precision 0 would be as wrong as infinity of one that is too
+  // large.
   void area_or_none(double& value) const { none_if_lost(value, &Unscaler::area); }
   void volume_or_none(double& value) const { none_if_lost(value, &Unscaler::volume); }
   void point(Eigen::Vector3d& value) const { value *= unit_; }

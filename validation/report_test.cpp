@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "validation/geometry/test_meshes.h"
 #include "validation/mesh_report.h"
 #include "validation/report_json.h"
-#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {
@@ -206,7 +206,8 @@ TEST(Report, FiguresOfExtremeCoordinatesAreRightOrNotStated) {
   options.reference = &reference;
   options.samples = 1000;
   options.solid_samples = 1000;
-  EXPECT_DOUBLE_EQ(judged(cube_of_quads(Eigen::Vector3d::Constant(-5e119), 1e120), options).to_reference->max, 5e119);
+  EXPECT_DOUBLE_EQ(judged(cube_of_quads(Eigen::Vector3d::Constant(-5e119), 1e120), options).to_reference->max,
+                   5e119);
   // What no scale fits is refused.
   MeshFile spread = cube_of_quads(Eigen::Vector3d::Zero(), 1e300);
   spread.points[7] = Eigen::Vector3d::Constant(1.2345678901234567e-300);

@@ -1,9 +1,9 @@
 // All pairs of triangles that meet where they should not, by exact predicates.
 #pragma once
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_soup.h"
 #include "validation/geometry/triangle_tree.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 

@@ -41,9 +41,9 @@ MeshFile welded_triangles(const MeshFile& mesh, QuadRule rule = QuadRule::as_giv
 ///  - closed, an even number of sides at every edge: inside if a ray crosses an odd number of polygons;
 ///    outside if an even one, and the point is reachable;
 ///  - open, but neighbours face the same way over all edges with two sides but 1 %: inside if of 24 rays 3/4
-///    count over 0, or if they count 3/8 on average and a straight way leads to a cell that the flood does not
-///    come to (so the point is beside an inner wall without a second side); outside if 3/4 do not count over
-///    0, 3/4 cross an even number, and the point is reachable;
+///    count over 0, or if they count 3/8 on average and a straight way leads to a cell that the flood does
+///    not come to (so the point is beside an inner wall without a second side); outside if 3/4 do not count
+///    over 0, 3/4 cross an even number, and the point is reachable;
 ///  - open, and neighbours do not: inside if 3/4 cross an odd number; outside if 3/4 an even one, and the
 ///    point is reachable.
 /// Any other point is unknown. An oriented mesh whose volume is negative, from wherever in its box it is
@@ -60,12 +60,14 @@ class Solid {
   /// The side of a point, by the reading.
   Side side(const Eigen::Vector3d& point) const;
 
-  bool closed() const { return closed_; }      ///< whether every edge has an even number of sides
-  bool oriented() const { return oriented_; }  ///< whether neighbours face the same way over all edges but 1 %
+  bool closed() const { return closed_; }  ///< whether every edge has an even number of sides
+  bool oriented() const {
+    return oriented_;
+  }  ///< whether neighbours face the same way over all edges but 1 %
 
  private:
   struct Crossings {
-    int sum = 0;    ///< crossings in which the ray leaves through a front less those in which it enters by one
+    int sum = 0;  ///< crossings in which the ray leaves through a front less those in which it enters by one
     int count = 0;  ///< number of all crossings
     bool sure = true;
   };

@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "algorithms/core/disjoint_sets.h"
+#include "validation/geometry/surface_samples.h"
 #include "validation/outer_boundary.h"
 #include "validation/solid.h"
-#include "validation/geometry/surface_samples.h"
 
 namespace hermesh::validation {
 namespace {

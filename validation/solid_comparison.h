@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/io/mesh_file.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh::validation {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include "validation/outer_boundary.h"
 #include "validation/geometry/test_meshes.h"
+#include "validation/outer_boundary.h"
 
 namespace hermesh::validation {
 namespace {

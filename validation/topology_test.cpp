@@ -8,9 +8,9 @@
 #include <numbers>
 #include <random>
 
+#include "validation/geometry/test_meshes.h"
 #include "validation/library_counts.h"
 #include "validation/measures.h"
-#include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
 namespace {

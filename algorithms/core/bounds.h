@@ -1,4 +1,5 @@
-// Boxes along the axes, one type for all of algorithms/ and experiments/; the judges of validation/ keep their own.
+// Boxes along the axes, one type for all of algorithms/ and experiments/; the judges of validation/ keep
+// their own.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,14 +7,15 @@
 
 namespace hermesh {
 
-/// A box along the axes from `lower` to `upper`, in the unit of what is added to it. Its faces belong to it. It is empty
-/// until something is added.
+/// A box along the axes from `lower` to `upper`, in the unit of what is added to it. Its faces belong to it.
+/// It is empty until something is added.
 template <class T>
 struct BoundsOf {
   using Vector = Eigen::Matrix<T, 3, 1>;
-  static constexpr T kFarthest =
-      std::numeric_limits<T>::has_infinity ? std::numeric_limits<T>::infinity() : std::numeric_limits<T>::max();
-  static constexpr T kLeast = std::numeric_limits<T>::has_infinity ? -kFarthest : std::numeric_limits<T>::lowest();
+  static constexpr T kFarthest = std::numeric_limits<T>::has_infinity ? std::numeric_limits<T>::infinity()
+                                                                      : std::numeric_limits<T>::max();
+  static constexpr T kLeast =
+      std::numeric_limits<T>::has_infinity ? -kFarthest : std::numeric_limits<T>::lowest();
 
   Vector lower = Vector::Constant(kFarthest), upper = Vector::Constant(kLeast);
 
@@ -31,7 +33,8 @@ struct BoundsOf {
   bool empty() const { return (lower.array() > upper.array()).any(); }
   /// Whether the two have a point in common. An empty box has none.
   bool overlaps(const BoundsOf& other) const {
-    // All six are compared: a branch costs more than a comparison, and this is the inner loop of many searches.
+    // All six are compared: a branch costs more than a comparison, and this is the inner loop of many
+    // searches.
     bool apart = false;
     for (int a = 0; a < 3; ++a) apart |= lower[a] > other.upper[a] || other.lower[a] > upper[a];
     return !apart;

@@ -8,8 +8,8 @@
 
 namespace hermesh {
 
-/// Disjoint sets of the numbers 0 to n − 1. The lowest number of a set stands for it, so that which one does is
-/// independent of the order of the calls.
+/// Disjoint sets of the numbers 0 to n − 1. The lowest number of a set stands for it, so that which one does
+/// is independent of the order of the calls.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t n = 0) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }

@@ -26,8 +26,8 @@ std::array<int, 3> LevelSet::dimensions() const {
 
 void initialize_openvdb() {
   static std::once_flag once;
-  // Threads that come second wait until all types are there. Our own follow, because openvdb::initialize() clears the
-  // registry of grid types before it fills it.
+  // Threads that come second wait until all types are there. Our own follow, because openvdb::initialize()
+  // clears the registry of grid types before it fills it.
   std::call_once(once, [] {
     openvdb::initialize();
     register_hermite_grids();

@@ -4,9 +4,8 @@
 
 #include <Eigen/Core>
 
-#include "algorithms/core/openvdb_trees.h"
-
 #include "algorithms/core/level_set.h"
+#include "algorithms/core/openvdb_trees.h"
 
 namespace hermesh {
 

@@ -14,9 +14,7 @@ namespace hermesh {
 class OneProgress {
  public:
   OneProgress(RunContext& context, std::string name)
-      : context_(context),
-        name_(std::move(name)),
-        on_progress_(std::exchange(context.on_progress, {})) {
+      : context_(context), name_(std::move(name)), on_progress_(std::exchange(context.on_progress, {})) {
     update(0.0);
   }
   ~OneProgress() {

@@ -1,5 +1,5 @@
-// Names of OpenVDB's trees and grids of floats, for headers that only refer to them: OpenVDB's own take seconds to read.
-// Whoever looks into a tree includes openvdb_trees.h besides.
+// Names of OpenVDB's trees and grids of floats, for headers that only refer to them: OpenVDB's own take
+// seconds to read. Whoever looks into a tree includes openvdb_trees.h besides.
 #pragma once
 
 #include <openvdb/version.h>
@@ -29,7 +29,8 @@ class Grid;
 
 using math::Coord;
 using math::CoordBBox;
-using FloatTree = tree::Tree<tree::RootNode<tree::InternalNode<tree::InternalNode<tree::LeafNode<float, 3>, 4>, 5>>>;
+using FloatTree =
+    tree::Tree<tree::RootNode<tree::InternalNode<tree::InternalNode<tree::LeafNode<float, 3>, 4>, 5>>>;
 using FloatGrid = Grid<FloatTree>;
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb

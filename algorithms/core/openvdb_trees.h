@@ -1,6 +1,7 @@
-// OpenVDB's grids, and the trees that most files use, compiled once: without these declarations every file that makes such
-// a grid compiles all virtual functions of its tree, reading and writing among them. Include it instead of
-// <openvdb/openvdb.h>, which has grids of points and files besides, and takes more than a second longer to read.
+// OpenVDB's grids, and the trees that most files use, compiled once: without these declarations every file
+// that makes such a grid compiles all virtual functions of its tree, reading and writing among them. Include
+// it instead of <openvdb/openvdb.h>, which has grids of points and files besides, and takes more than a
+// second longer to read.
 #pragma once
 
 #include <openvdb/Grid.h>
@@ -23,12 +24,12 @@ using Vec3SGrid = Grid<Vec3STree>;
 }  // namespace openvdb::OPENVDB_VERSION_NAME
 
 /// A tree and its grid; `Instance` is `extern template` or `template`.
-#define HERMESH_INSTANTIATE_TREE(Instance, Tree_)                                      \
-  namespace openvdb::OPENVDB_VERSION_NAME {                                            \
-  namespace tree {                                                                     \
-  Instance class Tree<Tree_::RootNodeType>;                                            \
-  }                                                                                    \
-  Instance class Grid<Tree_>;                                                          \
+#define HERMESH_INSTANTIATE_TREE(Instance, Tree_) \
+  namespace openvdb::OPENVDB_VERSION_NAME {       \
+  namespace tree {                                \
+  Instance class Tree<Tree_::RootNodeType>;       \
+  }                                               \
+  Instance class Grid<Tree_>;                     \
   }
 /// The nodes below the root, of values that have no nodes of their own.
 #define HERMESH_INSTANTIATE_NODES(Instance, Value)                     \

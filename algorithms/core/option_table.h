@@ -1,5 +1,5 @@
-// Options of a variant, each bound to the member that it sets, so that its name, its default, its range and its meaning
-// stand in one place.
+// Options of a variant, each bound to the member that it sets, so that its name, its default, its range and
+// its meaning stand in one place.
 #pragma once
 
 #include <charconv>
@@ -17,8 +17,8 @@
 
 namespace hermesh {
 
-/// The options that set members of `Settings`. The default of an option is the value that its member has in a `Settings`
-/// that nobody has touched.
+/// The options that set members of `Settings`. The default of an option is the value that its member has in a
+/// `Settings` that nobody has touched.
 template <class Settings>
 class OptionTable {
  public:
@@ -26,7 +26,8 @@ class OptionTable {
     double minimum = 0.0, maximum = 1e300;  ///< 1e300: no limit
   };
 
-  /// Declares a number, which has to be whole where its member is an integer. `only_with` is that of OptionSpec.
+  /// Declares a number, which has to be whole where its member is an integer. `only_with` is that of
+  /// OptionSpec.
   template <class Number>
   OptionTable&& number(const std::string& name, Number Settings::*member, Range range, std::string help,
                        std::vector<std::string> only_with = {}) && {
@@ -41,7 +42,8 @@ class OptionTable {
                         [=](Settings& settings, const Options& options) {
                           const double value = options.number(name);
                           if (std::is_integral_v<Number> && value != std::floor(value))
-                            throw Error("option '" + name + "' takes whole numbers, not " + options.text(name));
+                            throw Error("option '" + name + "' takes whole numbers, not " +
+                                        options.text(name));
                           settings.*member = static_cast<Number>(value);
                         }});
     return std::move(*this);
@@ -49,18 +51,20 @@ class OptionTable {
 
   /// Declares a choice among named values. @throws std::logic_error if the member's own value has no name.
   template <class Value>
-  OptionTable&& choice(const std::string& name, Value Settings::*member, std::vector<std::pair<std::string, Value>> values,
-                       std::string help, std::vector<std::string> only_with = {}) && {
+  OptionTable&& choice(const std::string& name, Value Settings::*member,
+                       std::vector<std::pair<std::string, Value>> values, std::string help,
+                       std::vector<std::string> only_with = {}) && {
     OptionSpec spec{.name = name, .fallback = "", .help = std::move(help), .only_with = std::move(only_with)};
     for (const auto& [word, value] : values) {
       spec.choices.push_back(word);
       if (value == Settings{}.*member) spec.fallback = word;
     }
     if (spec.fallback.empty()) throw std::logic_error("the default of option " + name + " has no name");
-    entries_.push_back({std::move(spec), [=, named = std::map<std::string, Value>(values.begin(), values.end())](
-                                            Settings& settings, const Options& options) {
-                          settings.*member = named.at(options.text(name));
-                        }});
+    entries_.push_back(
+        {std::move(spec), [=, named = std::map<std::string, Value>(values.begin(), values.end())](
+                              Settings& settings, const Options& options) {
+           settings.*member = named.at(options.text(name));
+         }});
     return std::move(*this);
   }
 
@@ -71,8 +75,8 @@ class OptionTable {
     return specs;
   }
 
-  /// The settings that checked options ask for. Options may hold others besides. @throws Error for a number that has to be
-  /// whole; std::logic_error if they lack one.
+  /// The settings that checked options ask for. Options may hold others besides. @throws Error for a number
+  /// that has to be whole; std::logic_error if they lack one.
   Settings read(const Options& options) const {
     Settings settings{};
     for (const Entry& entry : entries_) entry.set(settings, options);

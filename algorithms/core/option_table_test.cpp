@@ -19,7 +19,8 @@ struct Settings {
 
 OptionTable<Settings> table() {
   return OptionTable<Settings>()
-      .choice("shape", &Settings::shape, {{"round", Settings::Shape::round}, {"square", Settings::Shape::square}}, "a shape")
+      .choice("shape", &Settings::shape,
+              {{"round", Settings::Shape::round}, {"square", Settings::Shape::square}}, "a shape")
       .number("width", &Settings::width, {.maximum = 2.0}, "a width", {"shape=square"})
       .number("seed", &Settings::seed, {.maximum = 1e15}, "a seed")
       .choice("closed", &Settings::closed, {{"true", true}, {"false", false}}, "whether it is closed");
@@ -66,7 +67,8 @@ TEST(OptionTable, AnOptionLeftOutKeepsItsDefault) {
 }
 
 TEST(OptionTable, ADefaultWithoutANameIsRefused) {
-  EXPECT_THROW(OptionTable<Settings>().choice("closed", &Settings::closed, {{"false", false}}, ""), std::logic_error);
+  EXPECT_THROW(OptionTable<Settings>().choice("closed", &Settings::closed, {{"false", false}}, ""),
+               std::logic_error);
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ namespace hermesh {
 namespace {
 
 std::optional<double> parse_number(std::string_view text) {
-  // std::from_chars() knows no locale and no blanks, so a setting reads the same everywhere. What is not finite is
-  // refused here, for NaN would pass both comparisons with the range.
+  // std::from_chars() knows no locale and no blanks, so a setting reads the same everywhere. What is not
+  // finite is refused here, for NaN would pass both comparisons with the range.
   double value = 0.0;
   const char* const end = text.data() + text.size();
   const auto [stop, status] = std::from_chars(text.data(), end, value);
@@ -91,15 +91,16 @@ Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
     values_[spec.name] = checked(variant, spec, entry == given.end() ? spec.fallback : entry->second);
   }
   for (const OptionSpec& spec : declared)
-    // Conditions are judged when all values are there, defaults among them. Only an option that the user gave can be
-    // without effect; a default never complains.
+    // Conditions are judged when all values are there, defaults among them. Only an option that the user gave
+    // can be without effect; a default never complains.
     for (const std::string& condition : spec.only_with)
       if (given.contains(spec.name) && !holds(condition, *this))
         throw Error("option '" + spec.name + "' of " + std::string(variant) + " has no effect without " +
                     in_words(condition));
 }
 
-// An undeclared name or a wrong type is a fault of the program and not of the user: logic_error instead of Error.
+// An undeclared name or a wrong type is a fault of the program and not of the user: logic_error instead of
+// Error.
 double Options::number(std::string_view name) const {
   const std::optional<double> value = parse_number(text(name));
   if (!value) throw std::logic_error("option '" + std::string(name) + "' is not a number");

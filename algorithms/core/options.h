@@ -18,8 +18,8 @@ struct OptionSpec {
   std::vector<std::string> choices = {};
   double minimum = 0.0;
   double maximum = 1e300;
-  /// Settings of the variant's other options, each "name=value" or "name=value|value…", without any one of which this
-  /// option has no effect, so that to give it is an error.
+  /// Settings of the variant's other options, each "name=value" or "name=value|value…", without any one of
+  /// which this option has no effect, so that to give it is an error.
   std::vector<std::string> only_with = {};
 };
 
@@ -28,19 +28,20 @@ class Options {
  public:
   Options() = default;
   /// Checks `given` against the declarations and fills in what is missing.
-  /// @throws Error naming the variant, the option and what would be allowed; also for an option that has no effect beside
-  /// the others.
+  /// @throws Error naming the variant, the option and what would be allowed; also for an option that has no
+  /// effect beside the others.
   Options(std::string_view variant, std::span<const OptionSpec> declared,
           const std::map<std::string, std::string>& given);
 
   /// The value of a declared option as a number. @throws std::logic_error if it was not declared or is none.
   double number(std::string_view name) const;
-  /// The value of a declared option as text, numbers in their shortest form. @throws std::logic_error if it was not
-  /// declared.
+  /// The value of a declared option as text, numbers in their shortest form. @throws std::logic_error if it
+  /// was not declared.
   const std::string& text(std::string_view name) const;
   /// Whether the option was declared and has this value.
   bool is(std::string_view name, std::string_view value) const;
-  /// All options as "key=value key=value" in alphabetical order, the defaults included: equal for equal settings.
+  /// All options as "key=value key=value" in alphabetical order, the defaults included: equal for equal
+  /// settings.
   std::string canonical() const;
 
  private:

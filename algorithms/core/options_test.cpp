@@ -53,7 +53,11 @@ TEST(Options, RefusalsNameVariantOptionAndWhatIsAllowed) {
 TEST(Options, AnOptionThatHasNoEffectBesideTheOthersIsRefused) {
   const std::vector<OptionSpec> specs = {
       {.name = "kind", .fallback = "plain", .help = "", .choices = {"plain", "packed", "fixed"}},
-      {.name = "code", .fallback = "a", .help = "", .choices = {"a", "b"}, .only_with = {"kind=packed|fixed"}},
+      {.name = "code",
+       .fallback = "a",
+       .help = "",
+       .choices = {"a", "b"},
+       .only_with = {"kind=packed|fixed"}},
       {.name = "world", .fallback = "0", .help = ""},
       {.name = "voxels", .fallback = "1", .help = "", .only_with = {"world=0", "kind=plain"}}};
   const auto error = [&](const std::map<std::string, std::string>& given) {
@@ -70,7 +74,8 @@ TEST(Options, AnOptionThatHasNoEffectBesideTheOthersIsRefused) {
   EXPECT_EQ(error({{"code", "a"}}), "option 'code' of it has no effect without kind=packed or fixed");
   EXPECT_EQ(error({{"voxels", "2"}, {"world", "0.0"}}), "");
   EXPECT_EQ(error({{"voxels", "2"}, {"world", "3"}}), "option 'voxels' of it has no effect without world=0");
-  EXPECT_EQ(error({{"voxels", "2"}, {"kind", "fixed"}}), "option 'voxels' of it has no effect without kind=plain");
+  EXPECT_EQ(error({{"voxels", "2"}, {"kind", "fixed"}}),
+            "option 'voxels' of it has no effect without kind=plain");
 }
 
 TEST(Options, AVariantWithoutOptionsTakesNone) {

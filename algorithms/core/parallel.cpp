@@ -9,10 +9,11 @@ namespace hermesh {
 
 void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f) {
   // A block takes microseconds, so that sixteen are worth a task, and none is cancelled late.
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16), [&](const tbb::blocked_range<std::size_t>& range) {
-    context.check();
-    f(range.begin(), range.end());
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      context.check();
+                      f(range.begin(), range.end());
+                    });
 }
 
 void check_indices(std::uint64_t total, const std::string& what) {

@@ -28,8 +28,9 @@ class RangeFunction {
   void (*call_)(const void* function, std::size_t begin, std::size_t end);
 };
 
-/// Calls f(begin, end) for ranges that together are 0…n−1, in parallel, and looks for cancellation before each. (TBB stays
-/// out of this header, for nearly every file would read its headers, half a second each.) @throws Cancelled.
+/// Calls f(begin, end) for ranges that together are 0…n−1, in parallel, and looks for cancellation before
+/// each. (TBB stays out of this header, for nearly every file would read its headers, half a second each.)
+/// @throws Cancelled.
 void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f);
 
 /// Calls f(i) for i in 0…n−1, in parallel, and looks for cancellation every few blocks. @throws Cancelled.
@@ -50,11 +51,12 @@ LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
   return result;
 }
 
-/// Checks that indices of 32 bits can number `total` elements. `what` is their name in the plural. @throws Error
+/// Checks that indices of 32 bits can number `total` elements. `what` is their name in the plural. @throws
+/// Error
 void check_indices(std::uint64_t total, const std::string& what);
 
-/// Replaces each count by the sum of the counts before it and returns the total. @throws Error if the total cannot be
-/// an index of 32 bits; `what` names the counted things in the plural.
+/// Replaces each count by the sum of the counts before it and returns the total. @throws Error if the total
+/// cannot be an index of 32 bits; `what` names the counted things in the plural.
 std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what);
 
 }  // namespace hermesh

@@ -14,8 +14,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Newell's normal: twice the area that the polygon encloses, as a vector. Taken about the first corner, so that
-/// rounding is relative to the polygon's size and not to its distance from the origin.
+/// Newell's normal: twice the area that the polygon encloses, as a vector. Taken about the first corner, so
+/// that rounding is relative to the polygon's size and not to its distance from the origin.
 Vector3d newell(std::span<const Vector3d> corners) {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t i = 2; i < corners.size(); ++i)
@@ -28,14 +28,16 @@ double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Some of the places of a polygon's corners, by a tree of boxes that halves them again and again (Bentley 1975).
+/// Some of the places of a polygon's corners, by a tree of boxes that halves them again and again (Bentley
+/// 1975).
 class PlaceTree {
  public:
   /// Keeps a reference to `places`; none of them is chosen yet.
   explicit PlaceTree(const std::vector<Vector2d>& places)
       : places_(places), order_(places.size()), slot_(places.size()), chosen_(places.size(), 0) {
     std::iota(order_.begin(), order_.end(), 0u);
-    // Node i has the children 2i and 2i + 1. So many levels of halves leave at most kLeaf places to each of the last.
+    // Node i has the children 2i and 2i + 1. So many levels of halves leave at most kLeaf places to each of
+    // the last.
     boxes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
     build(0, places.size());
     for (std::uint32_t i = 0; i < order_.size(); ++i) slot_[order_[i]] = i;
@@ -52,14 +54,16 @@ class PlaceTree {
       (upper ? begin : end) = middle;
       node = 2 * node + upper;
     }
-    // The boxes are those of the chosen places only, so that any_in() leaves branches whose others are in its way.
+    // The boxes are those of the chosen places only, so that any_in() leaves branches whose others are in its
+    // way.
     boxes_[node].setEmpty();
     for (std::size_t i = begin; i < end; ++i)
       if (chosen_[order_[i]]) boxes_[node].extend(places_[order_[i]]);
     while (node /= 2) boxes_[node] = boxes_[2 * node].merged(boxes_[2 * node + 1]);
   }
 
-  /// Whether f(corner) holds for one of the chosen corners in the counter-clockwise triangle abc, border included.
+  /// Whether f(corner) holds for one of the chosen corners in the counter-clockwise triangle abc, border
+  /// included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
     Eigen::AlignedBox2d box(a, a);
@@ -85,38 +89,42 @@ class PlaceTree {
   }
 
   template <class F>
-  bool any_in(std::size_t node, std::size_t begin, std::size_t end, const Eigen::AlignedBox2d& box, const Vector2d& a,
-              const Vector2d& b, const Vector2d& c, F&& f) const {
+  bool any_in(std::size_t node, std::size_t begin, std::size_t end, const Eigen::AlignedBox2d& box,
+              const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
     const Eigen::AlignedBox2d& here = boxes_[node];
-    if (!here.intersects(box) || is_right_of(a, b, here) || is_right_of(b, c, here) || is_right_of(c, a, here))
+    if (!here.intersects(box) || is_right_of(a, b, here) || is_right_of(b, c, here) ||
+        is_right_of(c, a, here))
       return false;
     if (end - begin <= kLeaf)
-      return std::any_of(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end),
-                         [&](std::uint32_t i) {
-                           const Vector2d& p = places_[i];
-                           return chosen_[i] && area(a, b, p) >= 0 && area(b, c, p) >= 0 &&
-                                  area(c, a, p) >= 0 && f(i);
-                         });
+      return std::any_of(
+          order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i) {
+            const Vector2d& p = places_[i];
+            return chosen_[i] && area(a, b, p) >= 0 && area(b, c, p) >= 0 && area(c, a, p) >= 0 && f(i);
+          });
     const std::size_t middle = begin + (end - begin) / 2;
-    return any_in(2 * node, begin, middle, box, a, b, c, f) || any_in(2 * node + 1, middle, end, box, a, b, c, f);
+    return any_in(2 * node, begin, middle, box, a, b, c, f) ||
+           any_in(2 * node + 1, middle, end, box, a, b, c, f);
   }
 
-  /// Whether all of a box lies to the right of a line: its corner farthest to the left does. Rounding keeps order, so
-  /// no place of the box is judged otherwise when it is looked at by itself.
+  /// Whether all of a box lies to the right of a line: its corner farthest to the left does. Rounding keeps
+  /// order, so no place of the box is judged otherwise when it is looked at by itself.
   static bool is_right_of(const Vector2d& from, const Vector2d& to, const Eigen::AlignedBox2d& box) {
     const Vector2d way = to - from;
-    const Vector2d most(way.y() > 0 ? box.min().x() : box.max().x(), way.x() > 0 ? box.max().y() : box.min().y());
+    const Vector2d most(way.y() > 0 ? box.min().x() : box.max().x(),
+                        way.x() > 0 ? box.max().y() : box.min().y());
     return area(from, to, most) < 0;
   }
 
   const std::vector<Vector2d>& places_;
   std::vector<std::uint32_t> order_, slot_;  ///< corners as the leaves have them, and where each is
   std::vector<char> chosen_;
-  std::vector<Eigen::AlignedBox2d> boxes_;  ///< of the chosen places of each node; children of i: 2i and 2i + 1
+  std::vector<Eigen::AlignedBox2d>
+      boxes_;  ///< of the chosen places of each node; children of i: 2i and 2i + 1
 };
 
-/// Set of corners that are still to be looked at, as bits in the order of the ring. Bits of a further level mark the words
-/// that are not 0 and so on, so that the next member is found in a few steps however far away it is.
+/// Set of corners that are still to be looked at, as bits in the order of the ring. Bits of a further level
+/// mark the words that are not 0 and so on, so that the next member is found in a few steps however far away
+/// it is.
 class Candidates {
  public:
   explicit Candidates(std::size_t corners) {
@@ -158,8 +166,8 @@ class Candidates {
   std::vector<std::vector<std::uint64_t>> levels_;
 };
 
-// Ears are cut off a ring of corners that shrinks. Invariant: a corner outside a set of candidates has kept its
-// neighbors since it was judged not to belong, so that on the whole few corners are judged again.
+// Ears are cut off a ring of corners that shrinks. Invariant: a corner outside a set of candidates has kept
+// its neighbors since it was judged not to belong, so that on the whole few corners are judged again.
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
@@ -185,7 +193,8 @@ class Ring {
     std::vector<Triangle> triangles;
     triangles.reserve(places_.size() - 2);
     std::uint32_t at = 0;
-    // Each turn cuts one corner off, so that n corners give n − 2 triangles, the last of which is what is left.
+    // Each turn cuts one corner off, so that n corners give n − 2 triangles, the last of which is what is
+    // left.
     while (left() > 3) {
       if (cut_off_ % 1024 == 1023) {
         context.check();
@@ -204,8 +213,8 @@ class Ring {
   }
 
  private:
-  /// Places in the plane, seen along the axis that the polygon faces most and counter-clockwise. The projection scales
-  /// all areas alike, and nothing but their signs matters.
+  /// Places in the plane, seen along the axis that the polygon faces most and counter-clockwise. The
+  /// projection scales all areas alike, and nothing but their signs matters.
   static std::vector<Vector2d> placed(std::span<const Vector3d> corners) {
     const Vector3d normal = newell(corners);
     int axis;
@@ -224,12 +233,12 @@ class Ring {
 
   /// The first ear from a corner on; if there is none, the first corner in a straight line.
   std::optional<std::uint32_t> next_to_cut(std::uint32_t at, const RunContext& context) {
-    if (const std::optional<std::uint32_t> ear = first(perhaps_ears_, at, context, [&](std::uint32_t i) {
-          return is_ear(i);
-        }))
+    if (const std::optional<std::uint32_t> ear =
+            first(perhaps_ears_, at, context, [&](std::uint32_t i) { return is_ear(i); }))
       return ear;
-    // A corner that was no ear becomes one when a neighbour goes. Where the border touches itself it may do so as
-    // well when another corner goes, so all are asked again, but not for every corner of a straight line.
+    // A corner that was no ear becomes one when a neighbour goes. Where the border touches itself it may do
+    // so as well when another corner goes, so all are asked again, but not for every corner of a straight
+    // line.
     const auto flat_one = [&] {
       return first(perhaps_flat_, at, context,
                    [&](std::uint32_t i) { return std::abs(area_at(i)) <= flat_; });
@@ -246,11 +255,11 @@ class Ring {
     return flat_one();
   }
 
-  /// The first candidate from a corner on that `is` one; candidates before it that are none are removed until they are
-  /// added again.
+  /// The first candidate from a corner on that `is` one; candidates before it that are none are removed until
+  /// they are added again.
   template <class Is>
-  static std::optional<std::uint32_t> first(Candidates& candidates, std::uint32_t at, const RunContext& context,
-                                            Is&& is) {
+  static std::optional<std::uint32_t> first(Candidates& candidates, std::uint32_t at,
+                                            const RunContext& context, Is&& is) {
     for (std::size_t asked = 1;; ++asked) {
       const std::optional<std::uint32_t> corner = candidates.from(at);
       if (!corner || is(*corner)) return corner;
@@ -260,8 +269,8 @@ class Ring {
   }
 
   bool is_ear(std::uint32_t at) const {
-    // A straight corner is no ear, for its triangle would have no area; next_to_cut() takes one only for want of an
-    // ear.
+    // A straight corner is no ear, for its triangle would have no area; next_to_cut() takes one only for want
+    // of an ear.
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
     return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {
@@ -312,8 +321,8 @@ class Ring {
 
 bool is_fan(std::span<const Vector3d> corners) {
   const Vector3d normal = newell(corners);
-  // A triangle without an area, at a corner in line with its neighbours, would leave that corner on the side of another
-  // one, and a sliver that faces the wrong way would lie upon it.
+  // A triangle without an area, at a corner in line with its neighbours, would leave that corner on the side
+  // of another one, and a sliver that faces the wrong way would lie upon it.
   constexpr double kRounding = 1e-12;
   const double least = kRounding * normal.squaredNorm();
   for (std::size_t i = 2; i < corners.size(); ++i)

@@ -153,7 +153,8 @@ TEST(ClipEars, RandomStarsInRandomPlanes) {
     }
 }
 
-/// Two walls about the origin, `turns` times around; nearly every corner of its inner wall hides the ears of the others.
+/// Two walls about the origin, `turns` times around; nearly every corner of its inner wall hides the ears of
+/// the others.
 Polygon spiral(int corners, double turns) {
   Polygon polygon;
   const int steps = corners / 2;
@@ -179,7 +180,8 @@ TEST(ClipEars, ASpiral) {
   expect_cover(polygon, enclosed(polygon));
 }
 
-/// A zigzag over a straight border of as many corners, which leaves two straight rows when its tips are cut off.
+/// A zigzag over a straight border of as many corners, which leaves two straight rows when its tips are cut
+/// off.
 Polygon zigzag(int corners) {
   Polygon polygon;
   const int half = corners / 2;
@@ -209,20 +211,23 @@ void expect_covers_of(int corners) {
   const int quarter = corners / 4;
   Polygon comb;
   for (int i = 0; i < quarter; ++i)
-    for (const auto& [x, y] : {std::pair(0, 0), std::pair(1, 1000 + i % 7), std::pair(2, 1000), std::pair(3, i % 5)})
+    for (const auto& [x, y] :
+         {std::pair(0, 0), std::pair(1, 1000 + i % 7), std::pair(2, 1000), std::pair(3, i % 5)})
       comb.emplace_back(4 * i + x, y, 0);
   comb.emplace_back(4 * quarter, -1, 0);
   comb.emplace_back(0, -1, 0);
   std::reverse(comb.begin(), comb.end());
   expect_cover(comb, enclosed(comb));
-  // A box with all corners but four in a straight line, a quarter of which but one are left when the others have become ears.
+  // A box with all corners but four in a straight line, a quarter of which but one are left when the others
+  // have become ears.
   Polygon box;
   for (int i = 0; i < quarter; ++i) box.emplace_back(i, 0, 0);
   for (int i = 0; i < quarter; ++i) box.emplace_back(quarter, i, 0);
   for (int i = quarter; i > 0; --i) box.emplace_back(i, quarter, 0);
   for (int i = quarter; i > 0; --i) box.emplace_back(0, i, 0);
   expect_cover(box, enclosed(box));
-  for (const Polygon& polygon : {zigzag(corners), random_star(corners)}) expect_cover(polygon, enclosed(polygon));
+  for (const Polygon& polygon : {zigzag(corners), random_star(corners)})
+    expect_cover(polygon, enclosed(polygon));
 }
 /// The time is about in proportion to the corners: seconds here, and hours if it were to their square.
 TEST(ClipEars, NineHundredThousandCorners) {

@@ -9,8 +9,8 @@ std::vector<Triangle> triangulated(const PolygonMesh& mesh) {
   std::vector<Triangle> triangles;
   triangles.reserve(mesh.triangle_count());
   triangles = mesh.triangles;
-  // The diagonal a–c is the split that PolygonMesh promises of every quad: whoever makes one has ordered its corners
-  // so.
+  // The diagonal a–c is the split that PolygonMesh promises of every quad: whoever makes one has ordered its
+  // corners so.
   for (const auto& [a, b, c, d] : mesh.quads) {
     triangles.push_back({a, b, c});
     triangles.push_back({a, c, d});
@@ -19,8 +19,8 @@ std::vector<Triangle> triangulated(const PolygonMesh& mesh) {
 }
 
 Bounds bounds(const PolygonMesh& mesh) {
-  // By way of the polygons, because a stray point would enlarge the box, and with it the voxels that tools choose by
-  // it.
+  // By way of the polygons, because a stray point would enlarge the box, and with it the voxels that tools
+  // choose by it.
   Bounds box;
   for (const Triangle& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle) box.add(mesh.world(corner));
@@ -39,8 +39,8 @@ double power_of_two_not_below(double length) {
 }
 
 double origin_on_axis(double lower, double upper, double longest_side) {
-  // Distance of the box from 0 along the axis, 0 where it contains 0. Within four sides the coordinates are at most
-  // five times the longest side, which costs single precision three bits at most.
+  // Distance of the box from 0 along the axis, 0 where it contains 0. Within four sides the coordinates are
+  // at most five times the longest side, which costs single precision three bits at most.
   const double distance = std::max({lower, -upper, 0.0});
   if (distance <= 4.0 * longest_side) return 0.0;
   // Both ends have one sign here, so their difference cannot overflow, as their sum could.

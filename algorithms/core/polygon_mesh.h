@@ -23,7 +23,8 @@ struct PolygonMesh {
   std::vector<Eigen::Vector3f> points;               ///< world units, relative to origin
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
-  std::vector<MeshAttribute> attributes;  ///< each with a name of its own; read_mesh() reads them where asked to
+  std::vector<MeshAttribute>
+      attributes;  ///< each with a name of its own; read_mesh() reads them where asked to
 
   /// Position of a point in world units. This double is the point's position: a writer stores it without
   /// loss.

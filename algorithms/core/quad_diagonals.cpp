@@ -39,7 +39,8 @@ Cut cut_along(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 bool other_is_better(const PolygonMesh& mesh, const Quad& q) {
   const auto at = [&](int i) { return Vector3d(mesh.points[q[std::size_t(i)]].cast<double>()); };
   const Vector3d a = at(0), b = at(1), c = at(2), d = at(3);
-  // Twice the vector area of the quad, whatever the diagonal: the way that a bent or concave quad faces as a whole.
+  // Twice the vector area of the quad, whatever the diagonal: the way that a bent or concave quad faces as a
+  // whole.
   const Vector3d normal = (c - a).cross(d - b);
   const Cut own = cut_along(a, b, c, d, normal), other = cut_along(b, c, d, a, normal);
   // A concave quad has one proper diagonal, a convex one two; a quad that crosses itself may have none.
@@ -51,7 +52,8 @@ bool other_is_better(const PolygonMesh& mesh, const Quad& q) {
   return std::min(q[1], q[3]) < std::min(q[0], q[2]);
 }
 
-/// Moves the values of the first corner of each turned quad behind those of its last, in an attribute of the corners.
+/// Moves the values of the first corner of each turned quad behind those of its last, in an attribute of the
+/// corners.
 void turn_corners(const PolygonMesh& mesh, const std::vector<char>& turned, MeshAttribute& attribute) {
   if (attribute.domain != AttributeDomain::corner) return;
   const std::size_t n = std::size_t(attribute.components), first = 3 * mesh.triangles.size();

@@ -13,12 +13,12 @@
 
 namespace hermesh {
 
-/// What one run reports and obeys. Only cancelled() and check() may be called from any thread; the rest belongs to the
-/// thread that runs the stages.
+/// What one run reports and obeys. Only cancelled() and check() may be called from any thread; the rest
+/// belongs to the thread that runs the stages.
 class RunContext {
  public:
-  /// Callback with the name of the stage and the share of it that is done, 0 to 1; only the thread that runs the stage
-  /// calls it.
+  /// Callback with the name of the stage and the share of it that is done, 0 to 1; only the thread that runs
+  /// the stage calls it.
   std::function<void(std::string_view stage, double fraction)> on_progress;
   /// Flag that somebody else (a signal handler, say) sets to ask for an early end; may be null.
   const std::atomic<bool>* cancel = nullptr;

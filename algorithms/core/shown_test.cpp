@@ -13,17 +13,19 @@ TEST(Shown, KeepsWhatCanBeShown) {
 
 TEST(Shown, TakesControlFromTheTerminal) {
   EXPECT_EQ(shown("\x1b[31mred\x07"), "?[31mred?");
-  EXPECT_EQ(shown("\xc2\x9b" "31m"), "?31m");  // U+009B begins such a sequence, too
+  EXPECT_EQ(shown("\xc2\x9b"
+                  "31m"),
+            "?31m");  // U+009B begins such a sequence, too
   EXPECT_EQ(shown("a\r\n\tb   c"), "a b c");
   EXPECT_EQ(shown(std::string("a\0b\x7f", 4)), "a?b?");
 }
 
 TEST(Shown, WhatIsNoUtf8IsAQuestionMark) {
   EXPECT_EQ(shown("\xff\xfe"), "??");
-  EXPECT_EQ(shown("\xe4\xb8"), "??");              // cut off
-  EXPECT_EQ(shown("\xc0\xaf"), "??");              // longer than need be
-  EXPECT_EQ(shown("\xed\xa0\x80"), "???");         // half a pair
-  EXPECT_EQ(shown("\xf4\x90\x80\x80"), "????");    // beyond the last character
+  EXPECT_EQ(shown("\xe4\xb8"), "??");            // cut off
+  EXPECT_EQ(shown("\xc0\xaf"), "??");            // longer than need be
+  EXPECT_EQ(shown("\xed\xa0\x80"), "???");       // half a pair
+  EXPECT_EQ(shown("\xf4\x90\x80\x80"), "????");  // beyond the last character
 }
 
 TEST(Shown, IsCutBetweenCharacters) {

@@ -7,7 +7,8 @@
 
 namespace hermesh {
 
-/// The least and the greatest active value, tiles included; of a volume without active voxels the background twice.
+/// The least and the greatest active value, tiles included; of a volume without active voxels the background
+/// twice.
 std::pair<float, float> value_range(const LevelSet& volume);
 
 }  // namespace hermesh

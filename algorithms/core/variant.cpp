@@ -5,8 +5,8 @@
 namespace hermesh {
 namespace {
 
-// One function for both kinds of table, so that both complain in the same words. A table has a dozen entries: a search
-// from front to back keeps their order, in which the complaint lists them.
+// One function for both kinds of table, so that both complain in the same words. A table has a dozen entries:
+// a search from front to back keeps their order, in which the complaint lists them.
 template <class Variant>
 const Variant& find(std::span<const Variant> table, const std::string& name, const std::string& kind) {
   const auto found =

@@ -36,14 +36,14 @@ struct ExtractionInput {
       nullptr;  ///< the polygons that the volume was made from, where they are at hand; else null
   const Options& options;
   RunContext& context;
-  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform variant
-  /// ignores it.
+  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform
+  /// variant ignores it.
   const AdaptivityField* field = nullptr;
-  /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, where they are at
-  /// hand instead of polygons; else null.
+  /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, where
+  /// they are at hand instead of polygons; else null.
   const SparseHermite<EdgeCrossing>* hermite = nullptr;
-  /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a variant which
-  /// proves something of its mesh proves it of the points as they will be written.
+  /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a
+  /// variant which proves something of its mesh proves it of the points as they will be written.
   bool written_in_single = false;
   /// The box of index coordinates that a variant keeps its vertices in if it guarantees that nothing
   /// intersects (extraction/volume_ends.h). Up to rounding, all crossings lie in the box.

@@ -13,8 +13,8 @@
 namespace hermesh {
 namespace {
 
-// An accessor that does not register with the tree, which would be an insertion into a table that all threads share,
-// for each block of cells. It must not outlive a change of the tree, and nobody changes these trees.
+// An accessor that does not register with the tree, which would be an insertion into a table that all threads
+// share, for each block of cells. It must not outlive a change of the tree, and nobody changes these trees.
 using Accessor = openvdb::FloatGrid::ConstUnsafeAccessor;
 
 openvdb::Vec3d index_of(const openvdb::FloatGrid& grid, const Eigen::Vector3d& world) {
@@ -35,10 +35,14 @@ void check_linear(const openvdb::FloatGrid& grid, const char* what) {
 
 void check_scale(const openvdb::FloatGrid& grid) {
   // An imported volume whose least value is 0 has the next normal number below for a background.
-  const auto good = [](float value) { return std::isfinite(value) && value >= -std::numeric_limits<float>::min(); };
+  const auto good = [](float value) {
+    return std::isfinite(value) && value >= -std::numeric_limits<float>::min();
+  };
   // Inactive values count, too, because interpolation reads every sample, whatever its state.
   if (!good(grid.background()))
-    throw Error("the scale of the tolerance has a background that is negative or not finite; give it one of 0 or more");
+    throw Error(
+        "the scale of the tolerance has a background that is negative or not finite; give it one of 0 or "
+        "more");
   for (auto it = grid.cbeginValueAll(); it; ++it) {
     if (good(*it)) continue;
     std::ostringstream place;
@@ -53,7 +57,8 @@ Eigen::Vector3d centre(int cell) { return {(cell >> 6) + 0.5, ((cell >> 3) & 7) 
 
 }  // namespace
 
-FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld& placement) : placement_(placement) {
+FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld& placement)
+    : placement_(placement) {
   if (!field) return;
   if (field->scale) {
     check_linear(*field->scale.grid().grid, "the scale of the tolerance");
@@ -76,7 +81,8 @@ FieldEvaluator::FieldEvaluator(const AdaptivityField* field, const IndexToWorld&
   block_radius_ += grid.voxelSize().length();
 }
 
-Eigen::Vector3d FieldEvaluator::world(const std::array<std::int32_t, 3>& lower, const Eigen::Vector3d& local) const {
+Eigen::Vector3d FieldEvaluator::world(const std::array<std::int32_t, 3>& lower,
+                                      const Eigen::Vector3d& local) const {
   // The base is subtracted in whole numbers, which is exact, before anything becomes a float.
   const Eigen::Vector3d index(lower[0] - placement_.base[0], lower[1] - placement_.base[1],
                               lower[2] - placement_.base[2]);
@@ -89,8 +95,9 @@ BlockMask FieldEvaluator::inside(const std::array<std::int32_t, 3>& lower, const
   const Accessor accessor = grid.getConstUnsafeAccessor();
   const auto at = [&](const Eigen::Vector3d& local) { return index_of(grid, world(lower, local)); };
   BlockMask result{};
-  // A distance changes no faster than one walks, so that one look at the middle may decide for the whole block. Where
-  // the band is narrower than the block's radius, its background never exceeds that, and every cell is asked.
+  // A distance changes no faster than one walks, so that one look at the middle may decide for the whole
+  // block. Where the band is narrower than the block's radius, its background never exceeds that, and every
+  // cell is asked.
   if (is_level_set_) {
     const float middle = interpolated(accessor, at(Eigen::Vector3d::Constant(4.0)));
     if (std::fabs(middle) > block_radius_) return middle < 0.0f ? cells : result;

@@ -13,12 +13,12 @@
 namespace hermesh {
 namespace {
 
-/// How far off a plane, in cubes of its longest side, a quad may be that some reader takes for plane, and the part of its
-/// area that counts as none.
+/// How far off a plane, in cubes of its longest side, a quad may be that some reader takes for plane, and the
+/// part of its area that counts as none.
 constexpr double kPlane = 1e-5, kNoArea = 1e-9;
 
-/// Whether a quad means one surface by its first diagonal, folded back beyond itself, and another one to whoever takes it
-/// for plane and concave, and cuts it along the diagonal inside.
+/// Whether a quad means one surface by its first diagonal, folded back beyond itself, and another one to
+/// whoever takes it for plane and concave, and cuts it along the diagonal inside.
 bool is_folded_in_its_plane(const std::vector<Eigen::Vector3f>& points, const Quad& q) {
   const Eigen::Vector3d a = points[q[0]].cast<double>(), u = points[q[1]].cast<double>() - a,
                         v = points[q[2]].cast<double>() - a, w = points[q[3]].cast<double>() - a;
@@ -64,8 +64,9 @@ PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunCont
   return result;
 }
 
-/// The triangles that the field does not leave out, and their points, in the order in which these use them. A triangle
-/// of the uniform mesh is outside if its middle is; one that was merged may have its middle anywhere.
+/// The triangles that the field does not leave out, and their points, in the order in which these use them. A
+/// triangle of the uniform mesh is outside if its middle is; one that was merged may have its middle
+/// anywhere.
 CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   constexpr std::uint32_t kNone = 0xffffffffu;
   std::vector<std::uint32_t> number(all.points.size(), kNone);
@@ -88,8 +89,8 @@ CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   return result;
 }
 
-/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes: the map's
-/// largest singular value. A bound in world units that is divided by it holds in every direction.
+/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes:
+/// the map's largest singular value. A bound in world units that is divided by it holds in every direction.
 double longest_step(const IndexToWorld& placement) { return placement.linear.operatorNorm(); }
 
 }  // namespace
@@ -149,7 +150,8 @@ void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int
   for (const Triangle& t : all_triangles(polygons.triangles, polygons.quads)) {
     const std::size_t number = polygons.shown.size();
     // A merged triangle stands for something within if one of its corners does.
-    polygons.shown.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) || is_shown(number, 2, t[2]));
+    polygons.shown.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) ||
+                             is_shown(number, 2, t[2]));
   }
 }
 
@@ -165,7 +167,8 @@ CertifiedPolygons as_they_are(UniformMesh uniform) {
   return {std::move(uniform.points), std::move(uniform.triangles), std::move(uniform.quads), {}};
 }
 
-PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, const FilePoints& file, RunContext& context) {
+PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, const FilePoints& file,
+                     RunContext& context) {
   if (field.leaves_out_outside()) polygons = within(field, std::move(polygons));
   return in_world(std::move(polygons), file, context);
 }
@@ -182,8 +185,10 @@ const OptionTable<AskedTolerance>& tolerance_table() {
   static const auto table =
       OptionTable<AskedTolerance>()
           .number("tolerance", &AskedTolerance::voxels, {.maximum = 1e6},
-                  "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than 0.005; larger "
-                  "gives fewer polygons, 0 the uniform mesh itself, whose quads are cut from their first corner to the third",
+                  "two-sided distance to the uniform mesh, in voxels, that is exceeded by no more than "
+                  "0.005; larger "
+                  "gives fewer polygons, 0 the uniform mesh itself, whose quads are cut from their first "
+                  "corner to the third",
                   {"tolerance_world=0"})
           .number("tolerance_world", &AskedTolerance::world, {.maximum = 1e30},
                   "the same in world units, instead of tolerance where it is greater than 0");

@@ -13,8 +13,8 @@ PolygonMesh finished_quad(const std::vector<Eigen::Vector3d>& points) {
   return finished(std::move(polygons), FieldAtPoints(nullptr, placement), FilePoints(placement), context);
 }
 
-// The corner d lies within abc: cut along a–c, as was proved, the quad covers all of abc and, folded back, acd; whoever
-// takes it for a plane polygon leaves acd out.
+// The corner d lies within abc: cut along a–c, as was proved, the quad covers all of abc and, folded back,
+// acd; whoever takes it for a plane polygon leaves acd out.
 TEST(CertifiedMesh, AQuadThatOthersCutOtherwiseIsWrittenAsItsTriangles) {
   for (const double bend : {0.0, 1e-7, -1e-7, 1e-6}) {
     const PolygonMesh mesh = finished_quad({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3, 0.3, bend}});
@@ -26,10 +26,10 @@ TEST(CertifiedMesh, AQuadThatOthersCutOtherwiseIsWrittenAsItsTriangles) {
 TEST(CertifiedMesh, AQuadThatMeansOneSurfaceStaysAQuad) {
   const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0), within(0.3, 0.3, 0);
   const std::vector<std::vector<Eigen::Vector3d>> quads = {
-      {a, b, c, {-0.5, 0.5, 0}},       // convex
-      {within, a, b, c},               // concave, and cut within itself
-      {a, b, c, {0, 0.5, 0}},          // of three corners in a row
-      {a, b, c, {0.3, 0.3, 0.1}}};     // folded, but by nobody taken for plane
+      {a, b, c, {-0.5, 0.5, 0}},    // convex
+      {within, a, b, c},            // concave, and cut within itself
+      {a, b, c, {0, 0.5, 0}},       // of three corners in a row
+      {a, b, c, {0.3, 0.3, 0.1}}};  // folded, but by nobody taken for plane
   for (const std::vector<Eigen::Vector3d>& points : quads) {
     const PolygonMesh mesh = finished_quad(points);
     EXPECT_EQ(mesh.quads.size(), 1u) << points[3].transpose();

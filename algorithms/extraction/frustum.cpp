@@ -26,30 +26,35 @@ class Solid {
   explicit Solid(const Frustum& frustum) {
     check(frustum);
     const Vector3d forward = (frustum.look_at - frustum.position).normalized();
-    // An orthonormal frame: `up` is made perpendicular to the view, and its length is 1 because that of the others is.
+    // An orthonormal frame: `up` is made perpendicular to the view, and its length is 1 because that of the
+    // others is.
     const Vector3d right = forward.cross(frustum.up).normalized(), up = right.cross(forward);
     // Half of the angle, since it is measured from the lower to the upper plane.
     const double slope = std::tan(0.5 * frustum.field_of_view * std::numbers::pi / 180.0);
     for (int corner = 0; corner < 8; ++corner) {
       const double depth = corner & 4 ? frustum.far : frustum.near, half = slope * depth;
-      corners_[corner] = frustum.position + depth * forward + (corner & 1 ? half : -half) * frustum.aspect * right +
+      corners_[corner] = frustum.position + depth * forward +
+                         (corner & 1 ? half : -half) * frustum.aspect * right +
                          (corner & 2 ? half : -half) * up;
     }
     const Vector3d middle = mean();
     for (int f = 0; f < 6; ++f) {
       normals_[f] = (corner(f, 1) - corner(f, 0)).cross(corner(f, 3) - corner(f, 0)).normalized();
-      // Turned away from the middle, so that the order of corners in the table need not be the same for all faces.
+      // Turned away from the middle, so that the order of corners in the table need not be the same for all
+      // faces.
       if (normals_[f].dot(middle - corner(f, 0)) > 0) normals_[f] = -normals_[f];
     }
   }
 
-  /// The largest signed distance to the planes of the six faces: exact inside, and nowhere larger than the distance.
+  /// The largest signed distance to the planes of the six faces: exact inside, and nowhere larger than the
+  /// distance.
   double lower_bound(const Vector3d& point) const {
     double largest = -std::numeric_limits<double>::infinity();
     for (int f = 0; f < 6; ++f) largest = std::max(largest, normals_[f].dot(point - corner(f, 0)));
     return largest;
   }
-  /// Signed distance to the surface. From outside, the nearest point of a convex solid lies on one of its faces.
+  /// Signed distance to the surface. From outside, the nearest point of a convex solid lies on one of its
+  /// faces.
   double distance(const Vector3d& point) const {
     const double bound = lower_bound(point);
     if (bound <= 0) return bound;
@@ -73,7 +78,8 @@ class Solid {
   static void check(const Frustum& f) {
     const double numbers[] = {f.field_of_view, f.aspect, f.near, f.far};
     if (!f.position.allFinite() || !f.look_at.allFinite() || !f.up.allFinite() ||
-        !std::all_of(std::begin(numbers), std::end(numbers), [](double value) { return std::isfinite(value); }))
+        !std::all_of(std::begin(numbers), std::end(numbers),
+                     [](double value) { return std::isfinite(value); }))
       throw Error("a frustum needs finite numbers");
     if (!(f.field_of_view > 0 && f.field_of_view < 180))
       throw Error("a frustum's angle must be between 0 and 180 degrees");
@@ -97,8 +103,8 @@ class Solid {
     for (const Vector3d& corner : corners_) sum += corner;
     return sum / 8.0;
   }
-  /// Distance to one face: to its plane, if the foot of the perpendicular lies on the same side of all four edges
-  /// (which side it is depends on the order of corners), or else to the nearest edge.
+  /// Distance to one face: to its plane, if the foot of the perpendicular lies on the same side of all four
+  /// edges (which side it is depends on the order of corners), or else to the nearest edge.
   double to_face(int f, const Vector3d& point) const {
     const double height = normals_[f].dot(point - corner(f, 0));
     const Vector3d foot = point - height * normals_[f];
@@ -118,18 +124,20 @@ class Solid {
 };
 
 /// The leaf with its first sample there, or null if no sample is within the band.
-std::unique_ptr<SampleLeaf> make_leaf(const Solid& solid, const openvdb::Coord& lower, double voxel, double band) {
+std::unique_ptr<SampleLeaf> make_leaf(const Solid& solid, const openvdb::Coord& lower, double voxel,
+                                      double band) {
   const auto at = [&](double x, double y, double z) -> Vector3d {
     return Vector3d(lower.x() + x, lower.y() + y, lower.z() + z) * voxel;
   };
-  // The samples of a leaf lie within half the diagonal of 7 voxels of its middle, and the bound changes no faster than
-  // one walks: where it is beyond band and radius at the middle, no sample is in the band.
+  // The samples of a leaf lie within half the diagonal of 7 voxels of its middle, and the bound changes no
+  // faster than one walks: where it is beyond band and radius at the middle, no sample is in the band.
   const double radius = std::sqrt(3.0) * 3.5 * voxel, middle = solid.lower_bound(at(3.5, 3.5, 3.5));
   if (std::fabs(middle) > band + radius) return nullptr;
   auto leaf = std::make_unique<SampleLeaf>(lower, static_cast<float>(band), false);
   for (int sample = 0; sample < 512; ++sample) {
     const Vector3d point = at(sample >> 6, (sample >> 3) & 7, sample & 7);
-    // The bound alone settles most samples outside of the band; the distance to faces and edges is for the others.
+    // The bound alone settles most samples outside of the band; the distance to faces and edges is for the
+    // others.
     const double bound = solid.lower_bound(point);
     const double value = bound >= band ? band : std::clamp(solid.distance(point), -band, band);
     leaf->setValueOnly(static_cast<openvdb::Index>(sample), static_cast<float>(value));
@@ -140,7 +148,9 @@ std::unique_ptr<SampleLeaf> make_leaf(const Solid& solid, const openvdb::Coord& 
 
 }  // namespace
 
-double signed_distance(const Frustum& frustum, const Vector3d& point) { return Solid(frustum).distance(point); }
+double signed_distance(const Frustum& frustum, const Vector3d& point) {
+  return Solid(frustum).distance(point);
+}
 
 LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& context) {
   Stage stage(context, "frustum");
@@ -163,12 +173,14 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));
     count[a] = static_cast<int>(std::floor((box.max()[a] + band) / voxel / 8.0)) - first[a] + 1;
   }
-  // Threads make leaves, each in its own place; the tree, which takes one at a time, gets them afterwards in order.
+  // Threads make leaves, each in its own place; the tree, which takes one at a time, gets them afterwards in
+  // order.
   std::vector<std::unique_ptr<SampleLeaf>> leaves(std::size_t(count[0]) * count[1] * count[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
-    const int n = static_cast<int>(i), z = n % count[2], y = n / count[2] % count[1], x = n / (count[2] * count[1]);
-    leaves[i] =
-        make_leaf(solid, openvdb::Coord(8 * (first[0] + x), 8 * (first[1] + y), 8 * (first[2] + z)), voxel, band);
+    const int n = static_cast<int>(i), z = n % count[2], y = n / count[2] % count[1],
+              x = n / (count[2] * count[1]);
+    leaves[i] = make_leaf(solid, openvdb::Coord(8 * (first[0] + x), 8 * (first[1] + y), 8 * (first[2] + z)),
+                          voxel, band);
   });
   initialize_openvdb();
   auto grid = openvdb::FloatGrid::create(static_cast<float>(band));
@@ -176,7 +188,8 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
   for (auto& leaf : leaves)
     if (leaf) grid->tree().addLeaf(leaf.release());
-  // Tiles within the frustum have the background's value so far; the band around them says that they are inside.
+  // Tiles within the frustum have the background's value so far; the band around them says that they are
+  // inside.
   openvdb::tools::signedFloodFill(grid->tree());
   return make_level_set(grid);
 }

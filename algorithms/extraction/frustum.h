@@ -8,7 +8,8 @@
 
 namespace hermesh {
 
-/// The part of space that a camera sees, a pyramid cut off by two planes; lengths in world units, angles in degrees.
+/// The part of space that a camera sees, a pyramid cut off by two planes; lengths in world units, angles in
+/// degrees.
 struct Frustum {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d look_at = -Eigen::Vector3d::UnitZ();
@@ -19,8 +20,8 @@ struct Frustum {
 };
 
 /// Signed distance of a point to the frustum's surface, negative inside; exact everywhere.
-/// @throws Error for a frustum without volume: a number that is not finite, look-at at the position, up along the view,
-/// an angle not between 0 and 180, an aspect not above 0, or planes that are not 0 < near < far.
+/// @throws Error for a frustum without volume: a number that is not finite, look-at at the position, up along
+/// the view, an angle not between 0 and 180, an aspect not above 0, or planes that are not 0 < near < far.
 double signed_distance(const Frustum& frustum, const Eigen::Vector3d& point);
 
 /// Level set of the frustum with a band of three voxels, `resolution` voxels (8 to 4096) along the longest

@@ -22,8 +22,8 @@ FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   return hermite;
 }
 
-/// Moves the placement's origin to that of the world, with every sample where it was: points in single precision are
-/// then those that a file in single precision holds.
+/// Moves the placement's origin to that of the world, with every sample where it was: points in single
+/// precision are then those that a file in single precision holds.
 void about_world_origin(IndexToWorld& placement) {
   placement.offset += placement.origin;
   placement.origin.setZero();
@@ -57,7 +57,8 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
   if (parse_representation(input.options.text("representation")) != Representation::sparse)
     return std::nullopt;
   const NormalCodeId code = parse_normal_code(input.options.text("normals"));
-  // From a level set each leaf is packed as soon as it is sampled, so that the floats of all are never there together.
+  // From a level set each leaf is packed as soon as it is sampled, so that the floats of all are never there
+  // together.
   PackedHermite hermite = wants_polygons(input)
                               ? pack(sample(input, variant), code, input.context)
                               : sample_level_set_packed(input.level_set, input.isovalue, code, input.context);
@@ -90,8 +91,8 @@ FloatHermite hermite_input(const ExtractionInput& input, const std::string& vari
   if (representation == Representation::directed && needs_normals)
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");
   // There and back again: the extractor gets what the representation has kept, with its losses.
-  Represented data =
-      through(representation, parse_normal_code(input.options.text("normals")), sample(input, variant), input.context);
+  Represented data = through(representation, parse_normal_code(input.options.text("normals")),
+                             sample(input, variant), input.context);
   if (input.written_in_single) about_world_origin(data.hermite.placement);
   report_figures(data, input.level_set, input.context);
   return std::move(data.hermite);
@@ -104,21 +105,23 @@ bool from_level_set_alone(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> hermite_options() {
-  return {{"hermite",
-           "auto",
-           "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
-           "polygons are at hand",
-           {"auto", "exact", "level-set"}},
-          {"representation",
-           "sparse-float",
-           "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: 'dense-float' (52 "
-           "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
-           {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
-          {.name = "normals",
-           .fallback = "octahedral",
-           .help = "code of 16 bits for normals in 'sparse' and 'fixed'",
-           .choices = normal_code_names(),
-           .only_with = {"representation=sparse|fixed"}}};
+  return {
+      {"hermite",
+       "auto",
+       "Hermite data 'exact' from the polygons, from the 'level-set', or 'auto': exact where the "
+       "polygons are at hand",
+       {"auto", "exact", "level-set"}},
+      {"representation",
+       "sparse-float",
+       "how the Hermite data are kept: 'sparse-float', 'sparse' (4 bytes a crossing), or voxels: "
+       "'dense-float' (52 "
+       "bytes), 'fixed' (10), 'thesis' (10, as printed), 'directed' (12, no normals: with placement=average)",
+       {"sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed"}},
+      {.name = "normals",
+       .fallback = "octahedral",
+       .help = "code of 16 bits for normals in 'sparse' and 'fixed'",
+       .choices = normal_code_names(),
+       .only_with = {"representation=sparse|fixed"}}};
 }
 
 }  // namespace hermesh

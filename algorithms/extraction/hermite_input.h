@@ -14,8 +14,8 @@ namespace hermesh {
 /// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
 std::vector<OptionSpec> hermite_options();
 
-/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the isovalue 0
-/// alone, for nowhere else does the surface that is asked for lie on the polygons.
+/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the
+/// isovalue 0 alone, for nowhere else does the surface that is asked for lie on the polygons.
 bool wants_polygons(const ExtractionInput& input);
 
 /// The polygons, where a variant `asked` for what only they have; `instead` is the option to do without.
@@ -28,8 +28,9 @@ const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std:
 /// @throws Error for exact data where there are no polygons at the isovalue.
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Samples as those options say and packs the data into the thesis's voxels, whatever `representation` is. The bytes go
-/// to the run's context as figures, but for the crossings that are lost: who reads the voxels counts them.
+/// Samples as those options say and packs the data into the thesis's voxels, whatever `representation` is.
+/// The bytes go to the run's context as figures, but for the crossings that are lost: who reads the voxels
+/// counts them.
 /// @throws Error for exact data where there are no polygons at the isovalue.
 ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string& variant);
 
@@ -40,8 +41,8 @@ ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string
 /// the representation has none.
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);
 
-/// True where those options ask for the level set's own crossings as they are computed, so that an extractor may take
-/// them from the samples without keeping them.
+/// True where those options ask for the level set's own crossings as they are computed, so that an extractor
+/// may take them from the samples without keeping them.
 bool from_level_set_alone(const ExtractionInput& input);
 
 }  // namespace hermesh

@@ -34,8 +34,10 @@ std::array<WeightedCorner, 8> corners_around(const openvdb::Vec3d& index) {
   return corners;
 }
 
-/// Index coordinates of a point. Each grid has a transform of its own, so that the way leads through the world.
-openvdb::Vec3d index_of(const PolygonMesh& mesh, std::size_t point, const openvdb::math::Transform& transform) {
+/// Index coordinates of a point. Each grid has a transform of its own, so that the way leads through the
+/// world.
+openvdb::Vec3d index_of(const PolygonMesh& mesh, std::size_t point,
+                        const openvdb::math::Transform& transform) {
   const Eigen::Vector3d world = mesh.world(point);
   return transform.worldToIndex(openvdb::Vec3d(world.x(), world.y(), world.z()));
 }
@@ -52,17 +54,19 @@ void note_missing(std::size_t missing, const std::string& name, RunContext& cont
     context.note(std::to_string(missing) + " points lie beyond the active voxels of the grid " + name);
 }
 
-/// World position that is to be added to the grid's values: zero unless the grid holds closest points as `hermesh
-/// voxelize` writes them, relative to a place near the mesh, so that single precision is enough for them.
+/// World position that is to be added to the grid's values: zero unless the grid holds closest points as
+/// `hermesh voxelize` writes them, relative to a place near the mesh, so that single precision is enough for
+/// them.
 openvdb::Vec3d zero_of_positions(const openvdb::GridBase& grid) {
   const auto zero = grid.getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions);
   return zero ? zero->value() : openvdb::Vec3d(0.0);
 }
 
-/// Writes the first `components` components of the grid's values, trilinear, to those of the attribute from `first` on.
+/// Writes the first `components` components of the grid's values, trilinear, to those of the attribute from
+/// `first` on.
 template <class Grid>
-void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attribute, int first, int components,
-                 RunContext& context) {
+void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attribute, int first,
+                 int components, RunContext& context) {
   std::vector<float>& values = std::get<std::vector<float>>(attribute.values);
   // Threads count together, and a sum has no order; values are written by the one thread that has the point.
   std::atomic<std::size_t> missing{0};
@@ -112,7 +116,8 @@ void take_nearest(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attr
   note_missing(missing, grid.getName(), context);
 }
 
-/// Scales vectors of three to unit length; a mean of unit vectors is shorter. Zeros, where a point has no data, stay.
+/// Scales vectors of three to unit length; a mean of unit vectors is shorter. Zeros, where a point has no
+/// data, stay.
 void normalise(std::vector<float>& values) {
   for (std::size_t i = 0; i + 3 <= values.size(); i += 3) {
     const double length = std::hypot(double(values[i]), double(values[i + 1]), double(values[i + 2]));
@@ -134,7 +139,9 @@ std::vector<std::string> labels_of(const openvdb::GridBase& grid) {
 /// Calls f with the grid cast to its own type if that is one of `Grids`. @returns whether it is
 template <class... Grids, class F>
 bool with_grid(const openvdb::GridBase::Ptr& grid, F&& f) {
-  const auto attempt = [&]<class Grid>(const typename Grid::Ptr& typed) { return typed ? (f(*typed), true) : false; };
+  const auto attempt = [&]<class Grid>(const typename Grid::Ptr& typed) {
+    return typed ? (f(*typed), true) : false;
+  };
   return (attempt.template operator()<Grids>(openvdb::gridPtrCast<Grids>(grid)) || ...);
 }
 
@@ -175,8 +182,9 @@ MeshAttribute sample_grid(const openvdb::GridBase::Ptr& grid, const openvdb::Flo
 }
 
 bool can_be_sampled(const openvdb::GridBase& grid) {
-  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>() || grid.isType<openvdb::Vec3SGrid>() ||
-         grid.isType<openvdb::Vec3DGrid>() || grid.isType<openvdb::Int32Grid>() || grid.isType<openvdb::Int64Grid>() ||
+  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>() ||
+         grid.isType<openvdb::Vec3SGrid>() || grid.isType<openvdb::Vec3DGrid>() ||
+         grid.isType<openvdb::Int32Grid>() || grid.isType<openvdb::Int64Grid>() ||
          grid.isType<openvdb::BoolGrid>();
 }
 
@@ -191,7 +199,8 @@ std::vector<std::string> all_attributes(VdbReader& file, const std::filesystem::
     const openvdb::GridBase::Ptr grid = file.read_metadata(name);
     if (can_be_sampled(*grid) && grid->getGridClass() != openvdb::GRID_LEVEL_SET) names.push_back(name);
   }
-  if (names.empty()) throw Error(path.string() + " has no attributes; it has the grids " + file.joined_names());
+  if (names.empty())
+    throw Error(path.string() + " has no attributes; it has the grids " + file.joined_names());
   return names;
 }
 
@@ -202,7 +211,8 @@ std::vector<std::string> sample_attributes(PolygonMesh& mesh, const std::filesys
   const Stage stage(context, "attributes");
   return about_vdb_file(vdb, [&] {
     VdbReader file(vdb);
-    const std::vector<std::string> chosen = names == std::vector<std::string>{"all"} ? all_attributes(file, vdb) : names;
+    const std::vector<std::string> chosen =
+        names == std::vector<std::string>{"all"} ? all_attributes(file, vdb) : names;
     // One grid after the other is read and let go, so that the largest one bounds the memory.
     for (const std::string& name : chosen) {
       const std::string alpha_name = name + "-alpha";

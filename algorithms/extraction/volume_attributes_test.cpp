@@ -1,8 +1,7 @@
 #include "algorithms/extraction/volume_attributes.h"
 
-#include <openvdb/openvdb.h>
-
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,7 +17,8 @@ using openvdb::Coord;
 
 class VolumeAttributes : public testing::Test {
  protected:
-  VolumeAttributes() : folder(fs::temp_directory_path() / ("hermesh-attributes-" + std::to_string(::getpid()))) {
+  VolumeAttributes()
+      : folder(fs::temp_directory_path() / ("hermesh-attributes-" + std::to_string(::getpid()))) {
     fs::create_directories(folder);
     initialize_openvdb();
     mesh.points = {{0.5f, 0.5f, 0.5f}, {1.0f, 1.0f, 2.0f}, {9.0f, 9.0f, 9.0f}};
@@ -47,7 +47,8 @@ class VolumeAttributes : public testing::Test {
 };
 
 TEST_F(VolumeAttributes, LinearFieldsAreExactAndBeyondIsNothing) {
-  save({grid<openvdb::FloatGrid>("heat", [](const Coord& at) { return float(at.x() + 10 * at.y() - at.z()); })});
+  save({grid<openvdb::FloatGrid>("heat",
+                                 [](const Coord& at) { return float(at.x() + 10 * at.y() - at.z()); })});
   EXPECT_EQ(sample({"heat"}), std::vector<std::string>{"heat"});
   EXPECT_NEAR(floats(0)[0], 1 + 10 - 1, 1e-5);
   EXPECT_NEAR(floats(0)[1], 2 + 20 - 4, 1e-5);
@@ -79,7 +80,8 @@ TEST_F(VolumeAttributes, WholeNumbersAreThoseOfTheNearestSample) {
 }
 
 TEST_F(VolumeAttributes, VectorsTextureCoordinatesNormalsAndAlpha) {
-  save({grid<openvdb::Vec3SGrid>("colour", [](const Coord& at) { return openvdb::Vec3s(0.25f * float(at.x()), 0, 1); }),
+  save({grid<openvdb::Vec3SGrid>("colour",
+                                 [](const Coord& at) { return openvdb::Vec3s(0.25f * float(at.x()), 0, 1); }),
         grid<openvdb::FloatGrid>("colour-alpha", [](const Coord&) { return 0.5f; }),
         grid<openvdb::Vec3SGrid>("uv", [](const Coord&) { return openvdb::Vec3s(0.5f, 0.25f, 0); }),
         grid<openvdb::Vec3SGrid>("normal", [](const Coord&) { return openvdb::Vec3s(3, 0, 4); }),

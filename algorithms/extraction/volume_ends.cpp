@@ -6,10 +6,10 @@
 #include <cmath>
 #include <limits>
 
-#include "algorithms/lattice/grid_placement.h"
-#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/leaf_table.h"
 
 namespace hermesh {
 namespace {
@@ -36,8 +36,9 @@ struct EndEdge {
 /// What makes an edge with a change of sign an end of the data.
 struct EndRule {
   bool level_set = false;
-  openvdb::CoordBBox box;               ///< box of the data, where it is no level set
-  std::array<float, 3> largest_rise{};  ///< most that distances can rise from one sample to the next along each axis
+  openvdb::CoordBBox box;  ///< box of the data, where it is no level set
+  std::array<float, 3>
+      largest_rise{};  ///< most that distances can rise from one sample to the next along each axis
 
   bool operator()(const Coord& inside, float value, float beyond, int axis, int side) const {
     if (level_set) return std::fabs(double(beyond) - double(value)) > largest_rise[axis];
@@ -95,12 +96,13 @@ class EndFinder {
   }
 
   void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {
-    // The two signs of every edge along the axis that starts in the leaf, as bits. All edges with a change of sign
-    // start in a leaf, as the table promises.
+    // The two signs of every edge along the axis that starts in the leaf, as bits. All edges with a change of
+    // sign start in a leaf, as the table promises.
     const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
     const BlockMask own[2] = {table_.inside(leaf), inside_of(leaf, dx, dy, dz)};
     const auto shifted = [&](const BlockMask& here, const BlockMask& next) {
-      return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) { return ax + ay + az == 0 ? here : next; });
+      return shifted_mask(dx, dy, dz,
+                          [&](int ax, int ay, int az) { return ax + ay + az == 0 ? here : next; });
     };
     const BlockMask next = shifted(own[0], own[1]);
     BlockMask crossing;
@@ -122,7 +124,8 @@ class EndFinder {
     // An end above has its sample inside first, along the axis, and one below has it second.
     const Coord inside = side ? first : second, beyond = side ? second : first;
     const float value = table_.tree().getValue(inside);
-    if (rule_(inside, value, table_.tree().getValue(beyond), axis, side)) found.push_back({beyond, value, axis, side});
+    if (rule_(inside, value, table_.tree().getValue(beyond), axis, side))
+      found.push_back({beyond, value, axis, side});
   }
 
   const LeafTable& table_;
@@ -178,17 +181,20 @@ float mirrored(float value, const InsideRule& rule) {
   return std::nextafter(rule.isovalue, rule.scale * std::numeric_limits<float>::infinity());
 }
 
-/// A copy of the grid in which the samples beyond the ends are active and mirror those inside; a level set no longer.
-openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid, const std::vector<EndEdge>& edges,
-                                              const InsideRule& rule) {
+/// A copy of the grid in which the samples beyond the ends are active and mirror those inside; a level set no
+/// longer.
+openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid,
+                                              const std::vector<EndEdge>& edges, const InsideRule& rule) {
   const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
   if (copy->getGridClass() == openvdb::GRID_LEVEL_SET) copy->setGridClass(openvdb::GRID_UNKNOWN);
   auto access = copy->getAccessor();
   for (std::size_t i = 0; i < edges.size();) {
-    // A sample beyond may have several neighbours inside, where the data were clipped by a mask: it gets their mean.
+    // A sample beyond may have several neighbours inside, where the data were clipped by a mask: it gets
+    // their mean.
     std::size_t end = i;
     double sum = 0.0;
-    for (; end < edges.size() && edges[end].beyond == edges[i].beyond; ++end) sum += mirrored(edges[end].value, rule);
+    for (; end < edges.size() && edges[end].beyond == edges[i].beyond; ++end)
+      sum += mirrored(edges[end].value, rule);
     access.setValueOn(edges[i].beyond, static_cast<float>(sum / static_cast<double>(end - i)));
     i = end;
   }
@@ -213,7 +219,8 @@ std::string DataEnds::text() const {
   std::string result;
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side)
-      if (reached[axis][side]) result += (result.empty() ? "" : ", ") + std::string(side ? "+" : "-") + "xyz"[axis];
+      if (reached[axis][side])
+        result += (result.empty() ? "" : ", ") + std::string(side ? "+" : "-") + "xyz"[axis];
   return result;
 }
 
@@ -226,11 +233,14 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   const LeafTable table(level_set, isovalue, context);
   const std::vector<EndEdge> edges = EndFinder(table, rule).find(context);
   if (edges.empty()) return {level_set, {}};
-  // Without a sample in a leaf there is no band to flood from: OpenVDB would take the sign of a node's first tile for all.
+  // Without a sample in a leaf there is no band to flood from: OpenVDB would take the sign of a node's first
+  // tile for all.
   if (rule.level_set && grid.background() > 0.0f && grid.tree().leafCount() > 0) {
     const LevelSet flooded = with_flooded_signs(grid);
     if (EndFinder(LeafTable(flooded, isovalue, context), rule).find(context).empty()) {
-      context.note("the level set's inactive samples had no signs (its inside was not flooded): they got those of the band");
+      context.note(
+          "the level set's inactive samples had no signs (its inside was not flooded): they got those of the "
+          "band");
       return {flooded, {}};
     }
   }
@@ -255,7 +265,8 @@ EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& i
   if (ends == Ends::open)
     result.mesh = open_ends(result.mesh, closed.volume, closed.ends);
   else if (!extractor.promises.no_self_intersection)
-    flatten_ends(result.mesh, closed.volume, closed.ends);  // moves points without a look at what they might meet
+    flatten_ends(result.mesh, closed.volume,
+                 closed.ends);  // moves points without a look at what they might meet
   return result;
 }
 

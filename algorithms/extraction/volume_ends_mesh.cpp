@@ -2,16 +2,16 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "algorithms/extraction/adaptivity_field.h"
-#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/volume_ends.h"
+#include "algorithms/lattice/grid_placement.h"
 
 namespace hermesh {
 namespace {
 
-/// How near to the plane of the last samples a point counts as in it, in voxels: that much single precision may be off
-/// far from the origin, and nobody wants slivers as thin.
+/// How near to the plane of the last samples a point counts as in it, in voxels: that much single precision
+/// may be off far from the origin, and nobody wants slivers as thin.
 constexpr double kInPlane = 2e-3;
 
 /// Index coordinates of a mesh's points.
@@ -76,7 +76,8 @@ class PlaneCut {
       if (is_whole(q)) {
         mesh_.quads.push_back(q);
       } else {
-        // Cut along the diagonal between the corners 0 and 2, along which extractors mean their quads to be split.
+        // Cut along the diagonal between the corners 0 and 2, along which extractors mean their quads to be
+        // split.
         add_part({q[0], q[1], q[2]});
         add_part({q[0], q[2], q[3]});
       }
@@ -112,8 +113,8 @@ class PlaneCut {
     if (size == 4) mesh_.quads.push_back(part);
   }
 
-  /// Number of the point where the edge from a to b meets the plane, one for both polygons of the edge. It is computed
-  /// from the lower number on, so that it does not matter which polygon asks first.
+  /// Number of the point where the edge from a to b meets the plane, one for both polygons of the edge. It is
+  /// computed from the lower number on, so that it does not matter which polygon asks first.
   std::uint32_t point_between(std::uint32_t a, std::uint32_t b) {
     if (a > b) std::swap(a, b);
     const auto [entry, is_new] =
@@ -150,7 +151,8 @@ void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& end
 
 PolygonMesh open_ends(const PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends) {
   if (!ends.in_a_box)
-    throw Error("the volume's data end in no box, so that the surface cannot be left open there; use --ends closed");
+    throw Error(
+        "the volume's data end in no box, so that the surface cannot be left open there; use --ends closed");
   PolygonMesh result = mesh;
   result.attributes.clear();
   const IndexSpace space(mesh, closed);

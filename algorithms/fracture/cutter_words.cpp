@@ -9,11 +9,11 @@
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/mesh_file.h"
+#include "algorithms/core/quad_diagonals.h"
 #include "algorithms/core/value_range.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
-#include "algorithms/core/quad_diagonals.h"
+#include "algorithms/io/mesh_file.h"
 
 namespace hermesh {
 namespace {

@@ -44,7 +44,8 @@ class Cutters {
   /// sample_index().
   virtual void codes(const At& lower, std::span<CutCode, 512> codes) const = 0;
 
-  /// False if no sample of the block has the code. It may be true of other blocks, too, where that is cheaper to say.
+  /// False if no sample of the block has the code. It may be true of other blocks, too, where that is cheaper
+  /// to say.
   virtual bool may_hold(const At& /*lower*/, CutCode) const { return true; }
 
   /// The crossing of the edge from sample `at` along `axis` with the surface between two codes, `first` at

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algorithms/fracture/growing_tree.h"
 #include "algorithms/fracture/labelled_solid.h"
 #include "algorithms/fracture/mass_properties.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/piece_attributes.h"
-#include "algorithms/fracture/growing_tree.h"
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/hermite/test_lattice.h"
 
@@ -34,7 +34,8 @@ TEST(GrowingTree, GivesWhatALoopOverAllPlacesGives) {
   // Many places are equal in some coordinates, or in all.
   const auto place = [&] {
     Vector3d p;
-    for (double& x : p) x = std::floor(16.0 * random.uniform()) / 4.0 + (random.uniform() < 0.3 ? random.uniform() : 0.0);
+    for (double& x : p)
+      x = std::floor(16.0 * random.uniform()) / 4.0 + (random.uniform() < 0.3 ? random.uniform() : 0.0);
     return p;
   };
   GrowingTree tree;

@@ -92,19 +92,21 @@ bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t
 /// Marks the cutters that took nothing but slivers. A plane then has no edge left, and some sliver
 /// lay on its other side than the piece that it joined; any other cutter has no piece of its code left.
 std::vector<char> merged_cutters(const LabelledSolid& solid, const Cutters& cutters,
-                                 const std::vector<CutterRecord>& records, const std::vector<MergedPiece>& merged) {
+                                 const std::vector<CutterRecord>& records,
+                                 const std::vector<MergedPiece>& merged) {
   std::vector<char> result(records.size(), 0);
   if (cutters.plane_sides()) {
     for (std::size_t k = 0; k < records.size(); ++k)
-      result[k] = records[k].edges == 0 && std::any_of(merged.begin(), merged.end(), [&](const MergedPiece& m) {
-                    return ((m.code ^ m.into_code) >> k & 1) != 0;
-                  });
+      result[k] = records[k].edges == 0 &&
+                  std::any_of(merged.begin(), merged.end(),
+                              [&](const MergedPiece& m) { return ((m.code ^ m.into_code) >> k & 1) != 0; });
     return result;
   }
   for (const MergedPiece& m : merged)
     if (m.code < result.size()) result[m.code] = 1;
   for (std::uint32_t piece = 1; piece <= solid.piece_count(); ++piece)
-    if (const CutCode code = solid.code_values[solid.code_of[piece] - 1]; code < result.size()) result[code] = 0;
+    if (const CutCode code = solid.code_values[solid.code_of[piece] - 1]; code < result.size())
+      result[code] = 0;
   return result;
 }
 

@@ -70,8 +70,8 @@ struct LabelledFracture {
   RepairReport repair;
   /// Joints that had to have one sheet, for polygons at or beside them met others (LabelledSolid::one_sheet).
   std::uint64_t met_joints = 0;
-  /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's surface
-  /// passes (LabelledGrid).
+  /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's
+  /// surface passes (LabelledGrid).
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
   /// Faces across which the object's mesh joins two pieces that have no seam there: those at which a gap is
   /// left, and those at which the pieces touch in an edge.

@@ -9,9 +9,9 @@
 
 namespace hermesh {
 
-/// A k-d tree (Bentley 1975) with a place in each node. Places that come in no order, as scattered ones do, leave it
-/// balanced well enough: a query visits about log n nodes. Distances are those of (place - p).squaredNorm(), bit for
-/// bit: rounding is monotonic, so the distance along one axis is never above them.
+/// A k-d tree (Bentley 1975) with a place in each node. Places that come in no order, as scattered ones do,
+/// leave it balanced well enough: a query visits about log n nodes. Distances are those of (place -
+/// p).squaredNorm(), bit for bit: rounding is monotonic, so the distance along one axis is never above them.
 class GrowingTree {
  public:
   /// Adds a place; its number is the count of those before it.
@@ -45,7 +45,8 @@ class GrowingTree {
  private:
   struct Node {
     Eigen::Vector3d place;
-    std::uint32_t children[2];  ///< below the place along the node's axis, and not below; 0: none, for it is the root
+    std::uint32_t
+        children[2];  ///< below the place along the node's axis, and not below; 0: none, for it is the root
   };
   struct Open {
     std::uint32_t node;
@@ -53,7 +54,8 @@ class GrowingTree {
     double squared;  ///< lower bound of the distance to all places beneath the node
   };
 
-  /// Calls f(number, squared distance) for places until those left are farther away than what it returned last.
+  /// Calls f(number, squared distance) for places until those left are farther away than what it returned
+  /// last.
   template <class F>
   void visit(const Eigen::Vector3d& p, F&& f) const {
     if (nodes_.empty()) return;
@@ -67,7 +69,8 @@ class GrowingTree {
       reach = f(now.node, (node.place - p).squaredNorm());
       const double off = node.place[now.axis] - p[now.axis];
       const int near = off <= 0.0, next = (now.axis + 1) % 3;
-      if (node.children[1 - near]) open.push_back({node.children[1 - near], next, std::max(now.squared, off * off)});
+      if (node.children[1 - near])
+        open.push_back({node.children[1 - near], next, std::max(now.squared, off * off)});
       if (node.children[near]) open.push_back({node.children[near], next, now.squared});
     }
   }

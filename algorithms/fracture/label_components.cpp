@@ -276,8 +276,9 @@ class Components {
   RunContext& context_;
   std::vector<std::unique_ptr<Locals>> locals_;  ///< each block's components, by sample
   std::vector<std::uint32_t> first_;             ///< number of each block's first component
-  std::vector<std::uint32_t> label_, size_;      ///< label and samples of each component; of a root, the label of its set
-  std::vector<std::uint64_t> total_;             ///< samples of a set, at its root
+  std::vector<std::uint32_t> label_,
+      size_;  ///< label and samples of each component; of a root, the label of its set
+  std::vector<std::uint64_t> total_;  ///< samples of a set, at its root
   DisjointSets sets_;
 };
 

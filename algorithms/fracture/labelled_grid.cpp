@@ -143,9 +143,8 @@ std::size_t LabelledGrid::memory_bytes() const {
   std::size_t sheets = joint_sheets_.capacity() * sizeof(joint_sheets_[0]);
   for (const SheetsOfBlock& block : joint_sheets_) sheets += block.capacity() * sizeof(block[0]);
   return crossings_.capacity() * sizeof(EdgeCrossing) + sides_.capacity() * sizeof(EdgeSides) +
-         cuts_.capacity() * sizeof(cuts_[0]) + solid_.blocks.capacity() * sizeof(solid_.blocks[0]) +
-         sheets + solid_.labels.memory_bytes() +
-         solid_.codes.memory_bytes();
+         cuts_.capacity() * sizeof(cuts_[0]) + solid_.blocks.capacity() * sizeof(solid_.blocks[0]) + sheets +
+         solid_.labels.memory_bytes() + solid_.codes.memory_bytes();
 }
 
 namespace {

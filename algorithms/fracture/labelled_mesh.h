@@ -27,9 +27,9 @@ struct JointMesh {
   std::vector<Triangle> triangles;
   std::vector<EdgeSides> sides;  ///< pieces and cutter of each triangle
 
-  std::uint64_t joints = 0;          ///< cells where pieces meet
-  std::uint64_t several_sheets = 0;  ///< cells with several sheets
-  std::uint64_t fanned_edges = 0, escaped = 0;  ///< as in UniformCounts
+  std::uint64_t joints = 0;                          ///< cells where pieces meet
+  std::uint64_t several_sheets = 0;                  ///< cells with several sheets
+  std::uint64_t fanned_edges = 0, escaped = 0;       ///< as in UniformCounts
   std::vector<LabelledSolid::Place> meeting_joints;  ///< as in UniformCounts
 };
 

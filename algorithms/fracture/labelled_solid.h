@@ -52,10 +52,9 @@ struct LabelledSolid {
   /// The cutters' code of each sample: 0 outside, else 1 + its place in `code_values`. Repairs and merges
   /// change labels, never codes.
   LabelField codes;
-  std::vector<CutCode> code_values;  ///< codes that occur, ascending
-  LabelField labels;                 ///< each sample's piece, from 1 on; 0 outside
-  std::vector<std::uint32_t>
-      code_of;  ///< the code, as in `codes`, that each piece is named after; [0] is 0
+  std::vector<CutCode> code_values;    ///< codes that occur, ascending
+  LabelField labels;                   ///< each sample's piece, from 1 on; 0 outside
+  std::vector<std::uint32_t> code_of;  ///< the code, as in `codes`, that each piece is named after; [0] is 0
 
   std::uint32_t piece_count() const { return static_cast<std::uint32_t>(code_of.size()) - 1; }
   std::uint64_t samples = 0;  ///< how many samples are inside

@@ -26,14 +26,17 @@ void measure_piece(PieceOutput& piece) {
   for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {
     if ((*neighbour)[t] < 0) continue;
     auto& [triangles, area] = piece.neighbours[(*neighbour)[t]];
-    const auto at = [&](int c) { return Eigen::Vector3d(piece.mesh.points[piece.mesh.triangles[t][c]].cast<double>()); };
+    const auto at = [&](int c) {
+      return Eigen::Vector3d(piece.mesh.points[piece.mesh.triangles[t][c]].cast<double>());
+    };
     ++triangles;
     area += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
   }
 }
 
-LabelledFracture labelled_pieces(const FloatHermite& object, const Cutters& cutters, const FractureOptions& options,
-                                 const PolygonMesh* source, const HandOver& hand_over, RunContext& context) {
+LabelledFracture labelled_pieces(const FloatHermite& object, const Cutters& cutters,
+                                 const FractureOptions& options, const PolygonMesh* source,
+                                 const HandOver& hand_over, RunContext& context) {
   LabelledFracture fracture = labelled_fracture(object, cutters, options, context);
   // The edge of a cube of a voxel's volume, which a transform may have stretched.
   const double voxel = std::cbrt(std::abs(object.placement.linear.determinant()));

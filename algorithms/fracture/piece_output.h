@@ -19,7 +19,8 @@ struct PieceOutput {
   std::optional<std::uint64_t> samples;  ///< how many samples of the labelled grid are the piece's
   PolygonMesh mesh;
   MassProperties mass;
-  /// Triangles and area (square world units) of the seam with each neighbour, by its number; only of tagged pieces.
+  /// Triangles and area (square world units) of the seam with each neighbour, by its number; only of tagged
+  /// pieces.
   std::map<std::int32_t, std::pair<std::uint64_t, double>> neighbours;
   double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
 };
@@ -29,11 +30,12 @@ using HandOver = std::function<void(PieceOutput&&)>;
 /// Fills in a piece's mass and neighbours from its mesh.
 void measure_piece(PieceOutput& piece);
 
-/// Breaks an object as labelled_fracture() does and hands its pieces over, without their measures and numbers, in the order
-/// of these: with texture coordinates on the cuts and the attributes of `source`, the polygons of the object, unless that is
-/// null. What is returned has no mesh and no pieces any more.
+/// Breaks an object as labelled_fracture() does and hands its pieces over, without their measures and
+/// numbers, in the order of these: with texture coordinates on the cuts and the attributes of `source`, the
+/// polygons of the object, unless that is null. What is returned has no mesh and no pieces any more.
 /// @throws Error and Cancelled as labelled_fracture() does.
-LabelledFracture labelled_pieces(const FloatHermite& object, const Cutters& cutters, const FractureOptions& options,
-                                 const PolygonMesh* source, const HandOver& hand_over, RunContext& context);
+LabelledFracture labelled_pieces(const FloatHermite& object, const Cutters& cutters,
+                                 const FractureOptions& options, const PolygonMesh* source,
+                                 const HandOver& hand_over, RunContext& context);
 
 }  // namespace hermesh

@@ -7,8 +7,8 @@
 
 #include "algorithms/core/error.h"
 #include "algorithms/fracture/cutters.h"
-#include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/growing_tree.h"
+#include "algorithms/fracture/noise.h"
 
 namespace hermesh {
 namespace {
@@ -243,7 +243,8 @@ class VoronoiCutters : public Cutters {
     return near;
   }
 
-  /// The square of the distance from a block's middle beyond which no seed is nearest to a sample of the block.
+  /// The square of the distance from a block's middle beyond which no seed is nearest to a sample of the
+  /// block.
   double squared_reach(const Vector3d& middle) const {
     // A displaced sample is at most r = block_radius() + √3 · amplitude from the middle, for each component
     // of the displacement is at most the amplitude. Its nearest seed is no farther from it than the seed

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/growing_tree.h"
+#include "algorithms/fracture/noise.h"
 
 namespace hermesh {
 namespace {
@@ -60,7 +60,8 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
     throw Error("the solid has no sample inside, so nothing can be scattered in it: use smaller voxels");
   Random random(options.seed);
   if (count > samples.size())
-    throw Error(std::to_string(count) + " places are to be scattered in a solid of " + std::to_string(samples.size()) +
+    throw Error(std::to_string(count) + " places are to be scattered in a solid of " +
+                std::to_string(samples.size()) +
                 " samples: ask for no more places than samples, or use smaller voxels");
   std::vector<Vector3d> places;
   GrowingTree tree;

@@ -19,7 +19,8 @@ namespace {
 using Lower = std::array<std::int32_t, 3>;
 using Leaves = LargeArray<SignLeaf>;
 
-/// Leaves of each operand in a chunk, about: some 0.1 ms of work, enough for a task, and small enough to go round.
+/// Leaves of each operand in a chunk, about: some 0.1 ms of work, enough for a task, and small enough to go
+/// round.
 constexpr std::size_t kLeavesPerChunk = 512;
 constexpr std::size_t kCrossingsPerChunk = std::size_t{1} << 16;
 
@@ -39,11 +40,12 @@ bool before(const SignLeaf& leaf, const Lower& lower) { return leaf.lower < lowe
 
 /// Number of the first leaf that is not before `lower`, of all of them.
 std::size_t first_not_before(const Leaves& leaves, const Lower& lower) {
-  return static_cast<std::size_t>(std::lower_bound(leaves.begin(), leaves.end(), lower, before) - leaves.begin());
+  return static_cast<std::size_t>(std::lower_bound(leaves.begin(), leaves.end(), lower, before) -
+                                  leaves.begin());
 }
 
-/// Number of the first of the leaves `begin` to `end` that is not before `lower`, by doubling steps and then halving:
-/// the time grows with the logarithm of the distance to the answer.
+/// Number of the first of the leaves `begin` to `end` that is not before `lower`, by doubling steps and then
+/// halving: the time grows with the logarithm of the distance to the answer.
 std::size_t first_not_before(const Leaves& leaves, std::size_t begin, std::size_t end, const Lower& lower) {
   std::size_t step = 1;
   while (begin + step < end && leaves[begin + step].lower < lower) {
@@ -52,11 +54,13 @@ std::size_t first_not_before(const Leaves& leaves, std::size_t begin, std::size_
   }
   const auto first = leaves.begin();
   const auto last = first + static_cast<std::ptrdiff_t>(std::min(begin + step, end));
-  return static_cast<std::size_t>(std::lower_bound(first + static_cast<std::ptrdiff_t>(begin), last, lower, before) -
-                                  first);
+  return static_cast<std::size_t>(
+      std::lower_bound(first + static_cast<std::ptrdiff_t>(begin), last, lower, before) - first);
 }
 
-bool same_column(const SignLeaf& a, const SignLeaf& b) { return a.lower[0] == b.lower[0] && a.lower[1] == b.lower[1]; }
+bool same_column(const SignLeaf& a, const SignLeaf& b) {
+  return a.lower[0] == b.lower[0] && a.lower[1] == b.lower[1];
+}
 
 template <class Crossing>
 std::size_t first_crossing(const SparseHermite<Crossing>& hermite, std::size_t leaf) {
@@ -77,12 +81,14 @@ void turn(SignLeaf& leaf) {
   for (std::uint64_t& word : leaf.beyond) word = ~word;
 }
 
-/// Number of crossed edges of a leaf: the sum of the set bits of 24 words, counted by byte: 8 a word make 192 at most.
+/// Number of crossed edges of a leaf: the sum of the set bits of 24 words, counted by byte: 8 a word make 192
+/// at most.
 std::uint32_t count_crossings(const SignLeaf& leaf) {
   std::uint64_t bytes = 0;
   for (const BlockMask& axis : crossing_edges(leaf))
     for (std::uint64_t word : axis) {
-      // Bits are added in pairs, fours and bytes, side by side; bytes are not added across until all words are in.
+      // Bits are added in pairs, fours and bytes, side by side; bytes are not added across until all words
+      // are in.
       word -= (word >> 1) & 0x5555555555555555u;
       word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
       bytes += (word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu;
@@ -93,8 +99,8 @@ std::uint32_t count_crossings(const SignLeaf& leaf) {
   return static_cast<std::uint32_t>((pairs * 0x0001000100010001u) >> 48);
 }
 
-/// Count – scan – fill over chunks of whole columns. The first pass merges the two sequences of leaves into runs that
-/// come from one operand or from both, and counts; the second writes.
+/// Count – scan – fill over chunks of whole columns. The first pass merges the two sequences of leaves into
+/// runs that come from one operand or from both, and counts; the second writes.
 template <class Code>
 class Combination {
  public:
@@ -108,8 +114,8 @@ class Combination {
     result.placement = a_.placement;
     result.normal_code = a_.normal_code;
     result.outermost_inside = (rule_.inside(a_.outermost_inside, b_.outermost_inside) & 1) != 0;
-    // Count: chunks are merged side by side. A chunk is whole columns, since what a missing leaf means is told by the
-    // leaf before it in its column and by no other.
+    // Count: chunks are merged side by side. A chunk is whole columns, since what a missing leaf means is
+    // told by the leaf before it in its column and by no other.
     std::vector<Chunk> chunks = chunks_of_columns();
     parallel_tasks(chunks.size(), context, [&](std::size_t i) { merge(chunks[i]); });
     // Scan: chunks are in order, so the sums of those before a chunk say where its part of the result begins.
@@ -138,7 +144,8 @@ class Combination {
   struct Chunk {
     std::size_t a_begin, a_end, b_begin, b_end;
     std::vector<Run> runs;
-    std::size_t leaves = 0, crossings = 0;  ///< sizes of its part of the result, then sums of the chunks before
+    std::size_t leaves = 0,
+                crossings = 0;  ///< sizes of its part of the result, then sums of the chunks before
   };
 
   /// Chunks of both operands, cut at the columns of every 512th leaf of either operand.
@@ -153,8 +160,8 @@ class Combination {
     std::sort(cuts.begin(), cuts.end());
     cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
     std::vector<Chunk> chunks(cuts.size());
-    // From the back, where the end of a chunk is the beginning of the next one. The first cut is at the first leaf of
-    // either operand, so no leaf is left out.
+    // From the back, where the end of a chunk is the beginning of the next one. The first cut is at the first
+    // leaf of either operand, so no leaf is left out.
     std::size_t a_end = a_.leaves.size(), b_end = b_.leaves.size();
     for (std::size_t i = cuts.size(); i-- > 0;) {
       chunks[i].a_end = a_end, chunks[i].b_end = b_end;
@@ -168,17 +175,19 @@ class Combination {
     std::size_t i = chunk.a_begin, j = chunk.b_begin;
     while (i < chunk.a_end || j < chunk.b_end) {
       const bool a_ends = i == chunk.a_end, b_ends = j == chunk.b_end;
-      // Leaves at one place are combined sample by sample; a run of leaves of one operand, up to the next leaf of the
-      // other, is kept or dropped as a whole.
+      // Leaves at one place are combined sample by sample; a run of leaves of one operand, up to the next
+      // leaf of the other, is kept or dropped as a whole.
       if (!a_ends && !b_ends && a_.leaves[i].lower == b_.leaves[j].lower) {
         add_both(chunk, i++, j++);
       } else if (b_ends || (!a_ends && a_.leaves[i].lower < b_.leaves[j].lower)) {
-        const std::size_t end = b_ends ? chunk.a_end : first_not_before(a_.leaves, i, chunk.a_end, b_.leaves[j].lower);
+        const std::size_t end =
+            b_ends ? chunk.a_end : first_not_before(a_.leaves, i, chunk.a_end, b_.leaves[j].lower);
         const SignLeaf* last_of_b = j > chunk.b_begin ? &b_.leaves[j - 1] : nullptr;
         add_from_one(chunk, From::a, a_, i, end, last_of_b, b_.outermost_inside);
         i = end;
       } else {
-        const std::size_t end = a_ends ? chunk.b_end : first_not_before(b_.leaves, j, chunk.b_end, a_.leaves[i].lower);
+        const std::size_t end =
+            a_ends ? chunk.b_end : first_not_before(b_.leaves, j, chunk.b_end, a_.leaves[i].lower);
         const SignLeaf* last_of_a = i > chunk.a_begin ? &a_.leaves[i - 1] : nullptr;
         add_from_one(chunk, From::b, b_, j, end, last_of_a, a_.outermost_inside);
         j = end;
@@ -186,18 +195,18 @@ class Combination {
     }
   }
 
-  /// Leaves `begin` to `end` of one operand, where the other has none. In the column of the other's last leaf before
-  /// them it has the sign that this leaf leaves behind, and further on that of infinity.
+  /// Leaves `begin` to `end` of one operand, where the other has none. In the column of the other's last leaf
+  /// before them it has the sign that this leaf leaves behind, and further on that of infinity.
   void add_from_one(Chunk& chunk, From from, const Hermite& own, std::size_t begin, std::size_t end,
                     const SignLeaf* last_of_other, bool outermost) const {
     std::size_t end_of_column = begin;
     if (last_of_other && same_column(*last_of_other, own.leaves[begin])) {
       const Lower& lower = own.leaves[begin].lower;
       // No leaf starts at the greatest integer, which is no multiple of 8.
-      end_of_column =
-          first_not_before(own.leaves, begin, end, {lower[0], lower[1], std::numeric_limits<std::int32_t>::max()});
-      // Behind its last leaf in the column all samples of the other operand have one sign, the same over the whole
-      // layer.
+      end_of_column = first_not_before(own.leaves, begin, end,
+                                       {lower[0], lower[1], std::numeric_limits<std::int32_t>::max()});
+      // Behind its last leaf in the column all samples of the other operand have one sign, the same over the
+      // whole layer.
       const bool sign = (last_of_other->beyond[2] & 1) != 0;
       if (keeps(from, sign)) add_run(chunk, from, own, begin, end_of_column);
     }
@@ -253,10 +262,11 @@ class Combination {
     }
   }
 
-  static std::size_t write_one(const Hermite& from, std::size_t begin, std::size_t count, bool turned, SignLeaf* leaf,
-                               Crossing* crossings, std::size_t first) {
+  static std::size_t write_one(const Hermite& from, std::size_t begin, std::size_t count, bool turned,
+                               SignLeaf* leaf, Crossing* crossings, std::size_t first) {
     const std::size_t source = first_crossing(from, begin), end = first_crossing(from, begin + count);
-    // Unless it is turned about, the run is copied as it is; the numbers of first crossings move by one constant.
+    // Unless it is turned about, the run is copied as it is; the numbers of first crossings move by one
+    // constant.
     std::memcpy(leaf, from.leaves.data() + begin, count * sizeof(SignLeaf));
     // Modulo 2³²: the sum is right whichever of the two is greater.
     const auto shift = static_cast<std::uint32_t>(first - source);
@@ -266,13 +276,15 @@ class Combination {
     }
     if (turned)
       std::transform(from.crossings.begin() + static_cast<std::ptrdiff_t>(source),
-                     from.crossings.begin() + static_cast<std::ptrdiff_t>(end), crossings + first, Code::negated);
+                     from.crossings.begin() + static_cast<std::ptrdiff_t>(end), crossings + first,
+                     Code::negated);
     else if (end > source)
       std::memcpy(crossings + first, from.crossings.data() + source, (end - source) * sizeof(Crossing));
     return first + (end - source);
   }
 
-  std::size_t write_both(std::size_t i, std::size_t j, SignLeaf& leaf, Crossing* crossings, std::size_t first) const {
+  std::size_t write_both(std::size_t i, std::size_t j, SignLeaf& leaf, Crossing* crossings,
+                         std::size_t first) const {
     leaf = combined_signs(rule_, a_.leaves[i], b_.leaves[j]);
     leaf.first = static_cast<std::uint32_t>(first);
     const std::array<BlockMask, 3> edges = crossing_edges(leaf), edges_a = crossing_edges(a_.leaves[i]),
@@ -289,10 +301,10 @@ class Combination {
     const Crossing *a, *b;
   };
 
-  /// Writes the crossings of the 64 edges of one word: crossed by `a`, by `b`, in the result; and the result's signs at
-  /// their first samples.
-  Crossing* write_edges(Sources& from, std::uint64_t a, std::uint64_t b, std::uint64_t kept, std::uint64_t inside,
-                        Crossing* to) const {
+  /// Writes the crossings of the 64 edges of one word: crossed by `a`, by `b`, in the result; and the
+  /// result's signs at their first samples.
+  Crossing* write_edges(Sources& from, std::uint64_t a, std::uint64_t b, std::uint64_t kept,
+                        std::uint64_t inside, Crossing* to) const {
     // No edge of the word is in the result: the crossings of both operands are passed over by their number.
     if (kept == 0) {
       from.a += std::popcount(a);
@@ -310,8 +322,8 @@ class Combination {
     return to;
   }
 
-  /// The crossing that the result takes. Which operands cross an edge is as good as random, so nothing is branched on
-  /// but equal offsets.
+  /// The crossing that the result takes. Which operands cross an edge is as good as random, so nothing is
+  /// branched on but equal offsets.
   Crossing taken(const Sources& from, bool in_a, bool in_b, bool first_inside) const {
     // If one operand crosses the edge, its crossing stands for the other's, which is not looked at.
     const Crossing* const of_a = in_a ? from.a : from.b;
@@ -334,7 +346,8 @@ auto with_crossing_code(const SparseHermite<Crossing>& hermite, F&& f) {
   if constexpr (std::is_same_v<Crossing, EdgeCrossing>)
     return f(FloatCrossingCode{});
   else
-    return with_normal_code(hermite.normal_code, [&](auto code) { return f(PackedCrossingCode<decltype(code)>{}); });
+    return with_normal_code(hermite.normal_code,
+                            [&](auto code) { return f(PackedCrossingCode<decltype(code)>{}); });
 }
 
 template <class Crossing>
@@ -349,11 +362,12 @@ void check_comparable(const SparseHermite<Crossing>& a, const SparseHermite<Cros
 }  // namespace
 
 template <class Crossing>
-SparseHermite<Crossing> combine(Boolean boolean, const SparseHermite<Crossing>& a, const SparseHermite<Crossing>& b,
-                                RunContext& context) {
+SparseHermite<Crossing> combine(Boolean boolean, const SparseHermite<Crossing>& a,
+                                const SparseHermite<Crossing>& b, RunContext& context) {
   check_comparable(a, b);
   Stage stage(context, "combine Hermite data");
-  return with_crossing_code(a, [&](auto code) { return Combination<decltype(code)>(boolean, a, b).result(context); });
+  return with_crossing_code(
+      a, [&](auto code) { return Combination<decltype(code)>(boolean, a, b).result(context); });
 }
 
 template <class Crossing>
@@ -369,7 +383,8 @@ SparseHermite<Crossing> complement(SparseHermite<Crossing> hermite, RunContext& 
       });
     };
     in_chunks(hermite.leaves, kLeavesPerChunk, turn);
-    in_chunks(hermite.crossings, kCrossingsPerChunk, [](Crossing& crossing) { crossing = Code::negated(crossing); });
+    in_chunks(hermite.crossings, kCrossingsPerChunk,
+              [](Crossing& crossing) { crossing = Code::negated(crossing); });
   });
   return hermite;
 }

@@ -43,7 +43,8 @@ void randomize(std::mt19937& random, NormalCodeId code, PackedCrossing& crossing
 void randomize(std::mt19937& random, NormalCodeId, EdgeCrossing& crossing) {
   const float offsets[] = {0.0f, 0.5f, 1.0f, std::uniform_real_distribution<float>()(random)};
   // The zeros of either sign are the same normal, but not the same bytes.
-  const std::array<float, 3> normals[] = {{0, 0, 1}, {-0.0f, 0, 1}, {0, -0.0f, -1}, {0.6f, 0, 0.8f}, {0.6f, -0.8f, 0}};
+  const std::array<float, 3> normals[] = {
+      {0, 0, 1}, {-0.0f, 0, 1}, {0, -0.0f, -1}, {0.6f, 0, 0.8f}, {0.6f, -0.8f, 0}};
   crossing = {offsets[random() % 4], normals[random() % 5]};
 }
 
@@ -108,7 +109,8 @@ template <class Crossing>
 Crossing oracle_choice(bool unites, bool leaves_solid, std::vector<Crossing> candidates, NormalCodeId code) {
   const auto better = [&](const Crossing& first, const Crossing& second) {
     const OracleCrossing a = unpacked(first, code), b = unpacked(second, code);
-    const double inside_a = leaves_solid ? a.offset : 1 - a.offset, inside_b = leaves_solid ? b.offset : 1 - b.offset;
+    const double inside_a = leaves_solid ? a.offset : 1 - a.offset,
+                 inside_b = leaves_solid ? b.offset : 1 - b.offset;
     if (a.offset != b.offset) return unites ? inside_a > inside_b : inside_a < inside_b;
     if (a.order != b.order) return unites ? a.order < b.order : a.order > b.order;
     return a.tag < b.tag;
@@ -195,7 +197,8 @@ TYPED_TEST(Combine, AgreesWithTheOracleOnRandomVoxels) {
   std::mt19937 random(7);
   for (const NormalCodeId code : kNormalCodes)
     for (const Boolean boolean : kBooleans) {
-      const auto a = random_lattice<TypeParam>(random, 24, code), b = random_lattice<TypeParam>(random, 24, code);
+      const auto a = random_lattice<TypeParam>(random, 24, code),
+                 b = random_lattice<TypeParam>(random, 24, code);
       const auto result = this->run(boolean, to_sparse(a, code), to_sparse(b, code));
       const auto expected = to_sparse(oracle(boolean, a, b, code), code);  // 13,824 voxels
       EXPECT_TRUE(same(result, expected)) << int(boolean) << ' ' << name(code);
@@ -207,7 +210,9 @@ TYPED_TEST(Combine, LawsHoldForRandomVoxels) {
   std::mt19937 random(8);
   for (int trial = 0; trial < 8; ++trial) {
     const NormalCodeId code = kNormalCodes[trial % kNormalCodes.size()];
-    const auto make = [&] { return to_sparse(random_lattice<TypeParam>(random, 16 + 8 * (trial % 2), code), code); };
+    const auto make = [&] {
+      return to_sparse(random_lattice<TypeParam>(random, 16 + 8 * (trial % 2), code), code);
+    };
     const auto a = make(), b = make(), c = make();
     this->expect_laws(a, b, c);
   }
@@ -242,7 +247,8 @@ TYPED_TEST(Combine, TheSameBytesForEveryNumberOfThreads) {
   for (const Boolean boolean : kBooleans) {
     const auto expected = to_sparse(oracle(boolean, a, b, NormalCodeId::octahedral));
     for (const int threads : {1, 2, 5}) {
-      tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+      tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                static_cast<std::size_t>(threads));
       EXPECT_TRUE(same(this->run(boolean, sparse_a, sparse_b), expected)) << threads;
     }
   }
@@ -378,7 +384,8 @@ TEST(CombineByHand, TheIntersectionIsNotDistributive) {
     });
     return to_sparse(lattice);
   };
-  const PackedHermite a = along_x(true, false, 900), b = along_x(true, false, 500), c = along_x(false, true, 200);
+  const PackedHermite a = along_x(true, false, 900), b = along_x(true, false, 500),
+                      c = along_x(false, true, 200);
   const auto outer = combine(Boolean::intersect, a, combine(Boolean::unite, b, c, context), context);
   const auto inner = combine(Boolean::unite, combine(Boolean::intersect, a, b, context),
                              combine(Boolean::intersect, a, c, context), context);

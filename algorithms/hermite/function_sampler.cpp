@@ -1,5 +1,4 @@
 #include <boost/math/tools/roots.hpp>
-
 #include <cmath>
 #include <vector>
 
@@ -22,8 +21,9 @@ class FunctionSampler {
   FunctionSampler(const AnalyticSurface& surface, const IndexToWorld& placement, const Lower& lower,
                   const Lower& upper, double tolerance)
       : surface_(surface), placement_(placement), lower_(lower), upper_(upper), tolerance_(tolerance) {
-    // The farthest sample that a leaf looks at lies 4 voxels from its center along each axis, 4.5 to be sure. If the
-    // value at the center is larger than such a way times the slope, none of these samples can have the other sign.
+    // The farthest sample that a leaf looks at lies 4 voxels from its center along each axis, 4.5 to be sure.
+    // If the value at the center is larger than such a way times the slope, none of these samples can have
+    // the other sign.
     reach_ = surface.lipschitz * 4.5 * placement.linear.colwise().norm().sum();
   }
 
@@ -38,8 +38,8 @@ class FunctionSampler {
     for (int x = 0; x < 9; ++x)
       for (int y = 0; y < 9; ++y)
         for (int z = 0; z < 9; ++z) {
-          // Of the samples beyond the leaf only those of the three layers next to it, without the edges where layers
-          // meet: no edge of the leaf ends there.
+          // Of the samples beyond the leaf only those of the three layers next to it, without the edges where
+          // layers meet: no edge of the leaf ends there.
           const int beyond = (x == 8) + (y == 8) + (z == 8);
           if (beyond > 1 || !is_inside({leaf.lower[0] + x, leaf.lower[1] + y, leaf.lower[2] + z})) continue;
           if (x == 8)
@@ -72,7 +72,8 @@ class FunctionSampler {
       border = border || index[a] == lower_[a] || index[a] == upper_[a];
     }
     const double value = surface_.value(world(index, Eigen::Vector3d::Zero()));
-    if (std::isnan(value)) throw Error("the function has no value at a sample; leave such places out of the box");
+    if (std::isnan(value))
+      throw Error("the function has no value at a sample; leave such places out of the box");
     if (value < 0 && border)
       throw Error("the function is negative on the border of the box; make the box larger");
     return value < 0;
@@ -82,8 +83,8 @@ class FunctionSampler {
     const Lower start{leaf.lower[0] + (i >> 6), leaf.lower[1] + ((i >> 3) & 7), leaf.lower[2] + (i & 7)};
     const auto at = [&](double offset) { return world(start, offset * Eigen::Vector3d::Unit(axis)); };
     const auto value = [&](double offset) { return surface_.value(at(offset)); };
-    // TOMS 748 (Alefeld, Potra & Shi 1995) keeps a bracket: the ends of the edge have different signs, so it converges
-    // whatever the function is like. 200 steps are more than halving alone would need.
+    // TOMS 748 (Alefeld, Potra & Shi 1995) keeps a bracket: the ends of the edge have different signs, so it
+    // converges whatever the function is like. 200 steps are more than halving alone would need.
     std::uintmax_t steps = 200;
     const auto close = [&](double a, double b) { return b - a <= tolerance_; };
     const auto [a, b] = boost::math::tools::toms748_solve(value, 0.0, 1.0, close, steps);
@@ -108,12 +109,13 @@ std::uint64_t first_layer(const BlockMask& inside, int axis) {
   if (axis == 0) return inside[0];
   std::uint64_t bits = 0;
   for (std::size_t x = 0; x < 8; ++x)
-    for (int i = 0; i < 8; ++i) bits |= (inside[x] >> (axis == 1 ? i : 8 * i) & 1) << (8 * x + std::size_t(i));
+    for (int i = 0; i < 8; ++i)
+      bits |= (inside[x] >> (axis == 1 ? i : 8 * i) & 1) << (8 * x + std::size_t(i));
   return bits;
 }
 
-/// Refuses data of which a leaf is missing that owns a crossing edge: a block was passed over whose function is steeper
-/// than was said. Whoever read such data would look for crossings that are not there.
+/// Refuses data of which a leaf is missing that owns a crossing edge: a block was passed over whose function
+/// is steeper than was said. Whoever read such data would look for crossings that are not there.
 void check_complete(const FloatHermite& hermite) {
   for (const SignLeaf& leaf : hermite.leaves)
     for (int axis = 0; axis < 3; ++axis)
@@ -123,27 +125,31 @@ void check_complete(const FloatHermite& hermite) {
         if (hermite.find(next)) continue;
         const std::uint64_t seen = way < 0 ? first_layer(leaf.inside, axis) : leaf.beyond[axis];
         if (seen != (hermite.sign_without_leaf(next) ? ~std::uint64_t{0} : 0))
-          throw Error("the function changes its sign in a block that it seems far from: it is steeper than the bound of its "
-                      "slope says");
+          throw Error(
+              "the function changes its sign in a block that it seems far from: it is steeper than the bound "
+              "of its "
+              "slope says");
       }
 }
 
 }  // namespace
 
-FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld& placement, const Lower& lower,
-                             const Lower& upper, double tolerance, RunContext& context) {
+FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld& placement,
+                             const Lower& lower, const Lower& upper, double tolerance, RunContext& context) {
   Stage stage(context, "Hermite data from a function");
-  if (!(tolerance > 0) || !(surface.lipschitz > 0)) throw Error("the tolerance and the slope's bound must be positive");
+  if (!(tolerance > 0) || !(surface.lipschitz > 0))
+    throw Error("the tolerance and the slope's bound must be positive");
   // Blocks that the box touches, and those that own an edge into it.
   Lower first{}, leaves{};
   for (int a = 0; a < 3; ++a) {
     if (lower[a] > upper[a]) throw Error("the box to be sampled is empty");
-    first[a] = (lower[a] - 1) & ~7;  // the edge that leads to the box's first sample starts one step before it
+    first[a] =
+        (lower[a] - 1) & ~7;  // the edge that leads to the box's first sample starts one step before it
     leaves[a] = (((upper[a] & ~7) - first[a]) >> 3) + 1;
   }
   const FunctionSampler sampler(surface, placement, lower, upper, tolerance);
-  // A layer of leaves of one x for each task. Candidates come in ascending order within a layer, and layers are joined
-  // in order, whatever thread made them.
+  // A layer of leaves of one x for each task. Candidates come in ascending order within a layer, and layers
+  // are joined in order, whatever thread made them.
   std::vector<std::vector<Candidate>> layers(static_cast<std::size_t>(leaves[0]));
   parallel_blocks(layers.size(), context, [&](std::size_t x) {
     for (std::int32_t y = 0; y < leaves[1]; ++y)

@@ -53,7 +53,8 @@ TEST(FunctionSampler, ASteepAndCurvedFunctionIsBracketedToTheTolerance) {
   for (const double tolerance : {1e-2, 1e-4, 1e-6})
     for_each_hit(sample_function(steep, lattice(0.25), {-8, -8, -8}, {8, 8, 8}, tolerance, context),
                  [&](const Vector3d& at, const Vector3d&) {
-                   // Along the edge the error is at most the tolerance; the distance to the sphere is no larger.
+                   // Along the edge the error is at most the tolerance; the distance to the sphere is no
+                   // larger.
                    ASSERT_LE(std::abs(at.norm() - 1.03), 0.25 * tolerance + 1e-7);
                  });
 }
@@ -87,14 +88,17 @@ TEST(FunctionSampler, FarFromTheOriginNothingIsLost) {
 TEST(FunctionSampler, RefusesWhatItCannotClose) {
   RunContext context;
   const auto sample = [&](const AnalyticSurface& surface, int half, double tolerance) {
-    return sample_function(surface, lattice(1.0), {-half, -half, -half}, {half, half, half}, tolerance, context);
+    return sample_function(surface, lattice(1.0), {-half, -half, -half}, {half, half, half}, tolerance,
+                           context);
   };
   EXPECT_THROW(sample(sphere(Vector3d::Zero(), 10.0), 9, 1e-6), Error);  // reaches the border
   EXPECT_THROW(sample(sphere(Vector3d::Zero(), 3.0), -1, 1e-6), Error);  // an empty box
   EXPECT_THROW(sample(sphere(Vector3d::Zero(), 3.0), 9, 0.0), Error);
-  const AnalyticSurface nowhere{[](const Vector3d&) { return std::nan(""); }, [](const Vector3d& p) { return p; }};
+  const AnalyticSurface nowhere{[](const Vector3d&) { return std::nan(""); },
+                                [](const Vector3d& p) { return p; }};
   EXPECT_THROW(sample(nowhere, 9, 1e-6), Error);
-  // Steeper than it says: blocks that the surface passes through would be passed over, and the data would be in pieces.
+  // Steeper than it says: blocks that the surface passes through would be passed over, and the data would be
+  // in pieces.
   AnalyticSurface steep = sphere(Vector3d::Zero(), 30.0);
   steep.value = [](const Vector3d& p) { return 4.0 * (p.norm() - 30.0); };
   EXPECT_THROW(sample(steep, 40, 1e-6), Error);
@@ -107,8 +111,8 @@ TEST(FunctionSampler, SameBytesAtAnyThreadCount) {
   RunContext context;
   const auto make = [&](int threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-    return sample_function(sphere(Vector3d(0.1, 0.2, 0.3), 20.0), lattice(1.0), {-30, -30, -30}, {30, 30, 30}, 1e-6,
-                           context);
+    return sample_function(sphere(Vector3d(0.1, 0.2, 0.3), 20.0), lattice(1.0), {-30, -30, -30}, {30, 30, 30},
+                           1e-6, context);
   };
   const FloatHermite one = make(1);
   for (const int threads : {2, 7}) {

@@ -6,9 +6,9 @@
 #include <type_traits>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/vdb_archive.h"
 #include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/sign_tree.h"
+#include "algorithms/io/vdb_archive.h"
 
 namespace hermesh {
 namespace {
@@ -25,15 +25,16 @@ constexpr const char *kDense = "hermite", *kSigns = "hermite_signs", *kCrossings
 constexpr const char* kNormals = "unit vectors in index space, towards the outside";
 constexpr std::size_t kPerLeaf = 512;
 
-// The names of the metadata. The last three are how a placement divides its translation, so that the same meshes are
-// made from a file as from what was written to it.
+// The names of the metadata. The last three are how a placement divides its translation, so that the same
+// meshes are made from a file as from what was written to it.
 constexpr const char *kVersionKey = "hermesh_hermite_version", *kCodeKey = "hermesh_normal_code",
                      *kNormalsKey = "hermesh_normals", *kOffsetKey = "hermesh_placement_offset",
                      *kOriginKey = "hermesh_placement_origin", *kBaseKey = "hermesh_placement_base";
 
 openvdb::Vec3d to_vdb(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-void describe(openvdb::GridBase& grid, const char* name, const IndexToWorld& placement, const std::string& code) {
+void describe(openvdb::GridBase& grid, const char* name, const IndexToWorld& placement,
+              const std::string& code) {
   grid.setName(name);
   grid.setTransform(transform_of(placement));
   grid.insertMeta(kVersionKey, openvdb::Int32Metadata(kVersion));
@@ -41,11 +42,12 @@ void describe(openvdb::GridBase& grid, const char* name, const IndexToWorld& pla
   grid.insertMeta(kNormalsKey, openvdb::StringMetadata(kNormals));
   grid.insertMeta(kOffsetKey, openvdb::Vec3DMetadata(to_vdb(placement.offset)));
   grid.insertMeta(kOriginKey, openvdb::Vec3DMetadata(to_vdb(placement.origin)));
-  grid.insertMeta(kBaseKey, openvdb::Vec3IMetadata({placement.base[0], placement.base[1], placement.base[2]}));
+  grid.insertMeta(kBaseKey,
+                  openvdb::Vec3IMetadata({placement.base[0], placement.base[1], placement.base[2]}));
 }
 
-/// Placement of a grid that was read. The transform is what counts, for other programs may have changed it; the
-/// metadata only divide its translation.
+/// Placement of a grid that was read. The transform is what counts, for other programs may have changed it;
+/// the metadata only divide its translation.
 IndexToWorld placement_of(const openvdb::GridBase& grid) {
   if (!grid.transform().isLinear()) throw Error("the Hermite data have a perspective transform");
   const openvdb::Mat4R matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
@@ -137,7 +139,8 @@ void read_crossings(const Int32Tree& tree, LargeArray<PackedCrossing>& crossings
       // A leaf whose records are all equal may have become a tile on its way through another program.
       const bool active =
           leaf ? leaf->probeValue(place, value)
-               : tree.probeValue(leaf_of_crossings(i) + Int32Tree::LeafNodeType::offsetToLocalCoord(place), value);
+               : tree.probeValue(leaf_of_crossings(i) + Int32Tree::LeafNodeType::offsetToLocalCoord(place),
+                                 value);
       if (!active) throw wrong();
       const auto bits = std::bit_cast<std::uint32_t>(value);
       crossings[n] = {static_cast<std::uint16_t>(bits), static_cast<std::uint16_t>(bits >> 16)};
@@ -162,8 +165,8 @@ PackedHermite read_packed(VdbReader& file, RunContext& context) {
   // Both grids say it, so that each is known for what it is by itself.
   if (check_description(*crossings) != code) throw Error("the Hermite data name two codes of normals");
   hermite.placement = placement_of(*signs);
-  // The signs come first and decide how many crossings there are; then the crossings; then all is held against itself,
-  // as for any data from outside.
+  // The signs come first and decide how many crossings there are; then the crossings; then all is held
+  // against itself, as for any data from outside.
   sign_tree::read_signs(signs->tree(), hermite, context, is_inside);
   read_crossings(crossings->tree(), hermite.crossings, context);
   check_consistent(hermite);
@@ -173,7 +176,8 @@ PackedHermite read_packed(VdbReader& file, RunContext& context) {
 }
 
 template <class Voxel>
-bool read_dense_as(const openvdb::GridBase::Ptr& grid, RunContext& context, std::optional<AnyHermite>& result) {
+bool read_dense_as(const openvdb::GridBase::Ptr& grid, RunContext& context,
+                   std::optional<AnyHermite>& result) {
   const auto typed = openvdb::gridPtrCast<DenseGrid<Voxel>>(grid);
   if (!typed) return false;
   DenseHermite<Voxel> hermite{
@@ -193,8 +197,10 @@ AnyHermite read_dense(VdbReader& file, RunContext& context) {
   const openvdb::GridBase::Ptr grid = file.read(kDense);
   std::optional<AnyHermite> result;
   // The type of the grid tells which layout it is; the first that fits reads it.
-  if (!(read_dense_as<FixedVoxel>(grid, context, result) || read_dense_as<ThesisVoxel>(grid, context, result) ||
-        read_dense_as<DirectedVoxel>(grid, context, result) || read_dense_as<FloatVoxel>(grid, context, result)))
+  if (!(read_dense_as<FixedVoxel>(grid, context, result) ||
+        read_dense_as<ThesisVoxel>(grid, context, result) ||
+        read_dense_as<DirectedVoxel>(grid, context, result) ||
+        read_dense_as<FloatVoxel>(grid, context, result)))
     throw Error("the grid '" + std::string(kDense) + "' has values of another type");
   return *std::move(result);
 }

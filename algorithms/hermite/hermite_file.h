@@ -1,17 +1,20 @@
 // Hermite data in .vdb files.
 //
-// Dense grids are written as they are, under the name `hermite`: one grid of a type that only this program knows.
+// Dense grids are written as they are, under the name `hermite`: one grid of a type that only this program
+// knows.
 //
 // Packed data are written as two grids of OpenVDB's own types, so that any tool opens the file:
-//   hermite_signs      bool: the sign of every sample, true inside; a sample is active if it owns a crossing edge
-//                      (an edge to the next sample along x, y or z with another sign), so that no leaf that does
-//                      is uniform, and pruning changes nothing
-//   hermite_crossings  int32: crossing number n at voxel (8⌊n/512⌋ + i, j, k) with 64i + 8j + k = n mod 512, leaf
+//   hermite_signs      bool: the sign of every sample, true inside; a sample is active if it owns a crossing
+//   edge
+//                      (an edge to the next sample along x, y or z with another sign), so that no leaf that
+//                      does is uniform, and pruning changes nothing
+//   hermite_crossings  int32: crossing number n at voxel (8⌊n/512⌋ + i, j, k) with 64i + 8j + k = n mod 512,
+//   leaf
 //                      after leaf along x. Bits 0 to 15 are the normal, 16 to 25 the offset, 26 to 31 the tag
-//                      (PackedCrossing). Crossings are numbered by leaf in ascending order of (x, y, z), in it by axis,
-//                      in that by sample.
-// All grids say in their metadata what version of this they are, what code their normals are in, and that these are
-// unit vectors of index space, towards the outside.
+//                      (PackedCrossing). Crossings are numbered by leaf in ascending order of (x, y, z), in
+//                      it by axis, in that by sample.
+// All grids say in their metadata what version of this they are, what code their normals are in, and that
+// these are unit vectors of index space, towards the outside.
 #pragma once
 
 #include <filesystem>
@@ -27,13 +30,14 @@ using AnyHermite = std::variant<PackedHermite, FixedDense, ThesisDense, Directed
 /// Writes the data aside, then renames. @throws Error if the path cannot be written.
 void write_hermite(const std::filesystem::path& path, const PackedHermite& hermite, RunContext& context);
 template <DenseVoxel Voxel>
-void write_hermite(const std::filesystem::path& path, const DenseHermite<Voxel>& hermite, RunContext& context);
+void write_hermite(const std::filesystem::path& path, const DenseHermite<Voxel>& hermite,
+                   RunContext& context);
 /// Writes the data as FloatVoxel, which loses nothing. @throws Error if the path cannot be written.
 void write_hermite(const std::filesystem::path& path, const FloatHermite& hermite, RunContext& context);
 
-/// Reads what write_hermite() wrote, bit by bit the same. @throws Error, in one sentence about the file, for one that
-/// is missing, truncated, no .vdb, without Hermite data or with such of another version, and if the data contradict
-/// themselves as check_consistent() tells.
+/// Reads what write_hermite() wrote, bit by bit the same. @throws Error, in one sentence about the file, for
+/// one that is missing, truncated, no .vdb, without Hermite data or with such of another version, and if the
+/// data contradict themselves as check_consistent() tells.
 AnyHermite read_hermite(const std::filesystem::path& path, RunContext& context);
 
 /// What Hermite data take, and in what form.

@@ -8,9 +8,9 @@
 #include <fstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/test_lattice.h"
+#include "algorithms/io/vdb_file.h"
 
 namespace hermesh {
 namespace {
@@ -53,7 +53,8 @@ class HermiteFile : public testing::Test {
     std::mt19937 random(seed);
     PackedHermite packed = pack(to_sparse(sample_solid(random_blobs(random))), code, context_);
     for (std::size_t i = 0; i < packed.crossings.size(); ++i)
-      packed.crossings[i].offset_and_tag = static_cast<std::uint16_t>(packed.crossings[i].offset() | (i % 64) << 10);
+      packed.crossings[i].offset_and_tag =
+          static_cast<std::uint16_t>(packed.crossings[i].offset() | (i % 64) << 10);
     packed.placement = odd_placement();
     return packed;
   }
@@ -186,7 +187,8 @@ TEST_F(HermiteFile, PackedFilesAreAsDescribed) {
   ASSERT_TRUE(signs && crossings);
   lattice.for_each_sample([&](int x, int y, int z) {
     bool crossed = false;
-    for (int axis = 0; axis < 3; ++axis) crossed |= lattice.inside(x, y, z) != lattice.successor(axis, x, y, z);
+    for (int axis = 0; axis < 3; ++axis)
+      crossed |= lattice.inside(x, y, z) != lattice.successor(axis, x, y, z);
     ASSERT_EQ(signs->tree().getValue(Coord(x, y, z)), lattice.inside(x, y, z));
     ASSERT_EQ(signs->tree().isValueOn(Coord(x, y, z)), crossed);
   });
@@ -219,8 +221,9 @@ TEST_F(HermiteFile, PruningAPackedFileChangesNothing) {
 }
 
 TEST_F(HermiteFile, AMovedTransformMovesTheData) {
-  const std::string none = error_after(
-      [](BoolGrid& signs, Int32Grid&) { signs.setTransform(openvdb::math::Transform::createLinearTransform(0.5)); });
+  const std::string none = error_after([](BoolGrid& signs, Int32Grid&) {
+    signs.setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+  });
   EXPECT_EQ(none, "no error");
   const IndexToWorld placement = std::get<PackedHermite>(read("changed.vdb")).placement;
   EXPECT_EQ(placement.linear, (0.5 * Eigen::Matrix3d::Identity()).eval());
@@ -252,36 +255,41 @@ TEST_F(HermiteFile, ContradictionsInTheMetadataAreNamed) {
   EXPECT_TRUE(contains(with("hermesh_hermite_version", openvdb::Int32Metadata(2)),
                        "of version 2, this program reads version 1"));
   EXPECT_TRUE(contains(with("hermesh_hermite_version", openvdb::FloatMetadata(1)), "does not say"));
-  EXPECT_TRUE(
-      contains(with("hermesh_normal_code", openvdb::StringMetadata("morse")), "there is no normal code \"morse\""));
+  EXPECT_TRUE(contains(with("hermesh_normal_code", openvdb::StringMetadata("morse")),
+                       "there is no normal code \"morse\""));
   EXPECT_TRUE(contains(with("hermesh_normal_code", openvdb::StringMetadata("thesis")), "two codes"));
-  EXPECT_TRUE(contains(with("hermesh_normals", openvdb::StringMetadata("inwards")), "normals of another kind"));
   EXPECT_TRUE(
-      contains(error_after([](BoolGrid& signs, Int32Grid&) { signs.removeMeta("hermesh_normals"); }), "does not say"));
+      contains(with("hermesh_normals", openvdb::StringMetadata("inwards")), "normals of another kind"));
+  EXPECT_TRUE(contains(error_after([](BoolGrid& signs, Int32Grid&) { signs.removeMeta("hermesh_normals"); }),
+                       "does not say"));
 }
 
 TEST_F(HermiteFile, ContradictionsInTheGridsAreNamed) {
   EXPECT_EQ(error_after([](BoolGrid&, Int32Grid&) {}), "no error");
-  EXPECT_TRUE(contains(error_after([](BoolGrid&, Int32Grid& crossings) { crossings.tree().setValueOff(Coord(0)); }),
-                       "crossing edges, or other crossings than the first"));
+  EXPECT_TRUE(
+      contains(error_after([](BoolGrid&, Int32Grid& crossings) { crossings.tree().setValueOff(Coord(0)); }),
+               "crossing edges, or other crossings than the first"));
   EXPECT_TRUE(contains(error_after([](BoolGrid&, Int32Grid& crossings) {
                          crossings.tree().setValueOff(Coord(0));
                          crossings.tree().setValueOn(Coord(-1, 0, 0), 1);
                        }),
                        "or other crossings than the first"));
-  EXPECT_TRUE(contains(
-      error_after([](BoolGrid&, Int32Grid& crossings) { crossings.tree().setValueOn(Coord(0, 0, 1), 1023 << 16); }),
-      "out of range"));
+  EXPECT_TRUE(contains(error_after([](BoolGrid&, Int32Grid& crossings) {
+                         crossings.tree().setValueOn(Coord(0, 0, 1), 1023 << 16);
+                       }),
+                       "out of range"));
   // A sample's sign turned about in the middle of nowhere makes six crossing edges.
-  EXPECT_TRUE(
-      contains(error_after([](BoolGrid& signs, Int32Grid&) { signs.tree().setValueOff(Coord(500, 3, 3), true); }),
-               "but their signs have"));
-  EXPECT_TRUE(
-      contains(error_after([](BoolGrid& signs, Int32Grid&) { signs.tree().addTile(1, Coord(512, 0, 0), true, false); }),
-               "change their sign between blocks"));
   EXPECT_TRUE(contains(
-      error_after([](BoolGrid& signs, Int32Grid&) { signs.tree().addTile(3, Coord(8192, 0, 0), true, false); }),
-      "change their sign between blocks"));
+      error_after([](BoolGrid& signs, Int32Grid&) { signs.tree().setValueOff(Coord(500, 3, 3), true); }),
+      "but their signs have"));
+  EXPECT_TRUE(contains(error_after([](BoolGrid& signs, Int32Grid&) {
+                         signs.tree().addTile(1, Coord(512, 0, 0), true, false);
+                       }),
+                       "change their sign between blocks"));
+  EXPECT_TRUE(contains(error_after([](BoolGrid& signs, Int32Grid&) {
+                         signs.tree().addTile(3, Coord(8192, 0, 0), true, false);
+                       }),
+                       "change their sign between blocks"));
   // OpenVDB refuses what cannot be inverted, but not what is nowhere.
   EXPECT_NE(error_after([](BoolGrid& signs, Int32Grid&) {
               openvdb::Mat4R nowhere = openvdb::Mat4R::identity();
@@ -343,7 +351,8 @@ TEST_P(DamagedHermiteFile, EveryFlippedByteIsRefused) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, DamagedHermiteFile, testing::Values("packed", "fixed", "thesis", "directed", "float"),
+INSTANTIATE_TEST_SUITE_P(All, DamagedHermiteFile,
+                         testing::Values("packed", "fixed", "thesis", "directed", "float"),
                          [](const auto& kind) { return std::string(kind.param); });
 
 }  // namespace

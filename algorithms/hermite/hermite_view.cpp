@@ -9,8 +9,9 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// Which blocks below a leaf hold a cell with one of its crossing edges: bit |dx| + 2|dy| + 4|dz| for each direction.
-/// The cells around an edge begin at its own sample and one step down each axis that is not the edge's.
+/// Which blocks below a leaf hold a cell with one of its crossing edges: bit |dx| + 2|dy| + 4|dz| for each
+/// direction. The cells around an edge begin at its own sample and one step down each axis that is not the
+/// edge's.
 unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
   // Whether an edge along `axis` starts in the first layers along the axes whose bits are set in `down`.
   const auto touches = [&](int axis, int down) {
@@ -28,10 +29,12 @@ unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
 }
 
 Lower below(const SignLeaf& leaf, int down) {
-  return {leaf.lower[0] - 8 * (down & 1), leaf.lower[1] - 8 * ((down >> 1) & 1), leaf.lower[2] - 8 * (down >> 2)};
+  return {leaf.lower[0] - 8 * (down & 1), leaf.lower[1] - 8 * ((down >> 1) & 1),
+          leaf.lower[2] - 8 * (down >> 2)};
 }
 
-/// Places in ascending order, each once, of the blocks that no leaf is at although one of its cells has a crossing edge.
+/// Places in ascending order, each once, of the blocks that no leaf is at although one of its cells has a
+/// crossing edge.
 std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunContext& context) {
   std::vector<std::uint8_t> missing(leaves.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
@@ -39,7 +42,8 @@ std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunCont
     const unsigned wanted = blocks_below(crossing_edges(leaves[i]));
     for (int down = 1; down < 7; ++down)
       // A block below comes before this one, so only the leaves before it are searched.
-      if (wanted >> down & 1 && !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
+      if (wanted >> down & 1 &&
+          !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
         missing[i] = static_cast<std::uint8_t>(missing[i] | 1u << down);
   });
   // Several leaves may want the same block; sorted, its doubles lie side by side.
@@ -52,8 +56,8 @@ std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunCont
   return found;
 }
 
-/// The sign of an added block, which has no leaf and owns no crossing edge. All of its samples have one sign, and so have the
-/// blocks that are not there, up to the nearest owner above: no edge on the way is crossed.
+/// The sign of an added block, which has no leaf and owns no crossing edge. All of its samples have one sign,
+/// and so have the blocks that are not there, up to the nearest owner above: no edge on the way is crossed.
 bool sign_of_added(const HermiteView::Blocks& blocks, const HermiteView::Block& block) {
   for (int d = 1; d < 8; ++d) {
     const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
@@ -71,7 +75,8 @@ struct Column {
 }  // namespace
 
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
-  // Column by column: each block's three neighbours in an adjacent one lie behind those of the block before it.
+  // Column by column: each block's three neighbours in an adjacent one lie behind those of the block before
+  // it.
   std::vector<Column> columns;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::array<std::int32_t, 2> lower{blocks[i].lower[0], blocks[i].lower[1]};
@@ -82,18 +87,21 @@ void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
     for (int beside = 0; beside < 9; ++beside) {
       const std::array<std::int32_t, 2> wanted{columns[c].lower[0] + 8 * (beside / 3 - 1),
                                                columns[c].lower[1] + 8 * (beside % 3 - 1)};
-      const auto there = std::lower_bound(columns.begin(), columns.end() - 1, wanted,
-                                          [](const Column& column, const auto& lower) { return column.lower < lower; });
+      const auto there =
+          std::lower_bound(columns.begin(), columns.end() - 1, wanted,
+                           [](const Column& column, const auto& lower) { return column.lower < lower; });
       const bool found = there != columns.end() - 1 && there->lower == wanted;
       std::size_t next = found ? there->first : 0;
       const std::size_t end = found ? (there + 1)->first : 0;
       for (std::size_t i = columns[c].first; i < columns[c + 1].first; ++i) {
         const std::int32_t z = blocks[i].lower[2];
-        // Both columns ascend, so one sweep over them finds all neighbors, in time that grows with their lengths.
+        // Both columns ascend, so one sweep over them finds all neighbors, in time that grows with their
+        // lengths.
         while (next < end && blocks[next].lower[2] < z - 8) ++next;
         for (std::size_t slot = 0, at = next; slot < 3; ++slot) {
           const bool hit = at < end && blocks[at].lower[2] == z + 8 * (static_cast<int>(slot) - 1);
-          blocks[i].neighbours[3 * static_cast<std::size_t>(beside) + slot] = hit ? static_cast<std::int32_t>(at++) : -1;
+          blocks[i].neighbours[3 * static_cast<std::size_t>(beside) + slot] =
+              hit ? static_cast<std::int32_t>(at++) : -1;
         }
       }
     }
@@ -126,8 +134,8 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
     block.leaf = -1;
   }
   find_neighbours(blocks_, context);
-  // Signs of added blocks are read off neighbours, so these must be known. Only signs of leaves are read, which no thread
-  // writes.
+  // Signs of added blocks are read off neighbours, so these must be known. Only signs of leaves are read,
+  // which no thread writes.
   parallel_blocks(added.size(), context, [&](std::size_t i) {
     Block& block = blocks_[leaves_before[i] + i];
     if (sign_of_added(blocks_, block)) block.inside = kAllInside;
@@ -135,7 +143,8 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
 }
 
 BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block) {
-  return cells_with_edges(blocks, block, [&](std::int32_t there) -> const auto& { return blocks[there].crossing; });
+  return cells_with_edges(
+      blocks, block, [&](std::int32_t there) -> const auto& { return blocks[there].crossing; });
 }
 
 }  // namespace hermesh

@@ -1,5 +1,5 @@
-// Hermite data of any representation as extraction walks over it: blocks with their neighbours, and a crossing for
-// each crossing edge.
+// Hermite data of any representation as extraction walks over it: blocks with their neighbours, and a
+// crossing for each crossing edge.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +15,8 @@
 
 namespace hermesh {
 
-/// Hermite data as blocks: there is one for every cell with a crossing edge and for every owner of one. The view refers
-/// to the data that it was made of, which must outlive it.
+/// Hermite data as blocks: there is one for every cell with a crossing edge and for every owner of one. The
+/// view refers to the data that it was made of, which must outlive it.
 class HermiteView {
  public:
   struct Block : CrossingEdges {
@@ -35,11 +35,13 @@ class HermiteView {
 
   /// The crossing of an edge, which must be crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
-  /// All crossings of a block, in the order of CrossingEdges::rank(). `out` has room for as many, 1536 at most.
+  /// All crossings of a block, in the order of CrossingEdges::rank(). `out` has room for as many, 1536 at
+  /// most.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const = 0;
 
  protected:
-  /// Makes the blocks of `leaves`, which come in ascending order and all own a crossing edge. @throws Cancelled.
+  /// Makes the blocks of `leaves`, which come in ascending order and all own a crossing edge. @throws
+  /// Cancelled.
   HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context);
 
  private:
@@ -50,19 +52,19 @@ class HermiteView {
 /// Sets `neighbours` of blocks in ascending order of (x, y, z).
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
 
-/// The cells of a block that have an edge of a mask, by their first corners. `edges(block)` gives the masks of a block that is
-/// there, by axis.
+/// The cells of a block that have an edge of a mask, by their first corners. `edges(block)` gives the masks
+/// of a block that is there, by axis.
 template <class Edges>
 BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block, Edges&& edges);
 /// The cells of a block with a crossing edge, by their first corners.
 BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block);
 
-/// The four cells around an edge as steps along the two axes after its own, counter-clockwise for a viewer whom the edge's
-/// axis points at.
+/// The four cells around an edge as steps along the two axes after its own, counter-clockwise for a viewer
+/// whom the edge's axis points at.
 inline constexpr int kAroundEdge[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
 
-/// The cells around the edges along one axis that start in a block. The neighbouring blocks are looked up once, in the
-/// constructor, for all of these edges.
+/// The cells around the edges along one axis that start in a block. The neighbouring blocks are looked up
+/// once, in the constructor, for all of these edges.
 class CellsAroundEdges {
  public:
   CellsAroundEdges(const HermiteView::Blocks& blocks, std::size_t block, int axis)
@@ -77,12 +79,14 @@ class CellsAroundEdges {
     }
   }
 
-  /// The cells around the edge that starts at a sample, in the order of kAroundEdge. Around a crossing edge there is a
-  /// block for each.
+  /// The cells around the edge that starts at a sample, in the order of kAroundEdge. Around a crossing edge
+  /// there is a block for each.
   std::array<LatticePlace, 4> operator()(int sample) const {
     // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
     const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
-    const auto cell = [&](int side, int down) { return LatticePlace{block_[side], sample - down + shift_[side]}; };
+    const auto cell = [&](int side, int down) {
+      return LatticePlace{block_[side], sample - down + shift_[side]};
+    };
     return {cell(low_u + low_v, u_ + v_), cell(low_v, v_), cell(0, 0), cell(low_u, u_)};
   }
 
@@ -99,23 +103,24 @@ BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block,
   BlockMask result{};
   for (int axis = 0; axis < 3; ++axis)
     for (const auto& [u, v] : kAroundEdge) {
-      // The four edges of a cell along an axis start at its corners of the face across that axis: masks of edges, shifted
-      // back to the cell's first corner.
+      // The four edges of a cell along an axis start at its corners of the face across that axis: masks of
+      // edges, shifted back to the cell's first corner.
       int d[3] = {0, 0, 0};
       d[(axis + 1) % 3] = -u;
       d[(axis + 2) % 3] = -v;
-      const BlockMask shifted = shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
-        const std::int32_t there = blocks[block].neighbours[neighbour_slot(ax, ay, az)];
-        return there >= 0 ? edges(there)[axis] : kNone;
-      });
+      const BlockMask shifted =
+          shifted_mask(d[0], d[1], d[2], [&](int ax, int ay, int az) -> const BlockMask& {
+            const std::int32_t there = blocks[block].neighbours[neighbour_slot(ax, ay, az)];
+            return there >= 0 ? edges(there)[axis] : kNone;
+          });
       for (int word = 0; word < 8; ++word) result[word] |= shifted[word];
     }
   return result;
 }
 
-/// Dual contouring's loop over the edges of a block, whatever is made of them: a quad, or a polygon between regions of cells.
-/// Calls f(axis, sample, cells) for each crossing edge, in the order of CrossingEdges::rank(); `cells` are the four around it,
-/// in the order of kAroundEdge.
+/// Dual contouring's loop over the edges of a block, whatever is made of them: a quad, or a polygon between
+/// regions of cells. Calls f(axis, sample, cells) for each crossing edge, in the order of
+/// CrossingEdges::rank(); `cells` are the four around it, in the order of kAroundEdge.
 template <class F>
 void for_each_edge_with_cells(const HermiteView::Blocks& blocks, std::size_t block, F&& f) {
   if (blocks[block].crossing_count() == 0) return;  // most blocks that exist for their cells alone

@@ -23,7 +23,9 @@ TestLattice<EdgeCrossing> sparse_noise(unsigned seed, bool outermost) {
   for (int i = 0; i < 40; ++i) lattice.sign(at(random), at(random), at(random)) = !outermost;
   // Samples at the first corner of a block are those whose cells begin in other blocks.
   lattice.sign(0, 0, 0) = lattice.sign(8, 16, 8) = !outermost;
-  lattice.for_each_crossed_edge([&](int axis, int x, int y, int z) { lattice.crossings[{axis, x, y, z}] = {0.5f, {1, 0, 0}}; });
+  lattice.for_each_crossed_edge([&](int axis, int x, int y, int z) {
+    lattice.crossings[{axis, x, y, z}] = {0.5f, {1, 0, 0}};
+  });
   return lattice;
 }
 
@@ -39,7 +41,9 @@ class HermiteViewTest : public testing::TestWithParam<std::tuple<unsigned, bool>
   decltype(view_of(hermite, context)) view = view_of(hermite, context);
   const HermiteView::Blocks& blocks = view.blocks();
 
-  bool crossed(int axis, const Index& p) { return lattice.inside(p[0], p[1], p[2]) != lattice.successor(axis, p[0], p[1], p[2]); }
+  bool crossed(int axis, const Index& p) {
+    return lattice.inside(p[0], p[1], p[2]) != lattice.successor(axis, p[0], p[1], p[2]);
+  }
 };
 
 TEST_P(HermiteViewTest, EveryBlockHasTheSignsOfItsSamples) {
@@ -48,7 +52,8 @@ TEST_P(HermiteViewTest, EveryBlockHasTheSignsOfItsSamples) {
     without_leaf += block.leaf < 0;
     for (int sample = 0; sample < 512; ++sample) {
       const Index p = index_of(block, sample);
-      ASSERT_EQ(test(block.inside, sample), lattice.inside(p[0], p[1], p[2])) << p[0] << ' ' << p[1] << ' ' << p[2];
+      ASSERT_EQ(test(block.inside, sample), lattice.inside(p[0], p[1], p[2]))
+          << p[0] << ' ' << p[1] << ' ' << p[2];
     }
   }
   EXPECT_GT(without_leaf, 0);
@@ -107,7 +112,8 @@ TEST_P(HermiteViewTest, CellsAroundAnEdgeGoRoundItCounterClockwise) {
   EXPECT_EQ(edges, hermite.crossings.size());
 }
 
-INSTANTIATE_TEST_SUITE_P(Noise, HermiteViewTest, testing::Combine(testing::Values(1u, 2u, 3u), testing::Bool()));
+INSTANTIATE_TEST_SUITE_P(Noise, HermiteViewTest,
+                         testing::Combine(testing::Values(1u, 2u, 3u), testing::Bool()));
 
 }  // namespace
 }  // namespace hermesh

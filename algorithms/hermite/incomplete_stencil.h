@@ -1,5 +1,5 @@
-// Crossings of edges whose stencils reach beyond the data or single precision, one at a time: what vector code leaves
-// over.
+// Crossings of edges whose stencils reach beyond the data or single precision, one at a time: what vector
+// code leaves over.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -9,8 +9,8 @@
 #include <limits>
 #include <optional>
 
-#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/hermite/crossing.h"
+#include "algorithms/lattice/leaf_table.h"
 
 namespace hermesh {
 
@@ -21,10 +21,11 @@ struct SampledVolume {
   float data_below;  ///< samples of no less than this magnitude are no data
 };
 
-/// Which samples are data. Near the surface at 0 of a level set all that is no data has the background's magnitude,
-/// and nothing else is asked. Where the band is narrower inside it has less there; at other isovalues the band may be
-/// wider on that side than the background tells, and a background of 0 tells nothing. There, and in any other volume,
-/// the active samples are data. Nothing is returned if tiles do not tell and the samples must be looked at.
+/// Which samples are data. Near the surface at 0 of a level set all that is no data has the background's
+/// magnitude, and nothing else is asked. Where the band is narrower inside it has less there; at other
+/// isovalues the band may be wider on that side than the background tells, and a background of 0 tells
+/// nothing. There, and in any other volume, the active samples are data. Nothing is returned if tiles do not
+/// tell and the samples must be looked at.
 std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set);
 /// Which samples are data; where tiles do not tell, the samples of the leaves are looked at.
 SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set);

@@ -20,7 +20,8 @@ class LeafStencils final : public edge_kernels::PlainCrossing {
     for (int slot = 0; slot < 27; ++slot) input.values[slot] = leaves.values(around_[slot]);
     if (volume_.masked) {
       for (int slot = 0; slot < 27; ++slot) {
-        active_[slot] = around_[slot] >= 0 ? leaves.active(static_cast<std::size_t>(around_[slot])) : BlockMask{};
+        active_[slot] =
+            around_[slot] >= 0 ? leaves.active(static_cast<std::size_t>(around_[slot])) : BlockMask{};
         input.active[slot] = active_[slot].data();
       }
     } else {
@@ -42,7 +43,8 @@ class LeafStencils final : public edge_kernels::PlainCrossing {
  private:
   const SampledVolume& volume_;
   std::size_t leaf_;
-  std::array<std::int32_t, 27> around_;  ///< numbers of the leaves around, as LeafPlaces::surroundings() gives them
+  std::array<std::int32_t, 27>
+      around_;  ///< numbers of the leaves around, as LeafPlaces::surroundings() gives them
   std::array<BlockMask, 27> active_;
 };
 

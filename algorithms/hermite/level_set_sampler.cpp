@@ -11,12 +11,12 @@
 #include <new>
 #include <optional>
 
-#include "algorithms/lattice/grid_placement.h"
-#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 #include "algorithms/hermite/leaf_stencils.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/leaf_table.h"
 
 namespace hermesh {
 namespace {
@@ -28,8 +28,8 @@ class CrossingStore {
   /// Room for `count` crossings and for kOutRoom of a kernel behind.
   Crossing* room_for(std::size_t count) {
     if (used_ + count + edge_kernels::kOutRoom > kBlock) {
-      // This allocator keeps what it is given back. Pages that the system has to clear each time cost as much as a fifth
-      // of the whole work.
+      // This allocator keeps what it is given back. Pages that the system has to clear each time cost as much
+      // as a fifth of the whole work.
       blocks_.emplace_back(static_cast<Crossing*>(scalable_malloc(kBlock * sizeof(Crossing))));
       if (!blocks_.back()) throw std::bad_alloc();
       used_ = 0;
@@ -55,7 +55,8 @@ class LeafSigns {
 
   /// Writes the leaf's `inside` and `beyond` to `signs`.
   void read(std::size_t leaf, SignLeaf& signs) {
-    // Leaves of a column follow one another along z, so the signs above one leaf are the own signs of the next.
+    // Leaves of a column follow one another along z, so the signs above one leaf are the own signs of the
+    // next.
     if (leaf_above_ == static_cast<std::int64_t>(leaf))
       signs.inside = above_;
     else
@@ -70,7 +71,8 @@ class LeafSigns {
     } else {
       signs.beyond[2] = uniform(above);
     }
-    for (int axis = 0; axis < 3; ++axis) complete_ &= !leaves_.differs_from_tile_below(leaf, signs.inside, axis);
+    for (int axis = 0; axis < 3; ++axis)
+      complete_ &= !leaves_.differs_from_tile_below(leaf, signs.inside, axis);
   }
   /// Whether all samples of the leaves were finite, and all crossed edges that end in them start in leaves.
   bool finite() const { return finite_; }
@@ -98,8 +100,13 @@ class Sampler {
  public:
   Sampler(const LevelSet& level_set, const SampledVolume& volume, edge_kernels::Sample<Crossing>* sample,
           RunContext& context)
-      : level_set_(level_set), volume_(volume), leaves_(volume.leaves), sample_(sample), context_(context),
-        signs_(leaves_.size()), found_(leaves_.size()) {}
+      : level_set_(level_set),
+        volume_(volume),
+        leaves_(volume.leaves),
+        sample_(sample),
+        context_(context),
+        signs_(leaves_.size()),
+        found_(leaves_.size()) {}
 
   /// Returns false if edges with a change of sign start in no leaf; then the result is of no use.
   bool run(SparseHermite<Crossing>& result) {
@@ -136,7 +143,8 @@ class Sampler {
   };
 
   void sample_leaves(std::size_t first, std::size_t end) {
-    // By the time that a leaf's turn comes its samples have come from memory, and before them what tells where they are.
+    // By the time that a leaf's turn comes its samples have come from memory, and before them what tells
+    // where they are.
     constexpr std::size_t kAhead = 6, kFurtherAhead = 18;
     for (std::size_t leaf = first; leaf < std::min(first + kAhead, end); ++leaf) ask_for(leaf);
     LeafSigns signs(leaves_);
@@ -146,7 +154,8 @@ class Sampler {
       if (leaf + kAhead < leaves_.size()) ask_for(leaf + kAhead);
       SignLeaf& to = signs_[leaf];
       signs.read(leaf, to);
-      const int count = kernels_.crossed(to.inside.data(), to.beyond.data(), batch.inputs[batch.size].crossing);
+      const int count =
+          kernels_.crossed(to.inside.data(), to.beyond.data(), batch.inputs[batch.size].crossing);
       found_[leaf].count = static_cast<std::uint32_t>(count);
       // Without a branch: which leaves have crossings no processor guesses.
       batch.leaf[batch.size] = leaf;
@@ -179,9 +188,10 @@ class Sampler {
     batch.size = 0;
   }
 
-  /// Asks for what lies where no machine can guess, and waiting for it costs more than the arithmetic: the leaf's samples,
-  /// and those just above along x and y. What lies below was read before, and above along z lies the next leaf. (Inlined
-  /// always: g++ takes a function that does nothing else for one without an effect, and drops the calls.)
+  /// Asks for what lies where no machine can guess, and waiting for it costs more than the arithmetic: the
+  /// leaf's samples, and those just above along x and y. What lies below was read before, and above along z
+  /// lies the next leaf. (Inlined always: g++ takes a function that does nothing else for one without an
+  /// effect, and drops the calls.)
   [[gnu::always_inline]] void ask_for(std::size_t leaf) const {
     const float *own = leaves_.values(leaf), *x = leaves_.values(leaves_.neighbour(leaf, 1, 0, 0)),
                 *y = leaves_.values(leaves_.neighbour(leaf, 0, 1, 0));
@@ -191,8 +201,8 @@ class Sampler {
     for (int i = 0; i < 8; ++i) __builtin_prefetch(y + 64 * i);
   }
 
-  /// Copies the crossings to their places in the result, which are in order of (x, y, z): count, scan and fill by
-  /// slabs of one x.
+  /// Copies the crossings to their places in the result, which are in order of (x, y, z): count, scan and
+  /// fill by slabs of one x.
   void copy(SparseHermite<Crossing>& result) {
     const std::vector<LeafPlaces::Slab> slabs = leaves_.slabs();
     std::vector<std::uint64_t> live(slabs.size()), crossings(slabs.size());
@@ -246,8 +256,8 @@ SparseHermite<Crossing> sample(const LevelSet& level_set, double isovalue,
   SparseHermite<Crossing> result;
   const Stage stage(context, "Hermite data from the level set");
   {
-    // First on the assumption that all crossed edges start in leaves, as they do where a band encloses the surface:
-    // then signs and crossings are made in one sweep over the samples.
+    // First on the assumption that all crossed edges start in leaves, as they do where a band encloses the
+    // surface: then signs and crossings are made in one sweep over the samples.
     const LeafPlaces leaves(level_set, isovalue, context);
     const std::optional<SampledVolume> volume = sampled_volume(leaves, level_set);
     if (volume && Sampler<Crossing>(level_set, *volume, sample_leaves, context).run(result)) return result;

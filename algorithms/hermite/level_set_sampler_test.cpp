@@ -13,9 +13,9 @@
 #include <random>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/hermite/test_normals.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -35,7 +35,8 @@ Vector3d plain_gradient(const openvdb::FloatGrid& grid, const Coord& at) {
   for (int axis = 0; axis < 3; ++axis) {
     Coord low = at, high = at;
     --low[axis], ++high[axis];
-    const double below = grid.tree().getValue(low), here = grid.tree().getValue(at), above = grid.tree().getValue(high);
+    const double below = grid.tree().getValue(low), here = grid.tree().getValue(at),
+                 above = grid.tree().getValue(high);
     if (is_data(low) && is_data(high))
       result[axis] = 0.5 * (above - below);
     else if (is_data(high) && is_data(at))
@@ -48,7 +49,8 @@ Vector3d plain_gradient(const openvdb::FloatGrid& grid, const Coord& at) {
 
 std::map<EdgeKey, EdgeCrossing> plain_sampler(const openvdb::FloatGrid& grid, double isovalue,
                                               const openvdb::CoordBBox& box) {
-  const bool greater_is_inside = grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
+  const bool greater_is_inside =
+      grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
   const double scale = greater_is_inside ? -1.0 : 1.0;
   const auto value = [&](const Coord& at) { return scale * (double(grid.tree().getValue(at)) - isovalue); };
   std::map<EdgeKey, EdgeCrossing> result;
@@ -62,7 +64,8 @@ std::map<EdgeKey, EdgeCrossing> plain_sampler(const openvdb::FloatGrid& grid, do
       Vector3d normal = scale * ((1 - t) * plain_gradient(grid, *it) + t * plain_gradient(grid, next));
       if (!(normal[axis] * (to - from) > 0)) normal[axis] = to - from;
       normal.normalize();
-      result[EdgeKey{(*it).x(), (*it).y(), (*it).z(), axis}] = {float(t), {float(normal[0]), float(normal[1]), float(normal[2])}};
+      result[EdgeKey{(*it).x(), (*it).y(), (*it).z(), axis}] = {
+          float(t), {float(normal[0]), float(normal[1]), float(normal[2])}};
     }
   return result;
 }
@@ -78,12 +81,14 @@ void expect_as_plain(const openvdb::FloatGrid::Ptr& grid, double isovalue, std::
   for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)
     for_each_crossing(hermite, leaf, [&](int axis, int sample, const EdgeCrossing& crossing) {
       const auto& lower = hermite.leaves[leaf].lower;
-      const auto found =
-          expected.find({lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7), axis});
+      const auto found = expected.find(
+          {lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7), axis});
       ASSERT_NE(found, expected.end());
-      // Single precision divides by the difference of the ends, which is small where the surface runs along the edge.
+      // Single precision divides by the difference of the ends, which is small where the surface runs along
+      // the edge.
       ASSERT_NEAR(crossing.offset, found->second.offset, 1e-4);
-      for (int a = 0; a < 3; ++a) ASSERT_NEAR(crossing.normal[a], found->second.normal[a], 2e-5) << "axis " << a;
+      for (int a = 0; a < 3; ++a)
+        ASSERT_NEAR(crossing.normal[a], found->second.normal[a], 2e-5) << "axis " << a;
       expected.erase(found);
     });
   EXPECT_EQ(expected.size(), 0u);
@@ -102,9 +107,9 @@ TEST_F(LevelSetSamplerTest, SpheresAcrossNodesOfTheTree) {
 }
 
 TEST_F(LevelSetSamplerTest, AnIsovalueInsideTheBand) {
-  expect_as_plain(
-      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f, 3.0f),
-      1.25, 5000);
+  expect_as_plain(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+                      20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f, 3.0f),
+                  1.25, 5000);
 }
 
 /// The band goes on where the background, or what is beyond it, ends: six voxels inside of a surface and
@@ -130,8 +135,8 @@ TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
   }
 }
 
-/// What is clamped inside is no data, though it is less in magnitude than the background: the normals of a plane stay exact.
-/// Without tiles inside, samples have to tell.
+/// What is clamped inside is no data, though it is less in magnitude than the background: the normals of a
+/// plane stay exact. Without tiles inside, samples have to tell.
 TEST_F(LevelSetSamplerTest, ABandThatIsNarrowerInside) {
   constexpr float kOutside = 4.0f, kInside = 1.2f;
   constexpr int kSide = 32;
@@ -164,7 +169,8 @@ TEST_F(LevelSetSamplerTest, ABandThatIsNarrowerInside) {
 /// Squares of the differences would overflow single precision, or vanish in it.
 TEST_F(LevelSetSamplerTest, HugeAndTinyValuesHaveTheSameNormals) {
   const auto scaled = [](float scale) {
-    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f);
+    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+        20.0f, openvdb::Vec3f(0.2f, 0.1f, 0.7f), 1.0f);
     for (auto it = grid->beginValueAll(); it; ++it) it.setValue(*it * scale);
     grid->tree().root().setBackground(3.0f * scale, false);
     RunContext context;
@@ -237,8 +243,8 @@ TEST_F(LevelSetSamplerTest, EmptyAndFullVolumes) {
   EXPECT_TRUE(hermite.outermost_inside);
 }
 
-/// A level set of noise, which crosses edges everywhere and of which every seventh sample is no data: stencils end at all
-/// sides of leaves and of nodes of the tree, and there are tiles of both signs around it.
+/// A level set of noise, which crosses edges everywhere and of which every seventh sample is no data:
+/// stencils end at all sides of leaves and of nodes of the tree, and there are tiles of both signs around it.
 openvdb::FloatGrid::Ptr noise_with_tiles() {
   const auto grid = openvdb::FloatGrid::create(3.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -258,10 +264,12 @@ openvdb::FloatGrid::Ptr noise_with_tiles() {
   return grid;
 }
 
-TEST_F(LevelSetSamplerTest, NoiseWithStencilsThatEndAnywhere) { expect_as_plain(noise_with_tiles(), 0.0, 40000); }
+TEST_F(LevelSetSamplerTest, NoiseWithStencilsThatEndAnywhere) {
+  expect_as_plain(noise_with_tiles(), 0.0, 40000);
+}
 
-/// Every edge is crossed, in more leaves in a row than the kernels take at once: what their lists have room for. Samples of
-/// the lowest layers are no data.
+/// Every edge is crossed, in more leaves in a row than the kernels take at once: what their lists have room
+/// for. Samples of the lowest layers are no data.
 openvdb::FloatGrid::Ptr checkerboard() {
   const auto grid = openvdb::FloatGrid::create(1.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -313,7 +321,8 @@ void expect_same_bytes(const openvdb::FloatGrid::Ptr& grid) {
 }
 
 TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
-  expect_same_bytes(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
+  expect_same_bytes(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
   expect_same_bytes(noise_with_tiles());
   const auto fog = noise_with_tiles();  // no level set: what is not active is no data
   fog->setGridClass(openvdb::GRID_FOG_VOLUME);
@@ -342,7 +351,8 @@ TEST_F(LevelSetSamplerTest, CrossingsAreInAscendingOrderOfLeavesAndSignsFollowFr
 
 TEST_F(LevelSetSamplerTest, ErrorsOfWhatRunsBesideTheSamplingAndCancellationArriveWhole) {
   const auto grid = [] {
-    return openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(40.0f, openvdb::Vec3f(0.0f, 0.0f, 0.0f), 1.0f);
+    return openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(40.0f, openvdb::Vec3f(0.0f, 0.0f, 0.0f),
+                                                                    1.0f);
   };
   for (const int threads : {1, 2, 7}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));

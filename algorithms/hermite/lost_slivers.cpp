@@ -14,9 +14,9 @@ struct Sliver {
   double length, middle;  ///< along the edge
 };
 
-/// The part between the crossings of an edge whose first sample is in one operand and not in the other, as the
-/// intersection or the union has them: [offset of the one that ends, offset of the one that begins] is inside neither,
-/// and the reverse both.
+/// The part between the crossings of an edge whose first sample is in one operand and not in the other, as
+/// the intersection or the union has them: [offset of the one that ends, offset of the one that begins] is
+/// inside neither, and the reverse both.
 Sliver between(bool unites, double ends, double begins) {
   return {unites ? begins - ends : ends - begins, 0.5 * (ends + begins)};
 }
@@ -27,16 +27,16 @@ class Counter {
       : unites_(boolean == Boolean::unite), turns_b_(boolean == Boolean::subtract), a_(a), b_(b) {}
 
   LostSlivers run() {
-    // Only an edge that both operands cross can lose a part, so only leaves at one place matter; both sequences
-    // ascend.
+    // Only an edge that both operands cross can lose a part, so only leaves at one place matter; both
+    // sequences ascend.
     std::size_t j = 0;
     for (std::size_t i = 0; i < a_.leaves.size(); ++i) {
       while (j < b_.leaves.size() && b_.leaves[j].lower < a_.leaves[i].lower) ++j;
       if (j == b_.leaves.size()) break;
       if (b_.leaves[j].lower == a_.leaves[i].lower) add(i, j);
     }
-    // Each lattice line stands for a square of one voxel across, so lengths along an axis add up to a volume. A sliver
-    // is seen best along its thin direction, which is the axis that finds most.
+    // Each lattice line stands for a square of one voxel across, so lengths along an axis add up to a volume.
+    // A sliver is seen best along its thin direction, which is the axis that finds most.
     result_.volume = *std::ranges::max_element(along_axis_);
     return result_;
   }
@@ -48,8 +48,8 @@ class Counter {
     const EdgeCrossing *of_a = a_.crossings_of(i).data(), *of_b = b_.crossings_of(j).data();
     for (int axis = 0; axis < 3; ++axis) {
       for (int x = 0; x < 8; ++x) {
-        // Edges that both cross with different signs at the first sample: one operand ends there and the other begins.
-        // For a difference the second one is its complement.
+        // Edges that both cross with different signs at the first sample: one operand ends there and the
+        // other begins. For a difference the second one is its complement.
         const std::uint64_t turned = turns_b_ ? ~std::uint64_t{0} : 0;
         std::uint64_t both =
             edges_a[axis][x] & edges_b[axis][x] & (leaf_a.inside[x] ^ leaf_b.inside[x] ^ turned);

@@ -21,12 +21,13 @@ struct LostSlivers {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< middle of the longest part, world units
 };
 
-/// What the combination of two operands on one lattice loses, as combine() takes them. Parts of less than a thousandth
-/// of a voxel are taken for rounding, and do not count. Symmetric in the operands of a union and an intersection.
+/// What the combination of two operands on one lattice loses, as combine() takes them. Parts of less than a
+/// thousandth of a voxel are taken for rounding, and do not count. Symmetric in the operands of a union and
+/// an intersection.
 LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b);
 
-/// A sentence on what became of parts of the result that are thinner than a voxel of that size (world units). (Parts that
-/// an operand by itself lost are told of when it is voxelized.)
+/// A sentence on what became of parts of the result that are thinner than a voxel of that size (world units).
+/// (Parts that an operand by itself lost are told of when it is voxelized.)
 std::string lost_slivers_note(const LostSlivers& lost, Boolean boolean, double voxel_size);
 
 }  // namespace hermesh

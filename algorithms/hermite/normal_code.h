@@ -1,7 +1,7 @@
 // Unit normals in 16 bits: the thesis's code (Aldén 2011, §4.1), the one that it was taken from, and better
 // ones of the same size. A code is a type with static functions, so that loops over normals have it as a
-// template parameter; with_normal_code() of with_normal_code.h, which has the codes themselves and is included by few
-// files, chooses it by name outside of the loop.
+// template parameter; with_normal_code() of with_normal_code.h, which has the codes themselves and is
+// included by few files, chooses it by name outside of the loop.
 //
 //               mean / max error   codes in use
 //   thesis         1.32° / 2.58°         64,008   as printed

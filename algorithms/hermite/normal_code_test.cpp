@@ -1,5 +1,4 @@
 #include "algorithms/hermite/normal_code.h"
-#include "algorithms/hermite/with_normal_code.h"
 
 #include <gtest/gtest.h>
 
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "algorithms/core/error.h"
+#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
 namespace {
@@ -26,8 +26,8 @@ Normal opposite(const Normal& n) { return {-n[0], -n[1], -n[2]}; }
 
 double length(const Normal& n) { return std::hypot(double(n[0]), double(n[1]), double(n[2])); }
 
-/// Angle between two vectors in degrees, by the arc tangent, because the arc cosine loses half of the digits of a small
-/// angle.
+/// Angle between two vectors in degrees, by the arc tangent, because the arc cosine loses half of the digits
+/// of a small angle.
 double degrees_between(const Normal& p, const Normal& q) {
   const double x = double(p[1]) * q[2] - double(p[2]) * q[1], y = double(p[2]) * q[0] - double(p[0]) * q[2],
                z = double(p[0]) * q[1] - double(p[1]) * q[0];

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/lattice/sample_side.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/sample_side.h"
 
 namespace hermesh {
 namespace {
@@ -33,9 +33,10 @@ struct KeyHash {
   }
 };
 
-/// Whether the triangles, whose normals have twice their areas as lengths here, are wound inside out: their signed
-/// volume is negative. The volume of an open mesh is that of the cone from an apex, and must be negative wherever in
-/// the mesh's box the apex is. (It is linear in the apex.) The volume of a flat sheet is rounding, and says nothing.
+/// Whether the triangles, whose normals have twice their areas as lengths here, are wound inside out: their
+/// signed volume is negative. The volume of an open mesh is that of the cone from an apex, and must be
+/// negative wherever in the mesh's box the apex is. (It is linear in the apex.) The volume of a flat sheet is
+/// rounding, and says nothing.
 bool is_inside_out(const std::vector<IndexTriangle>& triangles) {
   if (triangles.empty()) return false;
   Eigen::AlignedBox3d box;
@@ -133,8 +134,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
         from[a] = std::max(from[a], lowest[a]);
         to[a] = std::min(to[a], highest[a]);
       }
-      // The box of a large slanting triangle holds many blocks that its plane does not come near: half the block and
-      // kNearby along the normal.
+      // The box of a large slanting triangle holds many blocks that its plane does not come near: half the
+      // block and kNearby along the normal.
       const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kNearby);
       for (int x = from[0]; x <= to[0]; ++x)
         for (int y = from[1]; y <= to[1]; ++y)
@@ -146,8 +147,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
           }
     }
   });
-  // Count – scan – fill. Chunks are taken in order, so each block lists its triangles in ascending order, whatever the
-  // threads did: equal hits go to the lowest number.
+  // Count – scan – fill. Chunks are taken in order, so each block lists its triangles in ascending order,
+  // whatever the threads did: equal hits go to the lowest number.
   TriangleBins bins;
   bins.first.assign(blocks.size() + 1, 0);
   for (const auto& pairs : found)
@@ -173,8 +174,9 @@ class LeafHits {
       for_each_bit(edges_[axis], [&](int sample) { crossing_[axis][sample] = next++; });
   }
 
-  /// Where an edge is looked for: between the places that its ends' sides are taken from, which no polygon through a
-  /// sample holds; or, where the signs are those of a voxelizer that knows no such places, at the samples themselves.
+  /// Where an edge is looked for: between the places that its ends' sides are taken from, which no polygon
+  /// through a sample holds; or, where the signs are those of a voxelizer that knows no such places, at the
+  /// samples themselves.
   enum class EdgePlace { of_sides, of_samples };
 
   /// Intersects one triangle with the block's edges along one axis.
@@ -187,22 +189,25 @@ class LeafHits {
       return std::array<int, 2>{static_cast<int>(std::ceil(std::clamp(low, 0.0, 100.0))),
                                 static_cast<int>(std::floor(std::clamp(high, -1.0, double(limit))))};
     };
-    // Lattice lines along the axis that pass through the box of the triangle. A leaf owns edges that start at samples
-    // 0 to 7.
+    // Lattice lines along the axis that pass through the box of the triangle. A leaf owns edges that start at
+    // samples 0 to 7.
     const auto [u0, u1] = range(u, 7);
     const auto [v0, v1] = range(v, 7);
     const double shift = place == EdgePlace::of_sides ? 1.0 : 0.0;
     const auto weights = [&](double x, double y) {
-      const auto side = [&](int i, int j) { return (c[i][u] - x) * (c[j][v] - y) - (c[i][v] - y) * (c[j][u] - x); };
+      const auto side = [&](int i, int j) {
+        return (c[i][u] - x) * (c[j][v] - y) - (c[i][v] - y) * (c[j][u] - x);
+      };
       return Eigen::Vector3d(side(1, 2), side(2, 0), side(0, 1));
     };
     const Eigen::Vector3d along(c[0][axis], c[1][axis], c[2][axis]);
     for (int pu = u0; pu <= u1; ++pu)
       for (int pv = v0; pv <= v1; ++pv) {
         const double x = lower_[u] + pu, y = lower_[v] + pv;
-        // Barycentric weights of the line in the projection of the triangle along the axis; all of one sign where it
-        // is met.
-        const Eigen::Vector3d w = weights(x + shift * kSideShift[std::size_t(u)], y + shift * kSideShift[std::size_t(v)]);
+        // Barycentric weights of the line in the projection of the triangle along the axis; all of one sign
+        // where it is met.
+        const Eigen::Vector3d w =
+            weights(x + shift * kSideShift[std::size_t(u)], y + shift * kSideShift[std::size_t(v)]);
         const double area = w.sum();
         if (area == 0 || (w / area).minCoeff() < -kTolerance) continue;
         // Whether the edge is met is decided there, and where it is, on the edge between the samples.
@@ -250,8 +255,8 @@ class LeafHits {
     int hits = 0;  ///< at different places
   };
 
-  /// Gives an edge that no polygon hits a crossing: the plane of the polygon nearest to the level set's crossing, if it
-  /// faces the way that the signs say, met as near to the edge as the edge's ends allow.
+  /// Gives an edge that no polygon hits a crossing: the plane of the polygon nearest to the level set's
+  /// crossing, if it faces the way that the signs say, met as near to the edge as the edge's ends allow.
   bool take_nearest(int axis, int sample, const std::vector<IndexTriangle>& triangles,
                     std::span<const std::uint32_t> nearby) const {
     EdgeCrossing& found = *crossing_[axis][sample];
@@ -274,7 +279,8 @@ class LeafHits {
     return true;
   }
 
-  /// `met`: where the edge is met as `place` has it, from the leaf's lower end; `hit`: the same between the samples.
+  /// `met`: where the edge is met as `place` has it, from the leaf's lower end; `hit`: the same between the
+  /// samples.
   void offer(int axis, int u, int v, int pu, int pv, double met, double hit, const Eigen::Vector3d& normal,
              EdgePlace place) {
     if (!(met >= -kTolerance && met <= 8.0 + kTolerance)) return;
@@ -294,10 +300,11 @@ class LeafHits {
       const double away = std::abs(offset - crossing_[axis][sample]->offset);
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
-      // A hit that passes the way that the signs say beats one that does not; among equals the one nearer to the level
-      // set's own crossing wins, and of those the first.
+      // A hit that passes the way that the signs say beats one that does not; among equals the one nearer to
+      // the level set's own crossing wins, and of those the first.
       const bool better = consistent != best.consistent ? consistent : away < best.away;
-      if (first || better) best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
+      if (first || better)
+        best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
     }
   }
 
@@ -320,7 +327,8 @@ FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const P
   parallel_blocks(result.leaves.size(), context, [&](std::size_t b) {
     const std::size_t size = result.crossings_of(b).size();
     const auto hits = std::make_unique<LeafHits>(
-        result.leaves[b], std::span(result.crossings).subspan(result.leaves[b].first, size), result.placement.base);
+        result.leaves[b], std::span(result.crossings).subspan(result.leaves[b].first, size),
+        result.placement.base);
     const std::span<const std::uint32_t> nearby(bins.list.data() + bins.first[b],
                                                 bins.first[b + 1] - bins.first[b]);
     const auto add_all = [&](LeafHits::EdgePlace place) {

@@ -49,12 +49,14 @@ void report_figures(const Represented& data, const LevelSet& level_set, RunConte
   // Losses are a figure for tables and a note for whoever reads the run.
   context.figure("lost_crossings", static_cast<double>(data.lost));
   if (data.lost > 0)
-    context.note(std::to_string(data.lost) + " of " + std::to_string(data.crossings) +
-                       " edge crossings were lost by the representation of the Hermite data and stand in the middle "
-                       "of their edges");
+    context.note(
+        std::to_string(data.lost) + " of " + std::to_string(data.crossings) +
+        " edge crossings were lost by the representation of the Hermite data and stand in the middle "
+        "of their edges");
 }
 
-Represented through(Representation representation, NormalCodeId code, FloatHermite hermite, RunContext& context) {
+Represented through(Representation representation, NormalCodeId code, FloatHermite hermite,
+                    RunContext& context) {
   Represented result;
   // Taken first, because the data may be moved away below.
   result.crossings = hermite.crossings.size();

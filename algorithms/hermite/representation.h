@@ -19,7 +19,8 @@ enum class Representation {
   directed,      ///< DirectedVoxel, 12 bytes: offsets without normals
 };
 
-/// @throws Error for a name that is not one of "sparse-float", "sparse", "dense-float", "fixed", "thesis", "directed".
+/// @throws Error for a name that is not one of "sparse-float", "sparse", "dense-float", "fixed", "thesis",
+/// "directed".
 Representation parse_representation(const std::string& name);
 
 struct Represented {
@@ -29,14 +30,15 @@ struct Represented {
   std::size_t lost = 0;       ///< number of crossings that it lost; they came back as edges cut in the middle
 };
 
-/// Adds figures to the run: the bytes of the representation, in all, for each crossing and for each active voxel of
-/// the level set.
+/// Adds figures to the run: the bytes of the representation, in all, for each crossing and for each active
+/// voxel of the level set.
 void report_size(const Represented& data, const LevelSet& level_set, RunContext& context);
 /// Adds those figures, and what the representation lost, with a note where it lost something.
 void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context);
 
 /// Stores the data in a representation, with normals in `code` where it packs them, and reads them again.
 /// `thesis` has its own normals whatever `code` is.
-Represented through(Representation representation, NormalCodeId code, FloatHermite hermite, RunContext& context);
+Represented through(Representation representation, NormalCodeId code, FloatHermite hermite,
+                    RunContext& context);
 
 }  // namespace hermesh

@@ -109,9 +109,9 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
   }
 }
 
-/// An open mesh's volume depends on where it is measured from, and the origin is no place of its own: away from it in
-/// either direction (but not so far that index coordinates have another base) the data are those at the origin. Edges
-/// without a hit tell, which want a polygon that looks outwards.
+/// An open mesh's volume depends on where it is measured from, and the origin is no place of its own: away
+/// from it in either direction (but not so far that index coordinates have another base) the data are those
+/// at the origin. Edges without a hit tell, which want a polygon that looks outwards.
 TEST(PolygonSampler, AnOpenMeshIsNotTurnedOverForItsPlace) {
   initialize_openvdb();
   constexpr double kHalf = 12.4;
@@ -125,7 +125,8 @@ TEST(PolygonSampler, AnOpenMeshIsNotTurnedOverForItsPlace) {
       for (int y = -16; y <= 16; ++y)
         for (int z = -16; z <= 16; ++z) {
           const double sum = (Vector3d(far + x, y, z) - centre).cwiseAbs().sum();
-          grid->tree().setValue(openvdb::Coord(far + x, y, z), static_cast<float>((sum - kHalf) / std::sqrt(3.0)));
+          grid->tree().setValue(openvdb::Coord(far + x, y, z),
+                                static_cast<float>((sum - kHalf) / std::sqrt(3.0)));
         }
     RunContext context;
     return sample_polygons(make_level_set(grid), 0.0, open, context, &sampling);
@@ -139,7 +140,8 @@ TEST(PolygonSampler, AnOpenMeshIsNotTurnedOverForItsPlace) {
     EXPECT_EQ(sampling.nearest, at_origin.nearest) << far;
     ASSERT_EQ(found.crossings.size(), expected.crossings.size());
     for (std::size_t i = 0; i < found.crossings.size(); ++i)
-      for (int a = 0; a < 3; ++a) ASSERT_NEAR(found.crossings[i].normal[a], expected.crossings[i].normal[a], 1e-3) << far;
+      for (int a = 0; a < 3; ++a)
+        ASSERT_NEAR(found.crossings[i].normal[a], expected.crossings[i].normal[a], 1e-3) << far;
   }
 }
 

@@ -8,9 +8,9 @@
 
 namespace hermesh {
 
-/// Signs of a leaf, in 104 bytes. An edge belongs to the sample that it starts from, so the leaf owns the edges that
-/// lead from its last layers into its three upper neighbors; the signs of their first layers are kept here, so that no
-/// neighbor is looked up.
+/// Signs of a leaf, in 104 bytes. An edge belongs to the sample that it starts from, so the leaf owns the
+/// edges that lead from its last layers into its three upper neighbors; the signs of their first layers are
+/// kept here, so that no neighbor is looked up.
 struct SignLeaf {
   std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample, multiples of 8
   std::uint32_t first;                ///< number of the leaf's first crossing
@@ -57,8 +57,7 @@ inline std::uint64_t first_layer(const BlockMask& inside, int axis) {
   for (int x = 0; x < 8; ++x) {
     const std::uint64_t word = inside[x];
     // Along z the first bit of every byte is gathered: bit 8y goes to bit y.
-    const std::uint64_t row =
-        axis == 1 ? word & kFirstY : ((word & kFirstZ) * 0x0102040810204080u) >> 56;
+    const std::uint64_t row = axis == 1 ? word & kFirstY : ((word & kFirstZ) * 0x0102040810204080u) >> 56;
     result |= row << (8 * x);
   }
   return result;

@@ -1,5 +1,5 @@
-// Between the signs of SparseHermite and OpenVDB trees that have a sign for every sample: trees of dense voxels, and
-// the tree of bits in files. Heavy (OpenVDB): include it from .cpp files.
+// Between the signs of SparseHermite and OpenVDB trees that have a sign for every sample: trees of dense
+// voxels, and the tree of bits in files. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
 #include <tbb/parallel_sort.h>
@@ -19,8 +19,8 @@ using Position = std::array<std::int32_t, 3>;
 inline Position position(const openvdb::Coord& at) { return {at.x(), at.y(), at.z()}; }
 inline openvdb::Coord coord(const Position& at) { return {at[0], at[1], at[2]}; }
 
-/// Calls f(slot, inside) for every slot of an internal node that has no child. Slots follow one another along z, so
-/// that a sign is looked up once for every run of them: no leaf lies in a run to change it.
+/// Calls f(slot, inside) for every slot of an internal node that has no child. Slots follow one another along
+/// z, so that a sign is looked up once for every run of them: no leaf lies in a run to change it.
 template <class Node, class Crossing, class F>
 void for_each_tile(const Node& node, const SparseHermite<Crossing>& hermite, F&& f) {
   constexpr openvdb::Index kColumn = (1u << Node::LOG2DIM) - 1;
@@ -34,8 +34,8 @@ void for_each_tile(const Node& node, const SparseHermite<Crossing>& hermite, F&&
   }
 }
 
-/// Calls f(place, inside) for every place between two children of the root in a column along z. Before the first and
-/// behind the last all samples have the outermost sign.
+/// Calls f(place, inside) for every place between two children of the root in a column along z. Before the
+/// first and behind the last all samples have the outermost sign.
 template <class Root, class Crossing, class F>
 void for_each_gap(const Root& root, const SparseHermite<Crossing>& hermite, F&& f) {
   constexpr std::int64_t kWidth = Root::ChildNodeType::DIM;
@@ -54,15 +54,17 @@ void for_each_gap(const Root& root, const SparseHermite<Crossing>& hermite, F&& 
 
 /// Numbers of elements by the node of `width` samples that they lie in: runs of the result with equal nodes.
 struct Grouped {
-  std::vector<std::pair<openvdb::Coord, std::uint32_t>> members;  ///< origin of the node, number of the element
-  std::vector<std::size_t> starts;                                ///< first member of each run, and the end of the last
+  std::vector<std::pair<openvdb::Coord, std::uint32_t>>
+      members;                      ///< origin of the node, number of the element
+  std::vector<std::size_t> starts;  ///< first member of each run, and the end of the last
 };
 
 template <class Lower>
 Grouped grouped(std::size_t size, std::int32_t width, Lower&& lower) {
   Grouped result;
   result.members.resize(size);
-  for (std::size_t i = 0; i < size; ++i) result.members[i] = {lower(i) & ~(width - 1), static_cast<std::uint32_t>(i)};
+  for (std::size_t i = 0; i < size; ++i)
+    result.members[i] = {lower(i) & ~(width - 1), static_cast<std::uint32_t>(i)};
   tbb::parallel_sort(result.members.begin(), result.members.end());
   for (std::size_t i = 0; i < size; ++i)
     if (i == 0 || result.members[i].first != result.members[i - 1].first) result.starts.push_back(i);
@@ -89,8 +91,8 @@ std::vector<std::unique_ptr<Node>> nodes_above(const SparseHermite<Crossing>& he
   return nodes;
 }
 
-/// A tree with a leaf for each of `hermite` and tiles of `values`, outside and inside, elsewhere. `make_leaf(i)` makes
-/// a leaf of the tree and is called in parallel.
+/// A tree with a leaf for each of `hermite` and tiles of `values`, outside and inside, elsewhere.
+/// `make_leaf(i)` makes a leaf of the tree and is called in parallel.
 template <class Tree, class Crossing, class MakeLeaf>
 typename Tree::Ptr make_tree(const SparseHermite<Crossing>& hermite,
                              const std::array<typename Tree::ValueType, 2>& values, RunContext& context,
@@ -99,8 +101,8 @@ typename Tree::Ptr make_tree(const SparseHermite<Crossing>& hermite,
   using Upper = typename Root::ChildNodeType;
   using Lower = typename Upper::ChildNodeType;
   auto lowers = nodes_above<Lower>(
-      hermite, hermite.leaves.size(), values, context, [&](std::size_t i) { return coord(hermite.leaves[i].lower); },
-      make_leaf);
+      hermite, hermite.leaves.size(), values, context,
+      [&](std::size_t i) { return coord(hermite.leaves[i].lower); }, make_leaf);
   auto uppers = nodes_above<Upper>(
       hermite, lowers.size(), values, context, [&](std::size_t i) { return lowers[i]->origin(); },
       [&](std::size_t i) { return lowers[i].release(); });
@@ -112,11 +114,11 @@ typename Tree::Ptr make_tree(const SparseHermite<Crossing>& hermite,
   return tree;
 }
 
-/// The leaves of a tree in the order of SparseHermite, with signs. @throws Error if a place is no multiple of 8 or so
-/// far away that its neighbours' coordinates would overflow.
+/// The leaves of a tree in the order of SparseHermite, with signs. @throws Error if a place is no multiple of
+/// 8 or so far away that its neighbours' coordinates would overflow.
 template <class Tree, class IsInside>
-LargeArray<SignLeaf> leaf_signs(const std::vector<const typename Tree::LeafNodeType*>& sources, RunContext& context,
-                                IsInside&& is_inside) {
+LargeArray<SignLeaf> leaf_signs(const std::vector<const typename Tree::LeafNodeType*>& sources,
+                                RunContext& context, IsInside&& is_inside) {
   constexpr std::int32_t kFarthest = 1 << 30;
   LargeArray<SignLeaf> leaves(sources.size());
   parallel_blocks(sources.size(), context, [&](std::size_t i) {
@@ -133,11 +135,11 @@ LargeArray<SignLeaf> leaf_signs(const std::vector<const typename Tree::LeafNodeT
   return leaves;
 }
 
-/// Fills in the layers beyond the leaves of a tree, which are all there, and gives the number of crossing edges of
-/// each.
+/// Fills in the layers beyond the leaves of a tree, which are all there, and gives the number of crossing
+/// edges of each.
 template <class Tree, class Crossing, class IsInside>
-std::vector<std::uint64_t> complete_leaves(const Tree& tree, SparseHermite<Crossing>& all, RunContext& context,
-                                           IsInside&& is_inside) {
+std::vector<std::uint64_t> complete_leaves(const Tree& tree, SparseHermite<Crossing>& all,
+                                           RunContext& context, IsInside&& is_inside) {
   std::vector<std::uint64_t> owned(all.leaves.size());
   parallel_blocks(owned.size(), context, [&](std::size_t i) {
     SignLeaf& leaf = all.leaves[i];
@@ -154,9 +156,9 @@ std::vector<std::uint64_t> complete_leaves(const Tree& tree, SparseHermite<Cross
   return owned;
 }
 
-/// Signs of a tree, with room for the crossings, and the tree's leaves that they came from. Leaves that own no crossing
-/// edge are left out. The result is sound where the tree is; check_consistent(), check_columns() and check_tiles()
-/// tell.
+/// Signs of a tree, with room for the crossings, and the tree's leaves that they came from. Leaves that own
+/// no crossing edge are left out. The result is sound where the tree is; check_consistent(), check_columns()
+/// and check_tiles() tell.
 template <class Crossing, class Tree, class IsInside>
 std::vector<const typename Tree::LeafNodeType*> read_signs(const Tree& tree, SparseHermite<Crossing>& hermite,
                                                            RunContext& context, IsInside&& is_inside) {
@@ -182,8 +184,8 @@ std::vector<const typename Tree::LeafNodeType*> read_signs(const Tree& tree, Spa
   return sources;
 }
 
-/// @throws Error if two columns of missing leaves disagree side by side. Where both are missing, one of the two runs of
-/// missing leaves begins behind a leaf; so it is enough to look there.
+/// @throws Error if two columns of missing leaves disagree side by side. Where both are missing, one of the
+/// two runs of missing leaves begins behind a leaf; so it is enough to look there.
 template <class Crossing>
 void check_columns(const SparseHermite<Crossing>& hermite) {
   for (const SignLeaf& leaf : hermite.leaves) {
@@ -197,7 +199,8 @@ void check_columns(const SparseHermite<Crossing>& hermite) {
   }
 }
 
-/// @throws Error if a sample of the tree without a leaf of `hermite` has another sign than SparseHermite says.
+/// @throws Error if a sample of the tree without a leaf of `hermite` has another sign than SparseHermite
+/// says.
 template <class Tree, class Crossing, class IsInside>
 void check_tiles(const Tree& tree, const SparseHermite<Crossing>& hermite, IsInside&& is_inside) {
   const auto check = [](bool a, bool b) {

@@ -5,16 +5,16 @@
 #include <limits>
 
 #include "algorithms/core/error.h"
-#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/combine.h"
 #include "algorithms/io/grid_frame.h"
+#include "algorithms/lattice/grid_placement.h"
 
 namespace hermesh {
 namespace {
 
-/// A copy of a grid with the least positive number in place of zeros. A sample at 0 is outside, and so has to be in
-/// the inside of the complement, which negation alone would deny it.
+/// A copy of a grid with the least positive number in place of zeros. A sample at 0 is outside, and so has to
+/// be in the inside of the complement, which negation alone would deny it.
 openvdb::FloatGrid::Ptr without_zeros(const openvdb::FloatGrid& grid) {
   const openvdb::FloatGrid::Ptr result = grid.deepCopy();
   for (auto value = result->beginValueAll(); value; ++value)
@@ -55,8 +55,8 @@ SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double 
 }
 
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const SampleMesh& sample) {
-  // The frame is a lattice without rotation; the mesh is voxelized near its zero, and what comes of it is moved back
-  // by whole blocks.
+  // The frame is a lattice without rotation; the mesh is voxelized near its zero, and what comes of it is
+  // moved back by whole blocks.
   const GridFrame frame{lattice.voxel_size, Eigen::Matrix3d::Identity(), lattice.origin};
   FramedMesh framed = into_frame(mesh, frame);
   // The lattice stays where it is, and what is said of places is said of the world's.
@@ -88,8 +88,8 @@ CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     result.level_set = make_level_set(grid);
   }
-  // Signs of values and of Hermite data follow the same rule, sample by sample, so that both have the same crossing
-  // edges.
+  // Signs of values and of Hermite data follow the same rule, sample by sample, so that both have the same
+  // crossing edges.
   result.hermite = combine(boolean, a.hermite, b.hermite, context);
   result.hermite.placement = placement_of(*result.level_set.grid().grid);
   return result;

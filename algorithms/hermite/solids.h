@@ -18,8 +18,8 @@ struct SharedLattice {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
-/// The lattice of two meshes, about choose_origin() of the box about both, so that it does not matter which comes
-/// first, and near the zero of the world samples lie at multiples of the voxel size.
+/// The lattice of two meshes, about choose_origin() of the box about both, so that it does not matter which
+/// comes first, and near the zero of the world samples lie at multiples of the voxel size.
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size);
 
 struct SampledSolid {
@@ -40,14 +40,14 @@ SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice,
 std::string missed_edges_note(const PolygonSampling& sampling);
 
 /// Signs and crossings of a combination, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
-/// operands' signs, and the edges with crossings are those whose ends differ. The values of the level set are the
-/// minima (maxima) of the operands'.
+/// operands' signs, and the edges with crossings are those whose ends differ. The values of the level set are
+/// the minima (maxima) of the operands'.
 struct CombinedSolid {
   LevelSet level_set;
   FloatHermite hermite;
 };
-/// Combines two solids on one lattice. The bytes of a union and an intersection do not depend on which operand comes
-/// first. @throws Error as combine() of the Hermite data does.
+/// Combines two solids on one lattice. The bytes of a union and an intersection do not depend on which
+/// operand comes first. @throws Error as combine() of the Hermite data does.
 CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid& b, RunContext& context);
 
 }  // namespace hermesh

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "algorithms/core/error.h"
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/hermite/lost_slivers.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/variants.h"
 
 namespace hermesh {

@@ -12,7 +12,8 @@ namespace {
 // Crossings in a task of a conversion, some microseconds of work.
 constexpr std::size_t kCrossingsPerTask = 4096;
 
-/// The data with f(crossing) in place of each crossing, in parallel. The leaves, and with them all ranks, stay.
+/// The data with f(crossing) in place of each crossing, in parallel. The leaves, and with them all ranks,
+/// stay.
 template <class To, class From, class F>
 SparseHermite<To> converted(const SparseHermite<From>& from, RunContext& context, F&& f) {
   SparseHermite<To> result;
@@ -30,7 +31,8 @@ SparseHermite<To> converted(const SparseHermite<From>& from, RunContext& context
 }
 
 std::string text_of(const std::array<std::int32_t, 3>& lower) {
-  return "(" + std::to_string(lower[0]) + ", " + std::to_string(lower[1]) + ", " + std::to_string(lower[2]) + ")";
+  return "(" + std::to_string(lower[0]) + ", " + std::to_string(lower[1]) + ", " + std::to_string(lower[2]) +
+         ")";
 }
 
 bool is_sound(const EdgeCrossing& crossing) {
@@ -41,8 +43,8 @@ bool is_sound(const EdgeCrossing& crossing) {
 }
 bool is_sound(const PackedCrossing& crossing) { return crossing.offset() <= kLastOffset; }
 
-/// @throws Error unless the samples that `leaf` claims to lie beyond its last layer along `axis` are those of `next`,
-/// or, where there is no such leaf, uniform and as the column says.
+/// @throws Error unless the samples that `leaf` claims to lie beyond its last layer along `axis` are those of
+/// `next`, or, where there is no such leaf, uniform and as the column says.
 template <class Crossing>
 void check_beyond(const SparseHermite<Crossing>& hermite, const SignLeaf& leaf, int axis) {
   std::array<std::int32_t, 3> there = leaf.lower;
@@ -53,16 +55,16 @@ void check_beyond(const SparseHermite<Crossing>& hermite, const SignLeaf& leaf, 
   else
     expected = hermite.sign_without_leaf(there) ? ~std::uint64_t{0} : 0;
   if (leaf.beyond[axis] != expected)
-    throw Error("the Hermite data disagree about the signs between the blocks at " + text_of(leaf.lower) + " and " +
-                text_of(there));
+    throw Error("the Hermite data disagree about the signs between the blocks at " + text_of(leaf.lower) +
+                " and " + text_of(there));
 }
 
 }  // namespace
 
 PackedHermite pack(const FloatHermite& hermite, NormalCodeId code, RunContext& context) {
   PackedHermite result = with_normal_code(code, [&](auto chosen) {
-    return converted<PackedCrossing>(hermite, context,
-                                     [](const EdgeCrossing& crossing) { return pack<decltype(chosen)>(crossing); });
+    return converted<PackedCrossing>(
+        hermite, context, [](const EdgeCrossing& crossing) { return pack<decltype(chosen)>(crossing); });
   });
   // Last, because converted() takes over the code of data that have none.
   result.normal_code = code;
@@ -71,14 +73,14 @@ PackedHermite pack(const FloatHermite& hermite, NormalCodeId code, RunContext& c
 
 FloatHermite unpack(const PackedHermite& hermite, RunContext& context) {
   return with_normal_code(hermite.normal_code, [&](auto chosen) {
-    return converted<EdgeCrossing>(hermite, context,
-                                   [](PackedCrossing crossing) { return unpack<decltype(chosen)>(crossing); });
+    return converted<EdgeCrossing>(
+        hermite, context, [](PackedCrossing crossing) { return unpack<decltype(chosen)>(crossing); });
   });
 }
 
 bool same_lattice(const IndexToWorld& a, const IndexToWorld& b) {
-  // Relative to the size of a voxel: a billionth in direction and size, a millionth in place, and what doubles lose
-  // far from the origin.
+  // Relative to the size of a voxel: a billionth in direction and size, a millionth in place, and what
+  // doubles lose far from the origin.
   const double size = a.linear.cwiseAbs().maxCoeff();
   if (!((a.linear - b.linear).cwiseAbs().maxCoeff() <= 1e-9 * size)) return false;
   // Placements may divide their translation differently, so what they do to index 0 is compared.
@@ -92,13 +94,15 @@ bool same_lattice(const IndexToWorld& a, const IndexToWorld& b) {
 
 template <class Crossing>
 void check_consistent(const SparseHermite<Crossing>& hermite) {
-  // In the order of the leaves, each against its neighbors and against the sum of crossings so far: then every rank is
-  // right.
+  // In the order of the leaves, each against its neighbors and against the sum of crossings so far: then
+  // every rank is right.
   std::size_t next = 0;
   for (std::size_t i = 0; i < hermite.leaves.size(); ++i) {
     const SignLeaf& leaf = hermite.leaves[i];
     for (const std::int32_t lower : leaf.lower)
-      if (lower & 7) throw Error("the Hermite data have a block at " + text_of(leaf.lower) + ", which is no multiple of 8");
+      if (lower & 7)
+        throw Error("the Hermite data have a block at " + text_of(leaf.lower) +
+                    ", which is no multiple of 8");
     if (i > 0 && !(hermite.leaves[i - 1].lower < leaf.lower))
       throw Error("the Hermite data have their blocks out of order at " + text_of(leaf.lower));
     std::size_t crossings = 0;
@@ -114,7 +118,8 @@ void check_consistent(const SparseHermite<Crossing>& hermite) {
       below[axis] -= 8;
       if (hermite.find(below)) continue;
       if (first_layer(leaf.inside, axis) != (hermite.sign_without_leaf(below) ? ~std::uint64_t{0} : 0))
-        throw Error("the Hermite data lack the block at " + text_of(below) + ", which must own a crossing edge");
+        throw Error("the Hermite data lack the block at " + text_of(below) +
+                    ", which must own a crossing edge");
     }
   }
   if (next != hermite.crossings.size())

@@ -1,8 +1,9 @@
 // Hermite data with one record a crossing edge: the representation that everything else is made from.
 //
-// The thesis's voxel has room for three crossings, whether there are any or not (§4.2), and most voxels of a band
-// have none. Here a leaf keeps its signs, 512 bits and a layer beyond, and the crossings of its edges follow one
-// another in an array; which edge a crossing belongs to is its rank among the set bits of the crossing masks.
+// The thesis's voxel has room for three crossings, whether there are any or not (§4.2), and most voxels of a
+// band have none. Here a leaf keeps its signs, 512 bits and a layer beyond, and the crossings of its edges
+// follow one another in an array; which edge a crossing belongs to is its rank among the set bits of the
+// crossing masks.
 #pragma once
 
 #include <algorithm>
@@ -19,15 +20,17 @@ namespace hermesh {
 
 /// Hermite data, leaf by leaf. `Crossing` is EdgeCrossing (16 bytes) or PackedCrossing (4).
 ///
-/// Only leaves that own a crossing edge are there, in ascending order of (x, y, z), so that two grids with the same
-/// signs and crossings are equal member by member, however they were made. A sample without a leaf has the sign that
-/// the leaf before it in its column along z leaves behind (`beyond[2]`, which is then uniform), or, if there is none
-/// before it, `outermost_inside`. This holds because between two missing leaves no edge is crossed.
+/// Only leaves that own a crossing edge are there, in ascending order of (x, y, z), so that two grids with
+/// the same signs and crossings are equal member by member, however they were made. A sample without a leaf
+/// has the sign that the leaf before it in its column along z leaves behind (`beyond[2]`, which is then
+/// uniform), or, if there is none before it, `outermost_inside`. This holds because between two missing
+/// leaves no edge is crossed.
 template <class Crossing>
 struct SparseHermite {
   IndexToWorld placement;
   bool outermost_inside = false;  ///< sign at infinity; true after a complement
-  NormalCodeId normal_code = NormalCodeId::octahedral;  ///< code of PackedCrossing's normals; else without meaning
+  NormalCodeId normal_code =
+      NormalCodeId::octahedral;  ///< code of PackedCrossing's normals; else without meaning
   LargeArray<SignLeaf> leaves;
   LargeArray<Crossing> crossings;  ///< ordered by leaf, in it by axis, in that by sample
 
@@ -80,8 +83,9 @@ FloatHermite unpack(const PackedHermite& hermite, RunContext& context);
 /// True if both place the same index coordinates at the same point of the world, up to rounding.
 bool same_lattice(const IndexToWorld& a, const IndexToWorld& b);
 
-/// @throws Error that says what is wrong if the leaves are out of order, the ranks do not add up, two leaves disagree
-/// about a sample, a crossing is not a number, or the sign of a missing leaf is ambiguous. For data from outside.
+/// @throws Error that says what is wrong if the leaves are out of order, the ranks do not add up, two leaves
+/// disagree about a sample, a crossing is not a number, or the sign of a missing leaf is ambiguous. For data
+/// from outside.
 template <class Crossing>
 void check_consistent(const SparseHermite<Crossing>& hermite);
 

@@ -1,4 +1,5 @@
-// For tests: Hermite data as plain arrays over a cube of samples, to build sparse data from and to compare them with.
+// For tests: Hermite data as plain arrays over a cube of samples, to build sparse data from and to compare
+// them with.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,8 +16,8 @@
 
 namespace hermesh {
 
-/// Signs and crossings of the samples from `lower` (a multiple of 8) to `lower + size - 1` along each axis; all others
-/// have the sign `outermost`, as must those of the cube's own outermost layers.
+/// Signs and crossings of the samples from `lower` (a multiple of 8) to `lower + size - 1` along each axis;
+/// all others have the sign `outermost`, as must those of the cube's own outermost layers.
 template <class Crossing>
 struct TestLattice {
   int lower = -8, size = 40;
@@ -24,7 +25,9 @@ struct TestLattice {
   std::vector<char> signs = std::vector<char>(static_cast<std::size_t>(size) * size * size, outermost);
   std::map<std::tuple<int, int, int, int>, Crossing> crossings{};  ///< crossings by axis, x, y, z
 
-  bool within(int x, int y, int z) const { return std::min({x, y, z}) >= lower && std::max({x, y, z}) < lower + size; }
+  bool within(int x, int y, int z) const {
+    return std::min({x, y, z}) >= lower && std::max({x, y, z}) < lower + size;
+  }
   char& sign(int x, int y, int z) {
     return signs[static_cast<std::size_t>(((x - lower) * size + (y - lower)) * size + (z - lower))];
   }
@@ -64,7 +67,8 @@ SignLeaf leaf_of(const TestLattice<Crossing>& lattice, int x0, int y0, int z0) {
 }
 
 template <class Crossing>
-SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice, NormalCodeId code = NormalCodeId::octahedral) {
+SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice,
+                                  NormalCodeId code = NormalCodeId::octahedral) {
   SparseHermite<Crossing> result;
   result.outermost_inside = lattice.outermost;
   result.normal_code = code;
@@ -85,20 +89,22 @@ SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice, NormalCo
   return result;
 }
 
-/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as the sparse data's own look-ups
-/// tell them.
+/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as the sparse data's own
+/// look-ups tell them.
 template <class Crossing>
 TestLattice<Crossing> to_lattice(const SparseHermite<Crossing>& sparse, int lower, int size) {
   TestLattice<Crossing> result{lower, size, sparse.outermost_inside};
   result.for_each_sample([&](int x, int y, int z) {
     const std::array<std::int32_t, 3> at = {x & ~7, y & ~7, z & ~7};
     const SignLeaf* leaf = sparse.find(at);
-    result.sign(x, y, z) = leaf ? test(leaf->inside, sample_index(x & 7, y & 7, z & 7)) : sparse.sign_without_leaf(at);
+    result.sign(x, y, z) =
+        leaf ? test(leaf->inside, sample_index(x & 7, y & 7, z & 7)) : sparse.sign_without_leaf(at);
   });
   for (std::size_t i = 0; i < sparse.leaves.size(); ++i)
     for_each_crossing(sparse, i, [&](int axis, int sample, const Crossing& crossing) {
       const auto& at = sparse.leaves[i].lower;
-      result.crossings[{axis, at[0] + (sample >> 6), at[1] + ((sample >> 3) & 7), at[2] + (sample & 7)}] = crossing;
+      result.crossings[{axis, at[0] + (sample >> 6), at[1] + ((sample >> 3) & 7), at[2] + (sample & 7)}] =
+          crossing;
     });
   return result;
 }
@@ -168,7 +174,8 @@ inline Solid random_blobs(std::mt19937& random) {
       solids.push_back(ball(x, y, z, a));
       continue;
     }
-    if (random() % 2) x = std::floor(x), y = std::floor(y), a = std::ceil(a), b = std::ceil(b), c = std::floor(c);
+    if (random() % 2)
+      x = std::floor(x), y = std::floor(y), a = std::ceil(a), b = std::ceil(b), c = std::floor(c);
     solids.push_back(box(x, y, z, a, b, c));
   }
   return joined(solids);
@@ -176,18 +183,21 @@ inline Solid random_blobs(std::mt19937& random) {
 
 template <class Element>
 bool same_bytes(const LargeArray<Element>& a, const LargeArray<Element>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Element)) == 0);
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Element)) == 0);
 }
 
 /// Whether two data are equal member by member and byte by byte.
 template <class Crossing>
 testing::AssertionResult same(const SparseHermite<Crossing>& a, const SparseHermite<Crossing>& b) {
-  if (a.outermost_inside != b.outermost_inside) return testing::AssertionFailure() << "infinity differs in sign";
+  if (a.outermost_inside != b.outermost_inside)
+    return testing::AssertionFailure() << "infinity differs in sign";
   if (a.normal_code != b.normal_code) return testing::AssertionFailure() << "normals are in different codes";
   if (!same_bytes(a.leaves, b.leaves))
     return testing::AssertionFailure() << "leaves differ, " << a.leaves.size() << " and " << b.leaves.size();
   if (!same_bytes(a.crossings, b.crossings))
-    return testing::AssertionFailure() << "crossings differ, " << a.crossings.size() << " and " << b.crossings.size();
+    return testing::AssertionFailure()
+           << "crossings differ, " << a.crossings.size() << " and " << b.crossings.size();
   return testing::AssertionSuccess();
 }
 

@@ -29,7 +29,8 @@ decltype(auto) with_normal_code(NormalCodeId id, Function&& f) {
   return f(NearestNormalCode{});
 }
 
-static_assert(NormalCode<ThesisNormalCode> && NormalCode<BaptistaNormalCode> && NormalCode<RoundedNormalCode> &&
-              NormalCode<OctahedralNormalCode> && NormalCode<NearestNormalCode>);
+static_assert(NormalCode<ThesisNormalCode> && NormalCode<BaptistaNormalCode> &&
+              NormalCode<RoundedNormalCode> && NormalCode<OctahedralNormalCode> &&
+              NormalCode<NearestNormalCode>);
 
 }  // namespace hermesh

@@ -36,9 +36,9 @@ Unfinished& unfinished() {
   return *files;
 }
 
-/// Removes a file or folder whatever other threads do meanwhile. One may be filling a folder: that is moved aside
-/// first, so that no more files get into it. One may be removing it, and what that one takes away first is an error to
-/// this one: so it tries until nothing is left.
+/// Removes a file or folder whatever other threads do meanwhile. One may be filling a folder: that is moved
+/// aside first, so that no more files get into it. One may be removing it, and what that one takes away first
+/// is an error to this one: so it tries until nothing is left.
 void remove_for_good(const fs::path& path) {
   std::error_code ignored;
   const fs::path aside = path.string() + "~";
@@ -51,8 +51,8 @@ void remove_for_good(const fs::path& path) {
   }
 }
 
-/// A name that is hidden, in the same folder (a rename does not cross file systems), and with the same ending, which
-/// some libraries choose their format by.
+/// A name that is hidden, in the same folder (a rename does not cross file systems), and with the same
+/// ending, which some libraries choose their format by.
 fs::path temporary_name(const fs::path& target) {
   static std::atomic<unsigned> counter = 0;
   const std::string name = target.filename().string();
@@ -61,8 +61,9 @@ fs::path temporary_name(const fs::path& target) {
          (".hermesh-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + tail);
 }
 
-/// Makes something new beside `target`: calls `make` with one name after the other until there was nothing of that name.
-/// What a killed process left stands in the way of another one with its number, and in a container all have the same.
+/// Makes something new beside `target`: calls `make` with one name after the other until there was nothing of
+/// that name. What a killed process left stands in the way of another one with its number, and in a container
+/// all have the same.
 /// @returns the name; `error` is why there is nothing, if it is not 0.
 template <class Make>
 fs::path make_beside(const fs::path& target, int& error, Make&& make) {
@@ -73,8 +74,8 @@ fs::path make_beside(const fs::path& target, int& error, Make&& make) {
   }
 }
 
-/// What to write instead of `target`: where it is a link, the file behind it, for a rename would replace the link
-/// itself.
+/// What to write instead of `target`: where it is a link, the file behind it, for a rename would replace the
+/// link itself.
 fs::path checked_target(const fs::path& target) {
   std::error_code error;
   const fs::file_status status = fs::status(target, error);
@@ -124,8 +125,10 @@ AtomicFolder::AtomicFolder(fs::path target) : target_(std::move(target)) {
   if (!target_.has_filename()) target_ = target_.parent_path();  // "out/" is the folder "out"
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
-  if (!target_.has_filename() || (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target_, error))))
-    throw Error("cannot write to '" + target_.string() + "': it is there already and no empty folder; name a new one");
+  if (!target_.has_filename() ||
+      (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target_, error))))
+    throw Error("cannot write to '" + target_.string() +
+                "': it is there already and no empty folder; name a new one");
   const std::lock_guard lock(unfinished().mutex);
   int failure = 0;
   temporary_ =
@@ -155,14 +158,15 @@ void AtomicFolder::commit() {
 void commit_together(AtomicFile& first, AtomicFile& second) {
   // Held all the time, so that a signal's end of the process comes before or after both.
   const std::lock_guard lock(unfinished().mutex);
-  // A second name, or where the file system knows no hard links a copy, keeps the old first file until both are
-  // renamed.
+  // A second name, or where the file system knows no hard links a copy, keeps the old first file until both
+  // are renamed.
   const bool replaces = fs::exists(first.target_);
   fs::path older;
   if (replaces) {
     int no_links = 0;
-    older = make_beside(first.target_, no_links,
-                        [&](const fs::path& name) { return ::link(first.target_.c_str(), name.c_str()) == 0; });
+    older = make_beside(first.target_, no_links, [&](const fs::path& name) {
+      return ::link(first.target_.c_str(), name.c_str()) == 0;
+    });
     if (no_links != 0) fs::copy_file(first.target_, older);
   }
   try {

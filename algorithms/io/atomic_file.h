@@ -5,8 +5,8 @@
 
 namespace hermesh {
 
-/// A temporary file beside `target`, reserved by the constructor. The destructor removes it unless commit() renamed
-/// it; remove_unfinished_files() does so when the process is being cancelled.
+/// A temporary file beside `target`, reserved by the constructor. The destructor removes it unless commit()
+/// renamed it; remove_unfinished_files() does so when the process is being cancelled.
 class AtomicFile {
  public:
   /// @throws Error if the folder does not exist or cannot be written.
@@ -30,7 +30,8 @@ class AtomicFile {
 /// A folder of files that is there whole or not at all: write into path(), then commit().
 class AtomicFolder {
  public:
-  /// @throws Error if the parent folder does not exist or cannot be written, or if `target` is there and is no empty folder.
+  /// @throws Error if the parent folder does not exist or cannot be written, or if `target` is there and is
+  /// no empty folder.
   explicit AtomicFolder(std::filesystem::path target);
   ~AtomicFolder();
   AtomicFolder(const AtomicFolder&) = delete;
@@ -45,12 +46,12 @@ class AtomicFolder {
   bool committed_ = false;
 };
 
-/// Commits both files or neither: if the second cannot be renamed, the first target holds again what it held, or
-/// nothing. @throws Error as commit() does.
+/// Commits both files or neither: if the second cannot be renamed, the first target holds again what it held,
+/// or nothing. @throws Error as commit() does.
 void commit_together(AtomicFile& first, AtomicFile& second);
 
-/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open: for the moment before a
-/// process ends itself.
+/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open: for the moment before
+/// a process ends itself.
 void remove_unfinished_files() noexcept;
 
 }  // namespace hermesh

@@ -95,7 +95,8 @@ TEST_F(AtomicFileTest, WhatAKilledProcessLeftIsNotInTheWay) {
   const std::string head = ".hermesh-" + std::to_string(getpid()) + "-";
   ASSERT_TRUE(name.starts_with(head)) << name;
   const unsigned long next = std::stoul(name.substr(head.size())) + 1;
-  for (unsigned long i = next; i < next + 5; ++i) write(folder / (head + std::to_string(i) + "-a.txt"), "left");
+  for (unsigned long i = next; i < next + 5; ++i)
+    write(folder / (head + std::to_string(i) + "-a.txt"), "left");
   for (unsigned long i = next + 6; i < next + 9; ++i)
     fs::create_directory(folder / (head + std::to_string(i) + "-out"));
   AtomicFile file(folder / "a.txt");

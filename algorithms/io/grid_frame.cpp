@@ -29,8 +29,8 @@ template <class Tree>
 void move_tree(Tree& tree, const openvdb::Coord& by) {
   using Root = typename Tree::RootNodeType;
   Root& root = tree.root();
-  // The root is a map from places to nodes and tiles, so all of them are taken out and entered anew. Below it only
-  // origins change.
+  // The root is a map from places to nodes and tiles, so all of them are taken out and entered anew. Below it
+  // only origins change.
   std::vector<std::tuple<openvdb::Coord, typename Root::ValueType, bool>> tiles;
   for (auto tile = root.cbeginValueAll(); tile; ++tile)
     tiles.emplace_back(tile.getCoord(), *tile, tile.isValueOn());
@@ -66,8 +66,8 @@ GridFrame grid_frame(const openvdb::math::Transform& transform) {
   Eigen::Matrix3d linear;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) linear(i, j) = matrix(j, i);
-  // If all axes have one scale and right angles, the cube root of the volume is that scale, and what is left is a
-  // rotation; whether it is one is judged by how far its columns are from orthonormal.
+  // If all axes have one scale and right angles, the cube root of the volume is that scale, and what is left
+  // is a rotation; whether it is one is judged by how far its columns are from orthonormal.
   frame.voxel_size = std::cbrt(std::abs(linear.determinant()));
   frame.rotation = linear / frame.voxel_size;
   frame.offset = zero;
@@ -104,9 +104,9 @@ FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame) {
   FramedMesh result{mesh, {}};
   Vector3d moved = Vector3d::Zero();
   for (int a = 0; a < 3; ++a) {
-    // The middle of the mesh in multiples of kTop voxels. Rounded to a whole number it becomes the new origin, at most
-    // half a top node from the middle, so that points in single precision stay fine, and a tree can be moved back by
-    // whole top nodes.
+    // The middle of the mesh in multiples of kTop voxels. Rounded to a whole number it becomes the new
+    // origin, at most half a top node from the middle, so that points in single precision stay fine, and a
+    // tree can be moved back by whole top nodes.
     const double middle = box.empty() ? 0.0 : 0.5 * (box.lower[a] + box.upper[a]) / frame.voxel_size / kTop;
     if (!(std::abs(middle) < (1 << 30) / kTop))
       throw Error(
@@ -127,8 +127,8 @@ void out_of_frame(const std::vector<openvdb::GridBase::Ptr>& grids, const GridFr
     if (const auto zero = grid->getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions)) {
       const auto points = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
       for (auto value = points->beginValueOn(); value; ++value) {
-        // Closest points are relative to their zero, so they are only turned; the zero itself is turned, moved and
-        // offset, in double precision.
+        // Closest points are relative to their zero, so they are only turned; the zero itself is turned,
+        // moved and offset, in double precision.
         const Vector3d turned = frame.rotation * to_eigen(*value);
         value.setValue(openvdb::Vec3s(openvdb::Vec3d(turned.x(), turned.y(), turned.z())));
       }

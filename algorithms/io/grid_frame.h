@@ -22,8 +22,8 @@ struct GridFrame {
 /// differently along different axes, sheared, perspective), and for one that mirrors.
 GridFrame grid_frame(const openvdb::math::Transform& transform);
 
-/// The frame of the first float grid in the file. @throws Error as grid_frame(), and if the file cannot be read or
-/// holds none.
+/// The frame of the first float grid in the file. @throws Error as grid_frame(), and if the file cannot be
+/// read or holds none.
 GridFrame read_grid_frame(const std::filesystem::path& path);
 
 /// A mesh in the coordinates of a frame, near their zero.

@@ -15,10 +15,10 @@ namespace mesh_formats {
 
 namespace {
 
-constexpr std::array<std::string_view, 7> extensions = {".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf"};
-constexpr std::array<std::string_view, 7> names = {"PLY",         "OBJ",          "OFF",
-                                                   "STL",         "binary glTF",  "glTF in text",
-                                                   "a ZIP archive, as 3MF is"};
+constexpr std::array<std::string_view, 7> extensions = {".ply", ".obj",  ".off", ".stl",
+                                                        ".glb", ".gltf", ".3mf"};
+constexpr std::array<std::string_view, 7> names = {
+    "PLY", "OBJ", "OFF", "STL", "binary glTF", "glTF in text", "a ZIP archive, as 3MF is"};
 
 std::string lower(std::string text) {
   for (char& c : text)
@@ -35,8 +35,8 @@ TextCursor to_first_word(std::string_view bytes) {
 
 /// The format that the content shows for certain, whatever the file is called.
 std::optional<Format> format_of_content(std::string_view bytes) {
-  // From the surest sign to the weakest: an exact length, then a first line, then words that text of other kinds may
-  // begin with, too.
+  // From the surest sign to the weakest: an exact length, then a first line, then words that text of other
+  // kinds may begin with, too.
   if (is_binary_stl(bytes)) return Format::stl;
   if (begins_like_ply(bytes)) return Format::ply;
   if (begins_like_glb(bytes)) return Format::glb;
@@ -68,8 +68,8 @@ bool is_utf16(std::string_view bytes) {
                                (bytes.starts_with("\xFE\xFF") && bytes[2] == '\0'));
 }
 
-/// @throws Error where the content shows that the file is of another format than its name says. The name decides what
-/// is read; content that tells nothing is believed, but for formats that always tell.
+/// @throws Error where the content shows that the file is of another format than its name says. The name
+/// decides what is read; content that tells nothing is believed, but for formats that always tell.
 void check_format(std::string_view bytes, Format named, const std::string& file) {
   const std::optional<Format> content = format_of_content(bytes);
   const std::string is_named =
@@ -97,8 +97,7 @@ std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
 }
 
 void throw_unknown_extension(const std::filesystem::path& path) {
-  throw Error(in_quotes(path.string()) +
-              " is of an unknown type; mesh files end in " + kMeshEndings);
+  throw Error(in_quotes(path.string()) + " is of an unknown type; mesh files end in " + kMeshEndings);
 }
 
 namespace {
@@ -126,8 +125,8 @@ std::size_t PointMerger::slot_of(const Eigen::Vector3d& point, std::uint64_t has
 }
 
 void PointMerger::grow() {
-  // Sizes are powers of two, since slots are taken by the low bits. Growing enters all points anew; their numbers do
-  // not change.
+  // Sizes are powers of two, since slots are taken by the low bits. Growing enters all points anew; their
+  // numbers do not change.
   slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
   for (std::size_t i = 0; i < points_.size(); ++i)
     slots_[slot_of(points_[i], hash_of(points_[i]))] = static_cast<std::uint32_t>(i + 1);
@@ -140,7 +139,8 @@ std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
   std::uint32_t& recent = recent_[hash & (recent_.size() - 1)];
   if (recent != 0 && points_[recent - 1] == canonical) return recent - 1;
   const std::size_t slot = slot_of(canonical, hash);
-  // A new point gets the next number, so that numbers depend on the order of the file alone and not on hashes.
+  // A new point gets the next number, so that numbers depend on the order of the file alone and not on
+  // hashes.
   if (slots_[slot] == 0) {
     points_.push_back(canonical);
     slots_[slot] = static_cast<std::uint32_t>(points_.size());
@@ -158,8 +158,8 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   const std::size_t polygon = polygons_++;
   if (attributes_) attributes_->add_polygon(corners.size());
   for (const std::int64_t corner : corners) {
-    // Points may come after the polygons that name them (in PLY and OBJ), so here it is only checked that an index
-    // fits, and the largest is kept for finish().
+    // Points may come after the polygons that name them (in PLY and OBJ), so here it is only checked that an
+    // index fits, and the largest is kept for finish().
     if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
     if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
   }
@@ -180,7 +180,8 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
 }
 
 void MeshBuilder::number_triangles() {
-  // Where all triangles come before the first quad, or one kind is all there is, the order is that of triangulated().
+  // Where all triangles come before the first quad, or one kind is all there is, the order is that of
+  // triangulated().
   if (numbers_of_quads_.empty() || numbers_of_quads_.front() == numbers_of_triangles_.size()) return;
   mesh.triangle_numbers = std::move(numbers_of_triangles_);
   mesh.triangle_numbers.insert(mesh.triangle_numbers.end(), numbers_of_quads_.begin(),
@@ -208,8 +209,9 @@ void MeshBuilder::cut_concave_polygons() {
     if (attributes_ && !cut.empty()) attributes_->cut_polygon(fan.polygon, std::move(cut));
   }
   if (left > 0)
-    context_.note(in_quotes(file_) + ": " + std::to_string(left) +
-                  " concave polygons cross themselves; they were cut into fans, which may cover more than they do");
+    context_.note(
+        in_quotes(file_) + ": " + std::to_string(left) +
+        " concave polygons cross themselves; they were cut into fans, which may cover more than they do");
 }
 
 void MeshBuilder::add_comment(std::string_view text) {
@@ -230,8 +232,8 @@ void MeshBuilder::add_comment(std::string_view text) {
 
 void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   std::vector<std::size_t> kept;
-  // Points move down within their array, in order; only those left out have numbers that mean nothing, and no polygon
-  // names them.
+  // Points move down within their array, in order; only those left out have numbers that mean nothing, and no
+  // polygon names them.
   std::vector<std::uint32_t> numbers(mesh.points.size());
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     numbers[i] = static_cast<std::uint32_t>(kept.size());
@@ -249,11 +251,12 @@ void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   if (attributes_) attributes_->keep_points(std::move(kept));
 }
 
-/// Looks for points beyond single precision. Those that no polygon uses are left out: they must not stop the work, nor
-/// spoil what is computed of all points in single precision. @throws Error for a polygon's point that is not finite.
+/// Looks for points beyond single precision. Those that no polygon uses are left out: they must not stop the
+/// work, nor spoil what is computed of all points in single precision. @throws Error for a polygon's point
+/// that is not finite.
 void MeshBuilder::check_points() {
-  // Beyond single precision a point is as useless as one that is not finite, since meshes are single precision about
-  // an origin.
+  // Beyond single precision a point is as useless as one that is not finite, since meshes are single
+  // precision about an origin.
   const auto fits = [](const Eigen::Vector3d& point) {
     return (point.array().abs() <= double(std::numeric_limits<float>::max()))
         .all();  // false for what is no number, too
@@ -350,8 +353,8 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
 PolygonMesh to_polygon_mesh(const MeshFile& file) { return to_polygon_mesh(MeshFile(file)); }
 
 PolygonMesh to_polygon_mesh(MeshFile&& file) {
-  // Bounds of the polygons and not of the points: a stray point far away would move the origin, and cost all others
-  // precision.
+  // Bounds of the polygons and not of the points: a stray point far away would move the origin, and cost all
+  // others precision.
   Bounds box;
   for (const Triangle& triangle : file.triangles)
     for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
@@ -365,7 +368,8 @@ PolygonMesh to_polygon_mesh(MeshFile&& file) {
   mesh.attributes = std::move(file.attributes);
   mesh.points.reserve(file.points.size());
   for (const Eigen::Vector3d& point : file.points) {
-    // The difference is taken in double precision, so that a far origin costs nothing but the rounding of the result.
+    // The difference is taken in double precision, so that a far origin costs nothing but the rounding of the
+    // result.
     const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();
     if (!relative.allFinite())
       throw Error("the mesh has coordinates that are too large for single precision; scale it down");

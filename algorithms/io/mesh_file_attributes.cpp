@@ -18,8 +18,8 @@ const char* name_of(AttributeDomain domain) { return domain_names[static_cast<st
 /// Number in the file of each element of the mesh.
 using Order = std::vector<std::size_t>;
 
-/// Order of the polygons of the mesh, as MeshBuilder::add_polygon() cuts and drops: triangles and what is cut first,
-/// each piece with the number of its polygon, then the quads.
+/// Order of the polygons of the mesh, as MeshBuilder::add_polygon() cuts and drops: triangles and what is cut
+/// first, each piece with the number of its polygon, then the quads.
 Order polygon_order(const std::vector<std::uint32_t>& sizes) {
   Order order, quads;
   for (std::size_t polygon = 0; polygon < sizes.size(); ++polygon) {
@@ -33,8 +33,8 @@ Order polygon_order(const std::vector<std::uint32_t>& sizes) {
 
 template <class T>
 void reorder(std::vector<T>& values, std::size_t components, const Order& order) {
-  // Values are gathered in the order of the file, because what a polygon becomes is known only when all is read; this
-  // is the one time that they move.
+  // Values are gathered in the order of the file, because what a polygon becomes is known only when all is
+  // read; this is the one time that they move.
   std::vector<T> moved;
   moved.reserve(order.size() * components);
   for (const std::size_t element : order) {
@@ -84,8 +84,8 @@ std::vector<std::size_t> AttributeBuilder::corner_order() const {
 }
 
 void AttributeBuilder::spoil(std::size_t attribute, const std::string& reason) {
-  // Nothing is thrown: a bad attribute must not cost the mesh. It is left out at the end, or is an Error there if it
-  // was asked for by name.
+  // Nothing is thrown: a bad attribute must not cost the mesh. It is left out at the end, or is an Error
+  // there if it was asked for by name.
   std::string& spoiled = gathered_[attribute].spoiled;
   if (spoiled.empty()) spoiled = reason;
 }
@@ -141,8 +141,8 @@ void AttributeBuilder::reserve(AttributeDomain domain, std::size_t elements) {
 }
 
 void AttributeBuilder::begin(AttributeDomain domain) {
-  // Every attribute of the domain grows by one filled element, so that one that is never set is 0 or −1 and not the
-  // value of a neighbor.
+  // Every attribute of the domain grows by one filled element, so that one that is never set is 0 or −1 and
+  // not the value of a neighbor.
   ++begun(domain);
   for (const std::size_t attribute : of_domain_[static_cast<std::size_t>(domain)]) grow(gathered_[attribute]);
 }

@@ -43,8 +43,8 @@ std::size_t memory_limit() {
 void check_unpacked(std::uint64_t packed, std::uint64_t unpacked, const std::string& what) {
   if (unpacked > memory_limit()) throw Error(what + " unpacks to more than half of the memory there is");
   if (unpacked > std::max(kMostUnpackedAnyway, kMostUnpackedRatio * packed))
-    throw Error(what + " unpacks to more than " + std::to_string(kMostUnpackedRatio) + " times its length and " +
-                std::to_string(kMostUnpackedAnyway >> 20) +
+    throw Error(what + " unpacks to more than " + std::to_string(kMostUnpackedRatio) +
+                " times its length and " + std::to_string(kMostUnpackedAnyway >> 20) +
                 " MiB, which is the limit; if it is meant so, unpack it before");
 }
 
@@ -78,8 +78,8 @@ class Inflater {
  private:
   int step(std::string& bytes) {
     constexpr std::size_t most = std::size_t(1) << 30;  // zlib counts in 32 bits
-    // Room doubles when it is used up, so that the bytes are moved but a few times; before each doubling the limit is
-    // asked.
+    // Room doubles when it is used up, so that the bytes are moved but a few times; before each doubling the
+    // limit is asked.
     if (used_ == bytes.size()) {
       check_unpacked(packed_, bytes.size(), name_);
       bytes.resize(std::max<std::size_t>(2 * bytes.size(), 4 * rest_.size() + 4096));
@@ -119,12 +119,13 @@ std::string load_bytes(const fs::path& path, const RunContext& context) {
   const std::string name = in_quotes(path.string());
   const std::optional<MeshPath> named = parse_mesh_path(path);
   try {
-    // A length of the file or a room that memory has no place for ends here as bad_alloc, and becomes a sentence.
+    // A length of the file or a room that memory has no place for ends here as bad_alloc, and becomes a
+    // sentence.
     std::string bytes = read_whole(path);
     if (bytes.empty()) throw Error(name + " is empty");
-    if (is_gzip(bytes))
-      bytes = Inflater(bytes, path).unpack(context);
-    // A file that claims to be packed and is not was damaged on its way, or renamed; what it holds is anybody's guess.
+    if (is_gzip(bytes)) bytes = Inflater(bytes, path).unpack(context);
+    // A file that claims to be packed and is not was damaged on its way, or renamed; what it holds is
+    // anybody's guess.
     else if (named && named->gzipped)
       throw Error(name + " is named .gz but is not compressed by gzip");
     if (bytes.empty()) throw Error(name + " is empty once unpacked");

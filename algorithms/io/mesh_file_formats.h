@@ -1,4 +1,5 @@
-// What the parsers of the mesh file formats share. Private to algorithms/io/mesh_file*.cpp and algorithms/io/scenes.
+// What the parsers of the mesh file formats share. Private to algorithms/io/mesh_file*.cpp and
+// algorithms/io/scenes.
 #pragma once
 
 #include <filesystem>
@@ -26,36 +27,37 @@ std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path);
 /// @throws Error that lists the known extensions.
 [[noreturn]] void throw_unknown_extension(const std::filesystem::path& path);
 
-/// The whole file, unpacked if its first bytes say gzip (any number of members). @throws Error if it cannot be read,
-/// is empty, damaged or does not fit into memory.
+/// The whole file, unpacked if its first bytes say gzip (any number of members). @throws Error if it cannot
+/// be read, is empty, damaged or does not fit into memory.
 std::string load_bytes(const std::filesystem::path& path, const RunContext& context);
 /// The bytes of a regular file as they are. @throws Error if it cannot be read.
 std::string read_whole(const std::filesystem::path& path);
-/// Half of the machine's memory, in bytes: the limit of what a file may unpack to, since one of a few megabytes may
-/// unpack to terabytes.
+/// Half of the machine's memory, in bytes: the limit of what a file may unpack to, since one of a few
+/// megabytes may unpack to terabytes.
 std::size_t memory_limit();
 
-/// How many times its own length, or this many bytes, a packed file may unpack to. Text of meshes packs to a tenth, and
-/// only what was made to do harm to less than a 200th.
+/// How many times its own length, or this many bytes, a packed file may unpack to. Text of meshes packs to a
+/// tenth, and only what was made to do harm to less than a 200th.
 constexpr std::uint64_t kMostUnpackedRatio = 200, kMostUnpackedAnyway = std::uint64_t(1) << 28;
-/// Checks the length that `packed` bytes unpack to, so far or in all. @throws Error that begins with `what` if it is
-/// beyond those limits or memory_limit().
+/// Checks the length that `packed` bytes unpack to, so far or in all. @throws Error that begins with `what`
+/// if it is beyond those limits or memory_limit().
 void check_unpacked(std::uint64_t packed, std::uint64_t unpacked, const std::string& what);
 
-/// Gives points that are equal in all three coordinates (−0 is 0) one number, in the order in which they are first
-/// seen.
+/// Gives points that are equal in all three coordinates (−0 is 0) one number, in the order in which they are
+/// first seen.
 class PointMerger {
  public:
   explicit PointMerger(std::vector<Eigen::Vector3d>& points) : points_(points) {}
-  /// Number of the point, which is appended to the points if it is new. NaN equals nothing and must not come here.
+  /// Number of the point, which is appended to the points if it is new. NaN equals nothing and must not come
+  /// here.
   std::uint32_t add(const Eigen::Vector3d& point);
 
  private:
   void grow();
   std::size_t slot_of(const Eigen::Vector3d& point, std::uint64_t hash) const;
   std::vector<Eigen::Vector3d>& points_;
-  /// Cache by the low bits of the hash: the latest point with these. Most corners repeat a point of a moment ago, and
-  /// this table stays in the processor's cache when the other one has outgrown it.
+  /// Cache by the low bits of the hash: the latest point with these. Most corners repeat a point of a moment
+  /// ago, and this table stays in the processor's cache when the other one has outgrown it.
   std::vector<std::uint32_t> recent_ = std::vector<std::uint32_t>(1 << 15, 0);
   std::vector<std::uint32_t> slots_;  ///< open addressing, number of a point plus one; 0 is free
 };
@@ -81,12 +83,13 @@ class MeshBuilder {
     context_.check();
     context_.progress("read", total ? static_cast<double>(done) / static_cast<double>(total) : 0.0);
   }
-  /// Adds a polygon of any number of corners, which count from 0 and may name points that are still to come. @throws
-  /// Error for a corner that no index of 32 bits can number.
+  /// Adds a polygon of any number of corners, which count from 0 and may name points that are still to come.
+  /// @throws Error for a corner that no index of 32 bits can number.
   void add_polygon(std::span<const std::int64_t> corners);
   /// Takes over the origin from a comment `origin x y z`; any other text is ignored.
   void add_comment(std::string_view text);
-  /// The mesh, once indices, coordinates and counts have been checked. @throws Error if one of these is wrong.
+  /// The mesh, once indices, coordinates and counts have been checked. @throws Error if one of these is
+  /// wrong.
   MeshFile finish();
   /// @throws Error about the file.
   [[noreturn]] void fail(const std::string& what) const { throw Error(in_quotes(file_) + ": " + what); }
@@ -123,14 +126,15 @@ class MeshBuilder {
 MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
                     const ReadOptions& options = {});
 
-// The parsers of the formats hand what they find to the builder, and throw an Error that says where in the file.
+// The parsers of the formats hand what they find to the builder, and throw an Error that says where in the
+// file.
 
 void read_ply(std::string_view bytes, MeshBuilder& builder);
 void read_obj(std::string_view bytes, MeshBuilder& builder);
 void read_off(std::string_view bytes, MeshBuilder& builder);
 void read_stl(std::string_view bytes, MeshBuilder& builder);
-/// Whether the bytes have the length of a binary STL file of as many triangles as it declares: 84 bytes, then 50 for
-/// each triangle. No other format has exactly that length.
+/// Whether the bytes have the length of a binary STL file of as many triangles as it declares: 84 bytes, then
+/// 50 for each triangle. No other format has exactly that length.
 bool is_binary_stl(std::string_view bytes);
 /// Whether the first line is "ply".
 bool begins_like_ply(std::string_view bytes);

@@ -183,13 +183,15 @@ std::string gltf(const Ring& mesh, const std::string& uri) {
   const std::string size = std::to_string(12 * mesh.points.size()),
                     rest = std::to_string(6 * mesh.triangles.size());
   return R"({ "asset" : { "version" : "2.0" } , "scene" : 0 , "scenes" : [ { "nodes" : [ 0 , 1 ] } ] ,
-"nodes" : [ { "mesh" : 0 , "translation" : [ 1 , 2 , 3 ] } , { "children" : [ 2 ] , "scale" : [ 1 , -1 , 1 ] } , { "mesh" : 0 ,
-"rotation" : [ 0 , 0 , 0 , 1 ] } ] , "meshes" : [ { "primitives" : [ { "attributes" : { "POSITION" : 0 } , "indices" : 1 , "mode" : 4 } ,
+"nodes" : [
+{ "mesh" : 0 , "translation" : [ 1 , 2 , 3 ] } , { "children" : [ 2 ] , "scale" : [ 1 , -1 , 1 ] } ,
+{ "mesh" : 0 , "rotation" : [ 0 , 0 , 0 , 1 ] } ] , "meshes" : [ { "primitives" : [
+{ "attributes" : { "POSITION" : 0 } , "indices" : 1 , "mode" : 4 } ,
 { "attributes" : { "POSITION" : 0 } , "mode" : 5 } ] } ] ,
 "accessors" : [ { "bufferView" : 0 , "byteOffset" : 0 , "componentType" : 5126 , "count" : )" +
          points +
-         R"( , "type" : "VEC3" , "sparse" : { "count" : 2 , "indices" : { "bufferView" : 1 , "byteOffset" : 2 ,
-"componentType" : 5123 } , "values" : { "bufferView" : 0 , "byteOffset" : 12 } } } ,
+         R"( , "type" : "VEC3" , "sparse" : { "count" : 2 , "indices" : { "bufferView" : 1 ,
+"byteOffset" : 2 , "componentType" : 5123 } , "values" : { "bufferView" : 0 , "byteOffset" : 12 } } } ,
 { "bufferView" : 1 , "componentType" : 5123 , "count" : )" +
          corners + R"( , "type" : "SCALAR" } ] , "bufferViews" : [ { "buffer" : 0 , "byteLength" : )" + size +
          R"( , "byteStride" : 12 } , { "buffer" : 0 , "byteOffset" : )" + size + R"( , "byteLength" : )" +

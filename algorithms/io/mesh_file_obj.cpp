@@ -36,7 +36,8 @@ class ObjReader {
       builder_.tick(cursor_.offset(), bytes_.size());
       read_line();
     }
-    // What is no polygon is left out with a note: a mesh that lacks half of the model should not pass for whole.
+    // What is no polygon is left out with a note: a mesh that lacks half of the model should not pass for
+    // whole.
     if (left_out_ > 0)
       builder_.note("it holds curves, surfaces or calls of other files on " + std::to_string(left_out_) +
                     " lines, which are not read; the mesh lacks them");
@@ -54,7 +55,8 @@ class ObjReader {
     const std::size_t start = cursor_.offset();
     const std::string_view keyword = cursor_.word();
     const char first = keyword[0];
-    // From the commonest line to the rarest. Attributes that nobody asked for are skipped like any other line.
+    // From the commonest line to the rarest. Attributes that nobody asked for are skipped like any other
+    // line.
     if (keyword == "v") {
       read_point();
     } else if (keyword == "f" || keyword == "fo") {  // fo is what f was called at first
@@ -66,8 +68,8 @@ class ObjReader {
     } else if (builder_.attributes() && keyword == "usemtl") {
       read_material();
     } else if ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z')) {
-      // A word of letters may be a keyword of some program; anything else shows that the file is damaged, or no OBJ
-      // file.
+      // A word of letters may be a keyword of some program; anything else shows that the file is damaged, or
+      // no OBJ file.
       left_out_ += is_other_geometry(keyword);
       skip_continued_line();
     } else {
@@ -99,7 +101,8 @@ class ObjReader {
     skip_continued_line();
   }
 
-  /// The colour of the newest point: three numbers, or the last three of four, of which the first is then a weight.
+  /// The colour of the newest point: three numbers, or the last three of four, of which the first is then a
+  /// weight.
   void read_colour() {
     AttributeBuilder& attributes = *builder_.attributes();
     attributes.begin(AttributeDomain::point);
@@ -147,13 +150,15 @@ class ObjReader {
     if (name.ends_with('\\')) skip_continued_line();
     if (!material_attribute_)
       material_attribute_ = attributes.add("material", AttributeDomain::polygon, 1, true);
-    // Materials are numbered in the order in which they are first used; one that comes again keeps its number.
+    // Materials are numbered in the order in which they are first used; one that comes again keeps its
+    // number.
     const auto [entry, added] = material_numbers_.emplace(name, static_cast<int>(materials_.size()));
     if (added) materials_.push_back(name);
     material_ = entry->second;
   }
 
-  /// Reads a polygon, whose corners are v, v/vt, v//vn or v/vt/vn; a negative v counts back from the latest point.
+  /// Reads a polygon, whose corners are v, v/vt, v//vn or v/vt/vn; a negative v counts back from the latest
+  /// point.
   void read_polygon() {
     corners_.clear();
     for (skip_blanks(); !cursor_.at_line_end() && cursor_.peek() != '#'; skip_blanks()) {
@@ -163,8 +168,8 @@ class ObjReader {
       if (index < -points)
         cursor_.fail("a polygon refers to point " + std::to_string(index) + ", but there are only " +
                      std::to_string(points) + " points before it");
-      // What counts back must be resolved here; a number from the front may name a point that is still to come, and is
-      // checked at the end.
+      // What counts back must be resolved here; a number from the front may name a point that is still to
+      // come, and is checked at the end.
       corners_.push_back(index > 0 ? index - 1 : points + index);
       if (builder_.attributes()) {
         read_corner_value(uvs_);
@@ -210,8 +215,8 @@ class ObjReader {
     AttributeBuilder& attributes = *builder_.attributes();
     if (material_attribute_) attributes.set_labels(*material_attribute_, materials_);
     std::vector<std::pair<std::size_t, const CornerList*>> lists;
-    // Corners are given their values when all lists are complete, because a vt or vn may stand behind the polygon that
-    // names it.
+    // Corners are given their values when all lists are complete, because a vt or vn may stand behind the
+    // polygon that names it.
     for (const CornerList* list : {&uvs_, &normals_}) {
       if (!list->used) continue;
       lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),

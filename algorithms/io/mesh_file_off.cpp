@@ -41,16 +41,17 @@ class OffReader {
     return cursor_.number<std::uint64_t>("a count");
   }
 
-  /// Passes over the number of edges. Nobody fills it in, and some leave it out; where each count has a line of its
-  /// own, so has this one.
+  /// Passes over the number of edges. Nobody fills it in, and some leave it out; where each count has a line
+  /// of its own, so has this one.
   void read_edge_count() {
     if (cursor_.rest_of_line().find_first_not_of(" \t\r,") != std::string_view::npos) return;
-    // A copy of the cursor looks ahead: a line of one whole number alone is the count of edges, for the line of a
-    // point has three numbers.
+    // A copy of the cursor looks ahead: a line of one whole number alone is the count of edges, for the line
+    // of a point has three numbers.
     TextCursor ahead = cursor_;
     ahead.skip_to_word([](std::string_view) {});
     std::string_view line = ahead.rest_of_line();
-    while (!line.empty() && (line.back() == ' ' || line.back() == '\t' || line.back() == '\r')) line.remove_suffix(1);
+    while (!line.empty() && (line.back() == ' ' || line.back() == '\t' || line.back() == '\r'))
+      line.remove_suffix(1);
     const bool is_count = !line.empty() && line.find_first_not_of("0123456789") == std::string_view::npos;
     if (is_count) cursor_ = ahead;
   }
@@ -59,7 +60,8 @@ class OffReader {
     cursor_.skip_to_word([this](std::string_view comment) { builder_.add_comment(comment); });
   }
 
-  /// Reads a point. What follows the three coordinates on the line is a normal, a colour or a texture coordinate.
+  /// Reads a point. What follows the three coordinates on the line is a normal, a colour or a texture
+  /// coordinate.
   void read_point() {
     builder_.tick(cursor_.offset(), total_);
     Eigen::Vector3d point;
@@ -107,8 +109,8 @@ class BinaryOffReader {
  public:
   BinaryOffReader(std::string_view bytes, BinaryLayout layout) : bytes_(bytes), layout_(layout) {}
 
-  /// Whether the file ends where its last polygon does, or in padding. The walk keeps nothing, so that a wrong layout,
-  /// whose counts are nonsense, takes no memory.
+  /// Whether the file ends where its last polygon does, or in padding. The walk keeps nothing, so that a
+  /// wrong layout, whose counts are nonsense, takes no memory.
   bool fits() {
     const auto no_point = [](const Eigen::Vector3d&) {};
     const auto no_polygon = [](std::span<const std::int64_t>) {};
@@ -139,8 +141,8 @@ class BinaryOffReader {
   }
   void skip(std::uint64_t words) { at_ += 4 * words; }
 
-  /// Walks over the file, with the values of points and corners or without. @returns false where the bytes end too
-  /// early.
+  /// Walks over the file, with the values of points and corners or without. @returns false where the bytes
+  /// end too early.
   template <class Point, class Polygon>
   bool walk(Point&& point, Polygon&& polygon, bool with_values) {
     if (!has(3)) return false;
@@ -184,8 +186,9 @@ class BinaryOffReader {
   std::size_t at_ = 0;
 };
 
-/// Tries the layouts that programs write. Geomview and CGAL write big-endian words and count the numbers of colours;
-/// OpenMesh and PMP write neither, and OpenMesh's colours may lack the alpha. Only the length of the file tells.
+/// Tries the layouts that programs write. Geomview and CGAL write big-endian words and count the numbers of
+/// colours; OpenMesh and PMP write neither, and OpenMesh's colours may lack the alpha. Only the length of the
+/// file tells.
 void read_binary_off(std::string_view bytes, const OffKeyword& keyword, MeshBuilder& builder) {
   // What the format says comes first; where several layouts fit, it wins.
   for (const bool little_endian : {false, true})

@@ -11,8 +11,8 @@ using namespace ply;
 
 namespace {
 
-/// Source of the elements' values when they are text: an element a line, whatever else the line may hold. A float is
-/// rounded as the header declares it.
+/// Source of the elements' values when they are text: an element a line, whatever else the line may hold. A
+/// float is rounded as the header declares it.
 class AsciiValues {
  public:
   AsciiValues(std::string_view bytes, std::size_t start, const MeshBuilder& builder)
@@ -22,8 +22,8 @@ class AsciiValues {
     const char first = cursor_.peek();
     if (first < '+' || first > '9') skip_comments();  // it is no number
   }
-  /// Ends an element. Words behind its last value are passed over, unless it began on an earlier line: then nobody can
-  /// tell whether they belong to it or to the next one.
+  /// Ends an element. Words behind its last value are passed over, unless it began on an earlier line: then
+  /// nobody can tell whether they belong to it or to the next one.
   void end_element() {
     if (!cursor_.skip_blanks_to_word()) return cursor_.skip_line_end();
     if (wrapped_at_ > 0) cursor_.fail_at(wrapped_at_, "the line has fewer values than the header declares");
@@ -92,8 +92,8 @@ class AsciiValues {
   std::size_t long_lines_ = 0, first_long_line_ = 0;
 };
 
-/// Source of the elements' values when they are binary. `swapped` is known to the compiler, so that the loops ask
-/// nothing.
+/// Source of the elements' values when they are binary. `swapped` is known to the compiler, so that the loops
+/// ask nothing.
 template <bool swapped>
 class BinaryValues {
  public:
@@ -138,14 +138,15 @@ class BinaryValues {
     if (remaining() < size_of[static_cast<std::size_t>(type)]) fail_truncated();
     at_ += size_of[static_cast<std::size_t>(type)];
   }
-  /// Whether this many elements of so many bytes can still be there. A quotient, because the product may overflow.
+  /// Whether this many elements of so many bytes can still be there. A quotient, because the product may
+  /// overflow.
   bool has(std::uint64_t count, std::size_t bytes) const {
     return bytes == 0 || count <= remaining() / bytes;
   }
   std::size_t offset() const { return at_; }
   void finish(std::string_view, MeshBuilder& builder) const {
-    // Padding is told from data by its bytes, so a file that ends in zeros of its own cannot be mistaken: these belong
-    // to values that were read.
+    // Padding is told from data by its bytes, so a file that ends in zeros of its own cannot be mistaken:
+    // these belong to values that were read.
     const std::string_view rest = bytes_.substr(at_);
     if (!without_padding(rest).empty())
       builder.fail("it has " + std::to_string(rest.size()) +
@@ -176,7 +177,8 @@ class BinaryValues {
   const MeshBuilder& builder_;
 };
 
-/// Reads all elements. `with_attributes` keeps all thought of attributes out of the loops for those who want none.
+/// Reads all elements. `with_attributes` keeps all thought of attributes out of the loops for those who want
+/// none.
 template <class Values, bool with_attributes>
 class ElementReader {
  public:
@@ -199,7 +201,8 @@ class ElementReader {
   }
 
  private:
-  /// Makes room for an element, once the file is known to be long enough for it: a header may claim any count.
+  /// Makes room for an element, once the file is known to be long enough for it: a header may claim any
+  /// count.
   void reserve(const Element& element) {
     std::size_t least = 0;
     for (const Property& property : element.properties) {
@@ -252,12 +255,13 @@ class ElementReader {
     for (auto& [property, values] : corner_values_) values.clear();
   }
 
-  /// Gives the corners of a polygon their values. Lists of values may stand before that of the corners, so they are
-  /// looked at when the whole element has been read.
+  /// Gives the corners of a polygon their values. Lists of values may stand before that of the corners, so
+  /// they are looked at when the whole element has been read.
   void end_corners() {
     if (!header_.has_corner_values) return;
     for (auto& [property, values] : corner_values_) {
-      // No list at all is a polygon without values; a list of a wrong length cannot be divided among the corners.
+      // No list at all is a polygon without values; a list of a wrong length cannot be divided among the
+      // corners.
       if (values.empty() || values.size() == corners_.size() * static_cast<std::size_t>(property->component))
         continue;
       builder_.attributes()->spoil(property->attribute,
@@ -276,16 +280,16 @@ class ElementReader {
     }
   }
 
-  /// Adds the triangles of a strip. Each has the two corners before and the next one, and every other one is turned
-  /// over. −1 ends a strip, and a triangle with the same corner twice only leads to the next one.
+  /// Adds the triangles of a strip. Each has the two corners before and the next one, and every other one is
+  /// turned over. −1 ends a strip, and a triangle with the same corner twice only leads to the next one.
   void add_strips() {
     std::size_t first = 0;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       if (corners_[i] == -1 || corners_[i] == kUnsignedEndOfStrip) first = i + 1;
       if (i < first + 2) continue;
       std::array<std::int64_t, 3> corners = {corners_[i - 2], corners_[i - 1], corners_[i]};
-      // By its place in the strip and not by how many triangles were added: one that is left out turns the next one,
-      // too.
+      // By its place in the strip and not by how many triangles were added: one that is left out turns the
+      // next one, too.
       if ((i - first) % 2 == 1) std::swap(corners[0], corners[1]);
       if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
       builder_.add_polygon(corners);

@@ -10,8 +10,8 @@ namespace hermesh::mesh_formats::ply {
 enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 constexpr std::array<std::size_t, 8> size_of = {1, 1, 2, 2, 4, 4, 4, 8};
 
-/// What a property is read as. `corners` are a list of the corners of a polygon, `strips` of triangle strips. `value`
-/// is one number of an attribute, `corner_values` a list of numbers for the corners of a polygon.
+/// What a property is read as. `corners` are a list of the corners of a polygon, `strips` of triangle strips.
+/// `value` is one number of an attribute, `corner_values` a list of numbers for the corners of a polygon.
 enum class Role { ignored, x, y, z, corners, strips, value, corner_values };
 constexpr std::size_t role_count = 8;
 
@@ -42,8 +42,8 @@ struct Header {
   bool has_corner_values = false;
 };
 
-/// Parses the header. The builder gets its comments and, where it has attributes, one for each that the header
-/// declares. @throws Error with the number of the line.
+/// Parses the header. The builder gets its comments and, where it has attributes, one for each that the
+/// header declares. @throws Error with the number of the line.
 Header parse_header(std::string_view bytes, MeshBuilder& builder);
 
 }  // namespace hermesh::mesh_formats::ply

@@ -25,7 +25,8 @@ struct Group {
 };
 
 const std::vector<Group>& groups() {
-  // Larger groups come first: with an alpha there are four components, and only without one the three are looked for.
+  // Larger groups come first: with an alpha there are four components, and only without one the three are
+  // looked for.
   static const std::vector<Group> all = {{"normal", {"nx", "ny", "nz"}},
                                          {"colour", {"red", "green", "blue", "alpha"}, true},
                                          {"colour", {"red", "green", "blue"}, true},
@@ -94,8 +95,8 @@ bool find_corner_values(Element& element, AttributeBuilder& attributes) {
   return false;
 }
 
-/// Makes an attribute of all that the header declares besides the mesh. A name that several want goes to points first,
-/// then to polygons, then to corners.
+/// Makes an attribute of all that the header declares besides the mesh. A name that several want goes to
+/// points first, then to polygons, then to corners.
 void find_attributes(Header& header, AttributeBuilder& attributes) {
   for (Element& element : header.elements)
     if (element.name == "vertex") find_values(element, AttributeDomain::point, attributes);
@@ -149,7 +150,8 @@ class HeaderParser {
  private:
   void next_line() {
     const std::size_t end = bytes_.find(line_end_, position_);
-    // Binary data behind the header may hold anything, so lines are sought one at a time and only up to end_header.
+    // Binary data behind the header may hold anything, so lines are sought one at a time and only up to
+    // end_header.
     if (end == std::string_view::npos) builder_.fail("the file is truncated: its PLY header has no end");
     line_ = bytes_.substr(position_, end - position_);
     position_ = end + 1;
@@ -178,8 +180,9 @@ class HeaderParser {
     if (const std::optional<Type> known = known_type(word)) return *known;
     fail(quoted_word(word) + " is no type of a PLY property");
   }
-  /// Passes over an unknown line, for some programs forget the word "comment". A line that is built like a declaration
-  /// may be one whose keyword is damaged; without it, all values would be taken for others, so it is an Error.
+  /// Passes over an unknown line, for some programs forget the word "comment". A line that is built like a
+  /// declaration may be one whose keyword is damaged; without it, all values would be taken for others, so it
+  /// is an Error.
   void pass_over(std::string_view keyword) {
     const std::string_view second = next_word(), third = next_word();
     const bool like_element = next_word().empty() && !third.empty() &&
@@ -198,7 +201,8 @@ class HeaderParser {
   void add_element() {
     const std::string_view name = next_word(), count = next_word();
     Element element{name, 0};
-    // A count of 64 bits, as long as a file can claim; whether the file is long enough is asked when it is read.
+    // A count of 64 bits, as long as a file can claim; whether the file is long enough is asked when it is
+    // read.
     const auto [stop, status] = std::from_chars(count.begin(), count.end(), element.count);
     if (status != std::errc() || stop != count.end()) fail("the count of an element is not a number");
     header_.elements.push_back(std::move(element));
@@ -234,8 +238,8 @@ class HeaderParser {
     if (element == "tristrips" && indices) return Role::strips;
     return Role::ignored;
   }
-  /// Role of a property. An element has each role once, since a polygon cannot have two lists of corners: a second one
-  /// is ignored.
+  /// Role of a property. An element has each role once, since a polygon cannot have two lists of corners: a
+  /// second one is ignored.
   static Role role(const Element& element, const Property& property) {
     const Role found = role_by_name(element.name, property);
     return std::ranges::find(element.properties, found, &Property::role) == element.properties.end()

@@ -7,8 +7,8 @@ namespace hermesh::mesh_formats {
 
 namespace {
 
-// Bytes: 80 of text and a count of 32 bits; then a normal and three corners of single precision, and two bytes of
-// attributes, for each triangle.
+// Bytes: 80 of text and a count of 32 bits; then a normal and three corners of single precision, and two
+// bytes of attributes, for each triangle.
 constexpr std::size_t header_size = 84, triangle_size = 50;
 
 std::uint32_t little_endian_word(const char* at) {
@@ -50,8 +50,8 @@ class StlReader {
     for (skip_space(); !cursor.at_end(); skip_space()) {
       builder_.tick(cursor.offset(), bytes_.size());
       const std::size_t start = cursor.offset();
-      // Only "vertex" and "endloop" make polygons, and nothing but more corners may come between them; all other
-      // keywords are asked for to see where the file breaks off.
+      // Only "vertex" and "endloop" make polygons, and nothing but more corners may come between them; all
+      // other keywords are asked for to see where the file breaks off.
       const Keyword keyword = read_keyword(cursor);
       if (keyword == Keyword::vertex) {
         read_vertex(cursor);
@@ -79,8 +79,8 @@ class StlReader {
  private:
   enum class Keyword { none, solid, facet, outer, vertex, end_loop, end_facet, end_solid };
 
-  /// Number of triangles of a binary file. If the size of the file is that of a whole number of triangles, it decides:
-  /// programs that write as they go leave a count of 0 or −1, and others count wrong.
+  /// Number of triangles of a binary file. If the size of the file is that of a whole number of triangles, it
+  /// decides: programs that write as they go leave a count of 0 or −1, and others count wrong.
   std::uint64_t count_triangles() {
     if (bytes_.size() < header_size)
       builder_.fail("the file is truncated: an STL file has at least 84 bytes");
@@ -107,8 +107,8 @@ class StlReader {
     return declared;
   }
 
-  /// A text that ends behind a facet may be cut off between two facets, which nobody can tell; one that ends within a
-  /// facet is refused.
+  /// A text that ends behind a facet may be cut off between two facets, which nobody can tell; one that ends
+  /// within a facet is refused.
   void check_end() {
     if (last_ != Keyword::end_solid && last_ != Keyword::end_facet)
       builder_.fail("the file is truncated: it does not end in 'endsolid'");
@@ -183,8 +183,8 @@ bool is_binary_stl(std::string_view bytes) {
          bytes.size() == header_size + triangle_size * declared_triangles(bytes);
 }
 
-/// Reads an STL file of either kind. Binary files that begin with "solid" exist, so that word alone does not decide.
-/// Text has no zero byte but as padding, and the count of a binary file has one.
+/// Reads an STL file of either kind. Binary files that begin with "solid" exist, so that word alone does not
+/// decide. Text has no zero byte but as padding, and the count of a binary file has one.
 void read_stl(std::string_view bytes, MeshBuilder& builder) {
   const auto has_zero = [](std::string_view part) { return part.find('\0') != std::string_view::npos; };
   const bool text = !is_binary_stl(bytes) && !has_zero(without_padding(bytes).substr(0, 1000)) &&

@@ -42,7 +42,8 @@ std::string raw(T value, bool big_endian) {
   return bytes;
 }
 
-/// A PLY file with an element before the points, properties of other types among them, and a list behind the corners.
+/// A PLY file with an element before the points, properties of other types among them, and a list behind the
+/// corners.
 std::string binary_ply(bool big) {
   std::string ply =
       std::string("ply\nformat binary_") + (big ? "big" : "little") +
@@ -181,11 +182,13 @@ TEST_F(MeshFileTest, PolygonsBecomeFansAndSliversOfTwoCornersGo) {
 
 TEST_F(MeshFileTest, ConcavePolygonsAreNotLeftByTheirTriangles) {
   // An L whose first corner does not see all of it, and whose points come behind it.
-  const MeshFile mesh = read("a.obj", "f 1 2 3 4 5 6\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n");
+  const MeshFile mesh =
+      read("a.obj", "f 1 2 3 4 5 6\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n");
   ASSERT_EQ(mesh.triangles.size(), 4u);
   double area = 0;
   for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d n = (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]);
+    const Eigen::Vector3d n =
+        (mesh.points[t[1]] - mesh.points[t[0]]).cross(mesh.points[t[2]] - mesh.points[t[0]]);
     EXPECT_GT(n.z(), 0);
     area += 0.5 * n.z();
   }
@@ -194,7 +197,8 @@ TEST_F(MeshFileTest, ConcavePolygonsAreNotLeftByTheirTriangles) {
 }
 
 TEST_F(MeshFileTest, CrossingPolygonsBecomeFansAndANoteSaysSo) {
-  const MeshFile mesh = read("a.off", "OFF 6 1 0\n0 0 0\n4 0 0\n0 4 0\n4 4 0\n1 -2 0\n3 9 0\n6 0 1 2 3 4 5\n");
+  const MeshFile mesh =
+      read("a.off", "OFF 6 1 0\n0 0 0\n4 0 0\n0 4 0\n4 4 0\n1 -2 0\n3 9 0\n6 0 1 2 3 4 5\n");
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}}));
   ASSERT_EQ(context.notes.size(), 1u);
   EXPECT_NE(context.notes[0].find("1 concave polygons cross themselves"), std::string::npos);
@@ -262,9 +266,9 @@ TEST_F(MeshFileTest, RefusesWhatIsNoMeshFile) {
   fs::create_directory(folder / "sub.ply");
   EXPECT_EQ(error_of_path(folder / "sub.ply"), "'sub.ply' is a folder; name a mesh file in it");
   EXPECT_EQ(error_of("empty.ply", ""), "'empty.ply' is empty");
-  EXPECT_EQ(
-      error_of("a.fbx", "x"),
-      "'a.fbx' is of an unknown type; mesh files end in .ply, .obj, .off, .stl, .glb, .gltf or .3mf (.gz may follow)");
+  EXPECT_EQ(error_of("a.fbx", "x"),
+            "'a.fbx' is of an unknown type; mesh files end in .ply, .obj, .off, .stl, .glb, .gltf or .3mf "
+            "(.gz may follow)");
   EXPECT_EQ(error_of("a.ply", obj), "'a.ply' is named .ply but holds OBJ");
   EXPECT_EQ(error_of("a.obj", ascii_ply), "'a.obj' is named .obj but holds PLY");
   EXPECT_EQ(error_of("a.stl", off), "'a.stl' is named .stl but holds OFF");
@@ -301,7 +305,8 @@ TEST_F(MeshFileTest, RefusesWrongNumbersAndNamesTheLine) {
 TEST_F(MeshFileTest, RefusesIndicesThatAreNoWholeNumbers) {
   const auto ply = [](float index) {
     std::string file =
-        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float "
+        "y\nproperty float z\n"
         "element face 1\nproperty list uchar float vertex_indices\nend_header\n";
     for (const float x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) file += raw(x, false);
     return file + raw<std::uint8_t>(3, false) + raw(0.0f, false) + raw(1.0f, false) + raw(index, false);
@@ -361,7 +366,8 @@ TEST_F(MeshFileTest, RefusesAMeshWithoutPolygons) {
             "'a.ply': it holds no polygon: there is no element 'face' with a list 'vertex_indices'");
 }
 
-/// Counts that nothing in the file bears out: if they were believed, the test would run out of memory or time.
+/// Counts that nothing in the file bears out: if they were believed, the test would run out of memory or
+/// time.
 TEST_F(MeshFileTest, DoesNotBelieveCountsThatTheFileIsTooShortFor) {
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
     for (const char* element : {"vertex", "face", "other"}) {
@@ -386,7 +392,8 @@ TEST_F(MeshFileTest, DoesNotBelieveCountsThatTheFileIsTooShortFor) {
   EXPECT_NE(error_of("b.off", "OFF\n0 1000000000000 0\n0 0 0\n").find("truncated"), std::string::npos);
   EXPECT_NE(error_of("c.off", "OFF\n0 1 0\n1000000000000 0 0\n").find("truncated"), std::string::npos);
   std::string stl = binary_stl("");
-  EXPECT_NE(error_of("a.stl", stl.replace(80, 4, "\xff\xff\xff\xff") + "x").find("truncated"), std::string::npos);
+  EXPECT_NE(error_of("a.stl", stl.replace(80, 4, "\xff\xff\xff\xff") + "x").find("truncated"),
+            std::string::npos);
 }
 
 TEST_F(MeshFileTest, TruncatedFilesAreRefusedWhereverTheyBreakOff) {

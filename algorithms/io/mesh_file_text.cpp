@@ -51,8 +51,9 @@ void TextCursor::fail_number(const char* what) {
   const std::string_view found = word();
   // A number as many countries write it is the likeliest reason, and deserves its own advice.
   const std::size_t comma = found.find(',');
-  const bool decimal = comma != std::string_view::npos && comma + 1 < found.size() && found[comma + 1] >= '0' &&
-                       found[comma + 1] <= '9' && found.find('.') == std::string_view::npos;
+  const bool decimal = comma != std::string_view::npos && comma + 1 < found.size() &&
+                       found[comma + 1] >= '0' && found[comma + 1] <= '9' &&
+                       found.find('.') == std::string_view::npos;
   fail_at(here, quoted_word(found) + " is not " + what + (decimal ? "; decimals need a point" : ""));
 }
 

@@ -79,8 +79,8 @@ class TextCursor {
   void skip_blanks() {
     while (at_ != end_ && is_blank(*at_)) ++at_;
   }
-  /// Passes over blanks and tells whether the line goes on behind them. For the innermost loops: mostly one blank,
-  /// then a word.
+  /// Passes over blanks and tells whether the line goes on behind them. For the innermost loops: mostly one
+  /// blank, then a word.
   [[gnu::always_inline]] bool skip_blanks_to_word() {
     for (; at_ != end_; ++at_) {
       if (*at_ > ' ') return true;
@@ -93,7 +93,8 @@ class TextCursor {
   void skip_word() {
     while (at_ != end_ && !is_space(*at_)) ++at_;
   }
-  /// Passes over white space, and over comments from `#` to the end of the line, whose text goes to `comment`.
+  /// Passes over white space, and over comments from `#` to the end of the line, whose text goes to
+  /// `comment`.
   template <class Comment>
   void skip_to_word(Comment&& comment) {
     for (skip_space(); peek() == '#'; skip_space()) {
@@ -140,8 +141,8 @@ class TextCursor {
     if (!take(value)) fail_number(what);
     return value;
   }
-  /// The number that starts here, if there is one and a slash or the end of the word follows. All up to these is passed
-  /// over in any case.
+  /// The number that starts here, if there is one and a slash or the end of the word follows. All up to these
+  /// is passed over in any case.
   template <class T>
   std::optional<T> leading_number_if_any() {
     T value{};
@@ -160,8 +161,8 @@ class TextCursor {
     }
     return value;
   }
-  /// The number that is the next word, or nothing if that is something else, which is passed over. There must be a
-  /// word.
+  /// The number that is the next word, or nothing if that is something else, which is passed over. There must
+  /// be a word.
   template <class T>
   std::optional<T> number_if_any() {
     const char* const start = at_;
@@ -175,7 +176,8 @@ class TextCursor {
   [[noreturn]] void fail(const std::string& what) const { fail_at(offset(), what); }
   /// @throws Error that names the line of `offset`, the place that is complained about.
   [[noreturn]] void fail_at(std::size_t offset, const std::string& what) const;
-  /// Number of the line at `offset`, counting from 1. It looks at all lines before, so it is for complaints only.
+  /// Number of the line at `offset`, counting from 1. It looks at all lines before, so it is for complaints
+  /// only.
   std::size_t line_at(std::size_t offset) const;
 
  private:
@@ -198,8 +200,9 @@ class TextCursor {
     at_ = stop;
     return true;
   }
-  /// Whether what stands behind a number ends it although it is no space: another character that may end a word, or the
-  /// rest of a name that old C libraries of Windows give to what is not finite, such as `1.#IND`.
+  /// Whether what stands behind a number ends it although it is no space: another character that may end a
+  /// word, or the rest of a name that old C libraries of Windows give to what is not finite, such as
+  /// `1.#IND`.
   template <class T>
   [[gnu::noinline]] bool take_odd_end(T& value) {
     if constexpr (std::is_floating_point_v<T>)
@@ -210,8 +213,8 @@ class TextCursor {
     return ends_word();
   }
   std::optional<double> take_windows_name(bool negative);
-  /// End of the line that the cursor is in. The next "\n" is remembered, or each line of a text without any would be
-  /// searched to the end of the text.
+  /// End of the line that the cursor is in. The next "\n" is remembered, or each line of a text without any
+  /// would be searched to the end of the text.
   const char* end_of_line() {
     if (!newline_ || newline_ < at_) {
       const void* const found = std::memchr(at_, '\n', remaining());

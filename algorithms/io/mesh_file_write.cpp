@@ -54,8 +54,8 @@ class Output {
   }
   void close() {
     flush();
-    // The last bytes go out only here, and a disk may be full of them. The destructor must not close the file a second
-    // time, even after an Error.
+    // The last bytes go out only here, and a disk may be full of them. The destructor must not close the file
+    // a second time, even after an Error.
     const gzFile file = std::exchange(file_, nullptr);
     errno = 0;
     if (gzclose(file) != Z_OK) fail();
@@ -106,8 +106,8 @@ bool fits_single_precision(const MeshFile& mesh) {
   return true;
 }
 
-/// An attribute of points as PLY's properties, by the names under which read_mesh_file() finds it again. Colours become
-/// bytes, which is what other programs read.
+/// An attribute of points as PLY's properties, by the names under which read_mesh_file() finds it again.
+/// Colours become bytes, which is what other programs read.
 struct PlyAttribute {
   const MeshAttribute& attribute;
   std::vector<std::string> properties;
@@ -133,8 +133,8 @@ std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
   return names;
 }
 
-/// The attributes of a file by the element that they are properties of. For corners, PLY as others read it has a place
-/// for texture coordinates alone.
+/// The attributes of a file by the element that they are properties of. For corners, PLY as others read it
+/// has a place for texture coordinates alone.
 struct PlyAttributes {
   std::vector<PlyAttribute> points, polygons;
   const MeshAttribute* corner_uv = nullptr;
@@ -143,21 +143,23 @@ struct PlyAttributes {
 PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
   PlyAttributes result;
   const std::size_t polygons = mesh.triangles.size() + mesh.quads.size();
-  const std::array<std::size_t, 3> elements = {mesh.points.size(), 3 * mesh.triangles.size() + 4 * mesh.quads.size(),
-                                               polygons};
+  const std::array<std::size_t, 3> elements = {mesh.points.size(),
+                                               3 * mesh.triangles.size() + 4 * mesh.quads.size(), polygons};
   for (const MeshAttribute& attribute : mesh.attributes) {
     const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
-    // An attribute that was not carried along with a change of the mesh has a wrong length; its values would go to the
-    // wrong elements.
+    // An attribute that was not carried along with a change of the mesh has a wrong length; its values would
+    // go to the wrong elements.
     const bool fits = values == elements[static_cast<std::size_t>(attribute.domain)] *
                                     static_cast<std::size_t>(attribute.components);
     const bool uv = attribute.name == "uv" && attribute.components == 2 && attribute.values.index() == 0;
     if (!fits || (attribute.domain == AttributeDomain::corner && !uv)) {
-      context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name + ", which was left out");
+      context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name +
+                   ", which was left out");
       continue;
     }
     // Only colours as floats from 0 to 1 become bytes; whole numbers are written as they are.
-    const bool bytes = attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
+    const bool bytes =
+        attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
     if (attribute.domain == AttributeDomain::corner)
       result.corner_uv = &attribute;
     else
@@ -178,7 +180,10 @@ void write_ply_value(Output& out, const PlyAttribute& from, std::size_t i) {
 void declare_ply_properties(Output& out, const std::vector<PlyAttribute>& attributes) {
   for (const PlyAttribute& each : attributes)
     for (const std::string& name : each.properties)
-      out.text(std::string("property ") + (each.bytes ? "uchar " : each.attribute.values.index() == 1 ? "int " : "float ") +
+      out.text(std::string("property ") +
+               (each.bytes                           ? "uchar "
+                : each.attribute.values.index() == 1 ? "int "
+                                                     : "float ") +
                name + "\n");
 }
 
@@ -217,7 +222,8 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
       write_ply_values(out, attributes.polygons, number++);
       if (!attributes.corner_uv) continue;
       out.binary(static_cast<std::uint8_t>(2 * polygon.size()));
-      for (std::size_t i = 0; i < 2 * polygon.size(); ++i) out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
+      for (std::size_t i = 0; i < 2 * polygon.size(); ++i)
+        out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
     }
   };
   write_polygons(mesh.triangles);
@@ -284,7 +290,8 @@ void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContex
   const std::vector<bool> used = used_points(mesh);
   std::size_t unused = 0, moved = 0;
   double largest_shift = 0.0;
-  // Points that become equal are counted by merging twice, before and after rounding, as a reader of STL merges them.
+  // Points that become equal are counted by merging twice, before and after rounding, as a reader of STL
+  // merges them.
   std::vector<Eigen::Vector3d> before, after;
   PointMerger merge_before(before), merge_after(after);
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -314,8 +321,8 @@ void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContex
 }
 
 void write_stl_triangle(Output& out, const std::array<Eigen::Vector3d, 3>& corners) {
-  // The normal is that of the rounded corners, which is what a reader of the file sees; a triangle without an area has
-  // none, and 0 says so.
+  // The normal is that of the rounded corners, which is what a reader of the file sees; a triangle without an
+  // area has none, and 0 says so.
   const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
   const double length = across.norm();
   const bool degenerate = !(length > 0.0 && std::isfinite(length));

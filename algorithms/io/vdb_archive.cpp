@@ -7,8 +7,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "algorithms/io/atomic_file.h"
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/io/atomic_file.h"
 #include "algorithms/lattice/memory_estimate.h"
 
 namespace hermesh {
@@ -16,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Refuses what is no .vdb file. OpenVDB reports a missing file and one of another kind in the same words; these are
-/// ours.
+/// Refuses what is no .vdb file. OpenVDB reports a missing file and one of another kind in the same words;
+/// these are ours.
 void check_is_vdb(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw Error(path.string() + " does not exist");
@@ -27,15 +27,16 @@ void check_is_vdb(const fs::path& path) {
   constexpr std::int64_t kMagic = 0x56444220;
   std::int64_t magic = 0;
   if (!in.read(reinterpret_cast<char*>(&magic), sizeof magic))
-    throw Error(path.string() +
-                (fs::file_size(path, ignored) == 0 ? " is empty" : " is truncated: it is too short for a .vdb file"));
+    throw Error(path.string() + (fs::file_size(path, ignored) == 0
+                                     ? " is empty"
+                                     : " is truncated: it is too short for a .vdb file"));
   if (magic != kMagic) throw Error(path.string() + " is not a .vdb file");
 }
 
-// A file that write_grids() made ends with eight bytes that say so and the CRC-32 of all before them, for OpenVDB reads
-// damaged data beyond the ends of its buffers (bloscFromStream() of version 10 compares lengths after it has read).
-// Other programs ignore what stands behind the last grid; a file that one of them has written anew has neither this nor
-// the metadata that announce it.
+// A file that write_grids() made ends with eight bytes that say so and the CRC-32 of all before them, for
+// OpenVDB reads damaged data beyond the ends of its buffers (bloscFromStream() of version 10 compares lengths
+// after it has read). Other programs ignore what stands behind the last grid; a file that one of them has
+// written anew has neither this nor the metadata that announce it.
 constexpr std::array<char, 8> kSeal = {'h', 'e', 'r', 'm', 'e', 's', 'h', '\n'};
 constexpr std::uintmax_t kSealBytes = kSeal.size() + sizeof(std::uint32_t);
 constexpr const char* kSealKey = "hermesh_checksum";
@@ -52,7 +53,8 @@ std::uint32_t crc_of(std::istream& in, std::uintmax_t bytes) {
   return static_cast<std::uint32_t>(crc);
 }
 
-/// Place of a file's identifier: 36 characters behind magic number (8 bytes), three versions (4 each) and a flag (1).
+/// Place of a file's identifier: 36 characters behind magic number (8 bytes), three versions (4 each) and a
+/// flag (1).
 constexpr std::streamoff kIdentifier = 21, kIdentifierLength = 36;
 
 /// Identifier in the form of a UUID, from the size and two checksums of all that follows it.
@@ -64,8 +66,8 @@ std::string identifier_of(std::istream& in, std::uintmax_t size) {
   in.seekg(kHead + static_cast<std::streamoff>((size - kHead) / 2));
   const std::uint32_t second = crc_of(in, size - kHead - (size - kHead) / 2);
   std::array<char, kIdentifierLength + 1> text{};
-  std::snprintf(text.data(), text.size(), "%08x-%04x-4%03x-8%03x-%012llx", first, second >> 16, (second >> 4) & 0xfff,
-                second & 0xf, static_cast<unsigned long long>(size & 0xffffffffffffu));
+  std::snprintf(text.data(), text.size(), "%08x-%04x-4%03x-8%03x-%012llx", first, second >> 16,
+                (second >> 4) & 0xfff, second & 0xf, static_cast<unsigned long long>(size & 0xffffffffffffu));
   return text.data();
 }
 
@@ -89,7 +91,8 @@ void seal(const fs::path& path, const fs::path& named) {
 /// Whether the file ends with a seal. @throws Error if it does not fit the file.
 bool check_seal(const fs::path& path) {
   const std::uintmax_t size = fs::file_size(path);
-  // A file without a seal may be whole: other programs write none. Whether it should have one, its metadata say.
+  // A file without a seal may be whole: other programs write none. Whether it should have one, its metadata
+  // say.
   if (size < kSealBytes) return false;
   std::ifstream in(path, std::ios::binary);
   in.seekg(static_cast<std::streamoff>(size - kSealBytes));
@@ -99,11 +102,13 @@ bool check_seal(const fs::path& path) {
   in.read(reinterpret_cast<char*>(&crc), sizeof crc);
   if (end != kSeal) return false;
   in.seekg(0);
-  if (crc_of(in, size - kSealBytes) != crc) throw Error(path.string() + " is damaged: its checksum does not fit");
+  if (crc_of(in, size - kSealBytes) != crc)
+    throw Error(path.string() + " is damaged: its checksum does not fit");
   return true;
 }
 
-/// @throws Error unless what the transform does can be undone. OpenVDB stores inverses beside what they are inverses of.
+/// @throws Error unless what the transform does can be undone. OpenVDB stores inverses beside what they are
+/// inverses of.
 void check_transform(const openvdb::math::Transform& transform, const std::string& what) {
   const auto fail = [&] { throw Error(what + " has a transform that is not finite or cannot be inverted"); };
   const openvdb::Vec3d size = transform.voxelSize();
@@ -111,8 +116,9 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
     if (!(std::isfinite(size[axis]) && size[axis] > 0.0)) fail();
   if (!transform.isLinear()) return;  // its inverse is made of it
   // There and back by the stored inverse, from the origin, far out along each axis and off the axes.
-  for (const openvdb::Vec3d index : {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),
-                                     openvdb::Vec3d(0, 0, 100), openvdb::Vec3d(-70, 20, 50)}) {
+  for (const openvdb::Vec3d index :
+       {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),
+        openvdb::Vec3d(0, 0, 100), openvdb::Vec3d(-70, 20, 50)}) {
     const openvdb::Vec3d world = transform.indexToWorld(index);
     // What is lost far from the origin, in voxels.
     const double rounding = 1e-12 * world.length() / std::min({size.x(), size.y(), size.z()});
@@ -125,8 +131,8 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
 VdbReader::VdbReader(const fs::path& path) : path_(path), file_(path.string()) {
   initialize_openvdb();
   check_is_vdb(path);
-  // The checksum is the surest judge of damage, so it comes first; the structure is stepped through all the same, for
-  // a seal can be forged. Only then OpenVDB may open the file.
+  // The checksum is the surest judge of damage, so it comes first; the structure is stepped through all the
+  // same, for a seal can be forged. Only then OpenVDB may open the file.
   const bool sealed = check_seal(path);
   structure_ = std::make_unique<VdbStructure>(path);
   file_.open(/*delayLoad=*/false);
@@ -155,17 +161,19 @@ const std::vector<const VdbDescriptor*> VdbReader::found(const std::string& name
 }
 
 bool VdbReader::can_read(const std::string& name) const {
-  return std::ranges::all_of(found(name), [](const VdbDescriptor* grid) { return VdbStructure::is_known(grid->type); });
+  return std::ranges::all_of(found(name),
+                             [](const VdbDescriptor* grid) { return VdbStructure::is_known(grid->type); });
 }
 
-openvdb::GridBase::Ptr VdbReader::with_good_transform(const std::string& name, openvdb::GridBase::Ptr grid) const {
+openvdb::GridBase::Ptr VdbReader::with_good_transform(const std::string& name,
+                                                      openvdb::GridBase::Ptr grid) const {
   check_transform(grid->transform(), "the grid '" + shown(name) + "' of " + path_.string());
   return grid;
 }
 
 openvdb::GridBase::Ptr VdbReader::read(const std::string& name) {
-  // Where several grids share a name, OpenVDB chooses one: all of them must be sound, and memory must do for the
-  // largest.
+  // Where several grids share a name, OpenVDB chooses one: all of them must be sound, and memory must do for
+  // the largest.
   double bytes = 0.0;
   for (const VdbDescriptor* grid : found(name)) bytes = std::max(bytes, structure_->check_tree(*grid));
   check_fits_memory(bytes, path_.string() + ": the grid '" + shown(name) + "'");
@@ -182,7 +190,8 @@ void write_sealed(const fs::path& file, const openvdb::GridCPtrVec& grids, const
     openvdb::io::File out(file.string());
     // The metadata announce the seal, so that a file which lost its end is told from one of another program.
     openvdb::MetaMap metadata;
-    metadata.insertMeta(kSealKey, openvdb::StringMetadata("CRC-32 of all but the last 12 bytes, in the last 4"));
+    metadata.insertMeta(kSealKey,
+                        openvdb::StringMetadata("CRC-32 of all but the last 12 bytes, in the last 4"));
     out.write(grids, metadata);
     out.close();
   } catch (const openvdb::Exception& e) {

@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using ScalarGrids = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid,
-                                      openvdb::BoolGrid, openvdb::MaskGrid>;
+using ScalarGrids = openvdb::TypeList<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid,
+                                      openvdb::Int64Grid, openvdb::BoolGrid, openvdb::MaskGrid>;
 
 // apply() calls its function, and returns true, only for a grid of one of the listed types.
 bool is_scalar(const openvdb::GridBase& grid) {
@@ -30,8 +30,8 @@ Error not_scalar(const openvdb::GridBase& grid, const std::string& what) {
 
 /// A mask as floats. It has no values but which of its samples are active: those become 1.
 openvdb::FloatGrid::Ptr from_mask(const openvdb::MaskGrid& mask) {
-  auto grid = openvdb::FloatGrid::create(
-      std::make_shared<openvdb::FloatTree>(mask.tree(), /*inactive=*/0.0f, /*active=*/1.0f, openvdb::TopologyCopy()));
+  auto grid = openvdb::FloatGrid::create(std::make_shared<openvdb::FloatTree>(
+      mask.tree(), /*inactive=*/0.0f, /*active=*/1.0f, openvdb::TopologyCopy()));
   grid->insertMeta(mask);
   grid->setTransform(mask.transform().copy());
   return grid;
@@ -41,10 +41,12 @@ openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const 
   // Most files hold floats: these are taken over without a copy.
   if (auto same = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return same;
   if (auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return from_mask(*mask);
-  // Other numbers are rounded to single precision; a value beyond it becomes infinite, which check_finite() finds.
+  // Other numbers are rounded to single precision; a value beyond it becomes infinite, which check_finite()
+  // finds.
   openvdb::FloatGrid::Ptr converted;
   grid->apply<ScalarGrids>([&]<class Grid>(const Grid& scalar) {
-    if constexpr (!std::is_same_v<Grid, openvdb::MaskGrid>) converted = std::make_shared<openvdb::FloatGrid>(scalar);
+    if constexpr (!std::is_same_v<Grid, openvdb::MaskGrid>)
+      converted = std::make_shared<openvdb::FloatGrid>(scalar);
   });
   if (!converted) throw not_scalar(*grid, what);
   return converted;
@@ -58,8 +60,8 @@ std::string chosen_grid(VdbReader& file, const fs::path& path) {
   std::vector<std::string> scalar;
   for (const std::string& name : names)
     if (is_scalar(*file.read_metadata(name))) scalar.push_back(name);
-  // One scalar grid among others is what is meant; of several nobody can tell, and where the only grid is none, its
-  // type makes the clearer complaint.
+  // One scalar grid among others is what is meant; of several nobody can tell, and where the only grid is
+  // none, its type makes the clearer complaint.
   if (names.empty()) throw Error(path.string() + " holds no grid");
   if (scalar.size() == 1) return scalar[0];
   if (names.size() == 1) return names[0];  // its type is the reader's complaint
@@ -68,7 +70,8 @@ std::string chosen_grid(VdbReader& file, const fs::path& path) {
 }
 
 void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {
-  // All values are asked, inactive ones and tiles among them: every stage that looks at signs reads those, too.
+  // All values are asked, inactive ones and tiles among them: every stage that looks at signs reads those,
+  // too.
   if (!std::isfinite(grid.background())) throw Error(what + " has a background that is not finite");
   for (auto it = grid.cbeginValueAll(); it; ++it)
     if (!std::isfinite(*it)) {
@@ -92,7 +95,8 @@ GridSummary summary_of(const openvdb::GridBase& grid, const std::string& name) {
       summary.lower[axis] = box.min()[axis], summary.upper[axis] = box.max()[axis];
   for (int axis = 0; axis < 3; ++axis) summary.voxel_size[axis] = grid.voxelSize()[axis];
   grid.apply<ScalarGrids>([&]<class Grid>(const Grid& of_numbers) {
-    if constexpr (!std::is_same_v<Grid, openvdb::MaskGrid>) summary.background = double(of_numbers.background());
+    if constexpr (!std::is_same_v<Grid, openvdb::MaskGrid>)
+      summary.background = double(of_numbers.background());
   });
   return summary;
 }

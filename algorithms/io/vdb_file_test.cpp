@@ -143,7 +143,8 @@ TEST_F(VdbFile, EveryTruncationIsRefused) {
   }
 }
 
-// A flipped byte may be a size, and AddressSanitizer's operator new ends the process where the real one throws.
+// A flipped byte may be a size, and AddressSanitizer's operator new ends the process where the real one
+// throws.
 #ifndef __SANITIZE_ADDRESS__
 TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
   write_level_set(folder_ / "a.vdb", ramp(), context_);
@@ -162,10 +163,12 @@ TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
 TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
   initialize_openvdb();
   for (const std::uint32_t compression :
-       {std::uint32_t(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK), std::uint32_t(openvdb::io::COMPRESS_ZIP)}) {
+       {std::uint32_t(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK),
+        std::uint32_t(openvdb::io::COMPRESS_ZIP)}) {
     auto grid = openvdb::FloatGrid::create(1.0f);
     grid->setName("sdf");
-    for (int i = 0; i < 300; ++i) grid->tree().setValue(openvdb::Coord(i % 8, i / 8 % 8, i / 64), 0.01f * float(i));
+    for (int i = 0; i < 300; ++i)
+      grid->tree().setValue(openvdb::Coord(i % 8, i / 8 % 8, i / 64), 0.01f * float(i));
     openvdb::io::File file((folder_ / "long.vdb").string());
     file.setCompression(compression);
     file.write({grid});
@@ -178,11 +181,13 @@ TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
       std::int64_t length = 0;
       std::memcpy(&length, good.data() + at, sizeof length);
       if (length != std::int64_t(good.size() - at - 8)) continue;
-      for (const std::int64_t claimed : {-length, std::int64_t{-4096}, length + 1, std::int64_t{1} << 40, std::int64_t{0}}) {
+      for (const std::int64_t claimed :
+           {-length, std::int64_t{-4096}, length + 1, std::int64_t{1} << 40, std::int64_t{0}}) {
         std::string bad = good;
         std::memcpy(bad.data() + at, &claimed, sizeof claimed);
         std::ofstream(folder_ / "bad.vdb", std::ios::binary) << bad;
-        EXPECT_NE(error_of(folder_ / "bad.vdb").find("is damaged or truncated"), std::string::npos) << claimed;
+        EXPECT_NE(error_of(folder_ / "bad.vdb").find("is damaged or truncated"), std::string::npos)
+            << claimed;
         ++refused;
       }
     }
@@ -192,7 +197,8 @@ TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
 
 TEST_F(VdbFile, GridsThatShareATreeAndStreamsAreRead) {
   initialize_openvdb();
-  const openvdb::FloatGrid::Ptr first = openvdb::ConstPtrCast<openvdb::FloatGrid>(ramp().grid().grid)->deepCopy();
+  const openvdb::FloatGrid::Ptr first =
+      openvdb::ConstPtrCast<openvdb::FloatGrid>(ramp().grid().grid)->deepCopy();
   const auto second = openvdb::FloatGrid::create(first->treePtr());
   first->setName("a"), second->setName("b");
   second->setTransform(openvdb::math::Transform::createLinearTransform(2.0));
@@ -206,7 +212,8 @@ TEST_F(VdbFile, GridsThatShareATreeAndStreamsAreRead) {
   EXPECT_EQ(read_level_set(folder_ / "stream.vdb", "", context_).active_voxels(), 7u);
 }
 
-/// Grids of points have leaves of another structure; OpenVDB knows the type, so that they can be stepped over.
+/// Grids of points have leaves of another structure; OpenVDB knows the type, so that they can be stepped
+/// over.
 TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
   const std::string type = "Tree_float_5_4_3", other = "Tree_ptidx32_5_4_3";
   openvdb::io::File((folder_ / "p.vdb").string()).write({ramp().grid().grid});
@@ -228,7 +235,8 @@ TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
   ASSERT_EQ(grids.size(), 1u);
   EXPECT_FALSE(grids[0].is_read);
   EXPECT_EQ(grids[0].value_type, other);
-  EXPECT_NE(error_of(folder_ / "p.vdb").find("a scalar grid is needed"), std::string::npos) << error_of(folder_ / "p.vdb");
+  EXPECT_NE(error_of(folder_ / "p.vdb").find("a scalar grid is needed"), std::string::npos)
+      << error_of(folder_ / "p.vdb");
 }
 
 TEST_F(VdbFile, ATransformThatCannotBeInvertedIsRefused) {

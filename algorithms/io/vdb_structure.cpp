@@ -22,17 +22,19 @@ using openvdb::Coord;
 using openvdb::io::GridDescriptor;
 
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
-constexpr char kSeparator = '\x1e';  ///< stands between a grid's name and its number, see io/GridDescriptor.cc
+constexpr char kSeparator =
+    '\x1e';  ///< stands between a grid's name and its number, see io/GridDescriptor.cc
 
 /// How the values of a tree lie in a file and in memory.
 struct ValueLayout {
-  std::uint32_t bytes = 0;       ///< size of a value
-  std::uint32_t half_bytes = 0;  ///< size where reals are saved with half precision; 0: no reals, never halved
+  std::uint32_t bytes = 0;  ///< size of a value
+  std::uint32_t half_bytes =
+      0;  ///< size where reals are saved with half precision; 0: no reals, never halved
   enum class Leaf { values, truths, mask } leaf = Leaf::values;
 };
 
-/// Layout of a type of tree, null for one that is not known here. Leaves of bools hold two masks and leaves of masks
-/// one; our own types of Hermite data are as large as their voxels (hermite/dense/voxels.h).
+/// Layout of a type of tree, null for one that is not known here. Leaves of bools hold two masks and leaves
+/// of masks one; our own types of Hermite data are as large as their voxels (hermite/dense/voxels.h).
 const ValueLayout* layout_of(const std::string& type) {
   using Leaf = ValueLayout::Leaf;
   static const std::map<std::string, ValueLayout> known = {{"bool", {1, 0, Leaf::truths}},
@@ -49,13 +51,14 @@ const ValueLayout* layout_of(const std::string& type) {
                                                            {"hermite_thesis", {10, 0, Leaf::values}},
                                                            {"hermite_fixed", {10, 0, Leaf::values}}};
   const std::string prefix = "Tree_", suffix = "_5_4_3";
-  if (!type.starts_with(prefix) || !type.ends_with(suffix) || type.size() < prefix.size() + suffix.size()) return nullptr;
+  if (!type.starts_with(prefix) || !type.ends_with(suffix) || type.size() < prefix.size() + suffix.size())
+    return nullptr;
   const auto found = known.find(type.substr(prefix.size(), type.size() - prefix.size() - suffix.size()));
   return found == known.end() ? nullptr : &found->second;
 }
 
-/// Checks the header of a chunk packed by Blosc: version, format, flags, size of an item; then 32 bits each for the
-/// bytes unpacked, of a block, and packed.
+/// Checks the header of a chunk packed by Blosc: version, format, flags, size of an item; then 32 bits each
+/// for the bytes unpacked, of a block, and packed.
 void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked) {
   file.need(packed);
   const std::string header = file.ahead(16);
@@ -64,7 +67,8 @@ void check_blosc(BoundedFile& file, std::uint64_t packed, std::uint64_t unpacked
   std::memcpy(sizes.data(), header.data() + 4, sizeof sizes);
   // OpenVDB fills what is shorter up to this length before it packs it, and reads into as much.
   constexpr std::uint64_t kLeast = 128;
-  if (sizes[0] > std::max(unpacked, kLeast) || sizes[2] > packed) file.damaged("a block of packed values is not as long as it says");
+  if (sizes[0] > std::max(unpacked, kLeast) || sizes[2] > packed)
+    file.damaged("a block of packed values is not as long as it says");
 }
 
 /// Checks what OpenVDB keeps for reading leaves later: their number, masks and packed sizes
@@ -80,7 +84,8 @@ void check_delayed_load(BoundedFile& file) {
   if (sizes != ~std::uint32_t{0}) list(sizes, 8);
 }
 
-/// Steps over metadata: count, then name, type, length and value of each. @returns their bytes, count and all.
+/// Steps over metadata: count, then name, type, length and value of each. @returns their bytes, count and
+/// all.
 std::string checked_metadata(BoundedFile& file) {
   const std::uint64_t start = file.position();
   for (std::uint32_t left = file.number<std::uint32_t>(); left > 0; --left) {
@@ -89,14 +94,15 @@ std::string checked_metadata(BoundedFile& file) {
     const std::uint32_t bytes = file.number<std::uint32_t>();
     file.need(bytes);
     const std::uint64_t end = file.position() + bytes;
-    // Strings and unknown types OpenVDB reads by the length that the file says, which need() has seen to; the others
-    // by their own.
+    // Strings and unknown types OpenVDB reads by the length that the file says, which need() has seen to; the
+    // others by their own.
     if (type == "__delayedload") {
       if (bytes > 0) check_delayed_load(file);
       if (file.position() > end) file.damaged("its metadata are longer than they say");
     } else if (type != "string" && openvdb::Metadata::isRegisteredType(type)) {
       // OpenVDB reads what the type takes, whatever the file says.
-      if (openvdb::Metadata::createMetadata(type)->size() != bytes) file.damaged("its metadata are not as long as they say");
+      if (openvdb::Metadata::createMetadata(type)->size() != bytes)
+        file.damaged("its metadata are not as long as they say");
     }
     file.seek(end);
   }
@@ -144,8 +150,8 @@ class TreeWalk {
 
   /// Steps over the whole tree. @returns bytes that it takes in memory.
   double walk() {
-    // Root: number of buffers, background, numbers of tiles and children; then the tiles, then each child with all
-    // nodes below it. Values of leaves come last of all.
+    // Root: number of buffers, background, numbers of tiles and children; then the tiles, then each child
+    // with all nodes below it. Values of leaves come last of all.
     if (file_.number<std::int32_t>() != 1) file_.damaged("its tree has several buffers");
     file_.skip(layout_.bytes);  // the background
     const std::uint32_t tiles = file_.number<std::uint32_t>(), children = file_.number<std::uint32_t>();
@@ -153,8 +159,8 @@ class TreeWalk {
     openvdb::CoordBBox box;
     const auto place = [&] {
       const auto at = file_.number<std::array<std::int32_t, 3>>();
-      // The root's map holds one node or tile a place, at multiples of 4096, within what index coordinates of 32 bits
-      // leave room for.
+      // The root's map holds one node or tile a place, at multiples of 4096, within what index coordinates of
+      // 32 bits leave room for.
       const Coord lower(at[0], at[1], at[2]);
       for (const std::int32_t index : at)
         if (index % kUpperDim != 0 || index < -kLargestIndex - kUpperDim || index > kLargestIndex)
@@ -207,8 +213,8 @@ class TreeWalk {
     for (int word = 0; word < kWords; ++word)
       for (std::uint64_t left = children[word]; left != 0; left &= left - 1) {
         const int slot = 64 * word + std::countr_zero(left), mask = (1 << kLog2) - 1;
-        const Coord there = lower.offsetBy(kChildDim * (slot >> (2 * kLog2)), kChildDim * (slot >> kLog2 & mask),
-                                           kChildDim * (slot & mask));
+        const Coord there = lower.offsetBy(kChildDim * (slot >> (2 * kLog2)),
+                                           kChildDim * (slot >> kLog2 & mask), kChildDim * (slot & mask));
         if constexpr (kLog2 == 5)
           node<4>(there);
         else
@@ -217,8 +223,8 @@ class TreeWalk {
   }
 
   void leaf(const Coord& lower) {
-    // The first of two visits of the file to a leaf: here only its mask, which tells how many values the second one
-    // packs.
+    // The first of two visits of the file to a leaf: here only its mask, which tells how many values the
+    // second one packs.
     const auto mask = file_.number<std::array<std::uint64_t, 8>>();
     leaves_->push_back({lower, count_bits(mask.data(), 8)});
     // About 100 bytes for origin, mask and pointer, besides the values.
@@ -234,17 +240,19 @@ class TreeWalk {
     if (layout_.leaf == ValueLayout::Leaf::truths) file_.skip(kLeafMask);
   }
 
-  /// Steps over the values of a node or leaf, as readCompressedValues() of io/Compression.h reads them: a byte that
-  /// says how inactive values are kept, up to two of these and a mask that tells them apart, then the values
-  /// themselves.
+  /// Steps over the values of a node or leaf, as readCompressedValues() of io/Compression.h reads them: a
+  /// byte that says how inactive values are kept, up to two of these and a mask that tells them apart, then
+  /// the values themselves.
   void values(std::uint64_t count, int active, std::uint64_t mask_bytes) {
     using namespace openvdb::io;
     const int kept = file_.number<std::int8_t>();
-    if (kept < NO_MASK_OR_INACTIVE_VALS || kept > NO_MASK_AND_ALL_VALS) file_.damaged("a node packs its values in an unknown way");
+    if (kept < NO_MASK_OR_INACTIVE_VALS || kept > NO_MASK_AND_ALL_VALS)
+      file_.damaged("a node packs its values in an unknown way");
     // Inactive values have full precision even where the others are halved.
     if (kept == NO_MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_ONE_INACTIVE_VAL) file_.skip(layout_.bytes);
     if (kept == MASK_AND_TWO_INACTIVE_VALS) file_.skip(2 * layout_.bytes);
-    if (kept == MASK_AND_NO_INACTIVE_VALS || kept == MASK_AND_ONE_INACTIVE_VAL || kept == MASK_AND_TWO_INACTIVE_VALS)
+    if (kept == MASK_AND_NO_INACTIVE_VALS || kept == MASK_AND_ONE_INACTIVE_VAL ||
+        kept == MASK_AND_TWO_INACTIVE_VALS)
       file_.skip(mask_bytes);
     // With this flag only active values are there, unless the byte says all are.
     if ((compression_ & COMPRESS_ACTIVE_MASK) && kept != NO_MASK_AND_ALL_VALS) count = std::uint64_t(active);
@@ -252,14 +260,15 @@ class TreeWalk {
     chunk(count * value_bytes_);
   }
 
-  /// Steps over one block of values, of which a signed length says how it is stored: packed, or as it is with the
-  /// negated length.
+  /// Steps over one block of values, of which a signed length says how it is stored: packed, or as it is with
+  /// the negated length.
   void chunk(std::uint64_t unpacked) {
     using namespace openvdb::io;
     if (!(compression_ & (COMPRESS_BLOSC | COMPRESS_ZIP))) return file_.skip(unpacked);
     const auto packed = file_.number<std::int64_t>();
     if (packed <= 0) {  // it is not packed
-      if (std::uint64_t{0} - std::uint64_t(packed) != unpacked) file_.damaged("a block of values is not as long as it must be");
+      if (std::uint64_t{0} - std::uint64_t(packed) != unpacked)
+        file_.damaged("a block of values is not as long as it must be");
       return file_.skip(unpacked);
     }
     if (compression_ & COMPRESS_BLOSC) check_blosc(file_, std::uint64_t(packed), unpacked);
@@ -287,7 +296,8 @@ void BoundedFile::damaged(std::string_view why) const {
   throw Error(path_.string() + " is damaged or truncated: " + std::string(why));
 }
 
-// The difference cannot wrap, since the position is never behind the end; a sum with a length from the file could.
+// The difference cannot wrap, since the position is never behind the end; a sum with a length from the file
+// could.
 void BoundedFile::need(std::uint64_t bytes) const {
   if (bytes > size_ - position_) damaged("it speaks of more than it holds");
 }
@@ -304,8 +314,8 @@ void BoundedFile::skip(std::uint64_t bytes) {
 
 void BoundedFile::read(void* to, std::size_t bytes) {
   need(bytes);
-  // Walks ask for a few bytes at a time: a quarter megabyte is read at once, and seek() and skip() only move the
-  // position within it.
+  // Walks ask for a few bytes at a time: a quarter megabyte is read at once, and seek() and skip() only move
+  // the position within it.
   constexpr std::size_t kBuffer = std::size_t{1} << 18;
   char* out = static_cast<char*>(to);
   while (bytes > 0) {
@@ -313,7 +323,8 @@ void BoundedFile::read(void* to, std::size_t bytes) {
       buffer_.resize(std::min<std::uint64_t>(kBuffer, size_ - position_));
       buffer_start_ = position_;
       in_.seekg(static_cast<std::streamoff>(position_));
-      if (!in_.read(buffer_.data(), static_cast<std::streamsize>(buffer_.size()))) damaged("it cannot be read to its end");
+      if (!in_.read(buffer_.data(), static_cast<std::streamsize>(buffer_.size())))
+        damaged("it cannot be read to its end");
     }
     const std::size_t at = position_ - buffer_start_, part = std::min(bytes, buffer_.size() - at);
     std::memcpy(out, buffer_.data() + at, part);
@@ -362,8 +373,8 @@ VdbStructure::VdbStructure(const fs::path& path) : file_(std::make_unique<Bounde
       walk(grid);
       continue;
     }
-    // Each grid lies behind its descriptor and before the next one: offsets that lead back would have the same bytes
-    // read again and again.
+    // Each grid lies behind its descriptor and before the next one: offsets that lead back would have the
+    // same bytes read again and again.
     const std::uint64_t here = file_->position();
     if (grid.start < here || grid.end < grid.start) file_->damaged("its grids do not follow one another");
     file_->seek(grid.end);

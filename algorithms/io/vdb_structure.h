@@ -1,11 +1,13 @@
-// The structure of .vdb files, checked before OpenVDB reads them. Heavy (OpenVDB): include it from .cpp files.
+// The structure of .vdb files, checked before OpenVDB reads them. Heavy (OpenVDB): include it from .cpp
+// files.
 //
-// OpenVDB believes the lengths in a file: bloscFromStream() and unzipFromStream() of version 10 read as many bytes as a
-// chunk says that it has, beyond the end of the buffer, and compare afterwards; strings are made as long as they claim to
-// be; what is missing at a file's end is taken for zeros; the offsets of grids may lead back to themselves. So all of it is
-// stepped through here, as OpenVDB will (tree/RootNode.h, InternalNode.h, LeafNode.h, io/Compression.h), and nothing is
-// unpacked: every length must fit the file and what it is a length of. After that, what is left to trust is that zlib and
-// Blosc write no more than they were told that there is room for, which both promise.
+// OpenVDB believes the lengths in a file: bloscFromStream() and unzipFromStream() of version 10 read as many
+// bytes as a chunk says that it has, beyond the end of the buffer, and compare afterwards; strings are made
+// as long as they claim to be; what is missing at a file's end is taken for zeros; the offsets of grids may
+// lead back to themselves. So all of it is stepped through here, as OpenVDB will (tree/RootNode.h,
+// InternalNode.h, LeafNode.h, io/Compression.h), and nothing is unpacked: every length must fit the file and
+// what it is a length of. After that, what is left to trust is that zlib and Blosc write no more than they
+// were told that there is room for, which both promise.
 #pragma once
 
 #include <filesystem>
@@ -19,8 +21,8 @@
 
 namespace hermesh {
 
-/// A file's bytes, read from front to back or from a given place, and never beyond its end. Numbers are those of the
-/// machine: little-endian, as .vdb files are.
+/// A file's bytes, read from front to back or from a given place, and never beyond its end. Numbers are those
+/// of the machine: little-endian, as .vdb files are.
 class BoundedFile {
  public:
   /// Opens the file at `path`, which errors name. @throws Error if it cannot be read.
@@ -67,10 +69,10 @@ struct VdbDescriptor {
 /// Steps through the structure of one file; see above for what is checked and why.
 class VdbStructure {
  public:
-  /// Reads the header, the file's metadata and the descriptors; of a file without offsets of grids (one that was written
-  /// into a stream), which OpenVDB reads as a whole, it checks all trees.
-  /// @throws Error for a file that is truncated, damaged, of a version that OpenVDB 10 does not read, or holds a grid of a
-  /// type that is not registered, which OpenVDB cannot step over.
+  /// Reads the header, the file's metadata and the descriptors; of a file without offsets of grids (one that
+  /// was written into a stream), which OpenVDB reads as a whole, it checks all trees.
+  /// @throws Error for a file that is truncated, damaged, of a version that OpenVDB 10 does not read, or
+  /// holds a grid of a type that is not registered, which OpenVDB cannot step over.
   explicit VdbStructure(const std::filesystem::path& path);
 
   const std::vector<VdbDescriptor>& grids() const { return grids_; }
@@ -81,7 +83,8 @@ class VdbStructure {
 
   /// Checks what stands before the grid's tree: metadata and transform. @throws Error for damage.
   void check_metadata(const VdbDescriptor& grid);
-  /// Checks all of the grid, and of the grid whose tree it shares. @returns bytes that the tree takes in memory.
+  /// Checks all of the grid, and of the grid whose tree it shares. @returns bytes that the tree takes in
+  /// memory.
   /// @throws Error for damage.
   double check_tree(const VdbDescriptor& grid);
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "algorithms/lattice/grid_placement.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/lattice/grid_placement.h"
 
 namespace hermesh {
 namespace {
@@ -71,8 +71,8 @@ void check_written_precision(const std::filesystem::path& path, const LevelSet& 
                 text(coordinate) + " by up to " + text(rounding) + ", more than a hundredth of a voxel of " +
                 text(voxel) + ", so nothing was written; " + advice);
   };
-  // From the coarsest to the finest: a file in single precision, one in double precision, and the mesh in memory,
-  // whose points are single precision about its own origin whatever the file.
+  // From the coarsest to the finest: a file in single precision, one in double precision, and the mesh in
+  // memory, whose points are single precision about its own origin whatever the file.
   const bool single = is_written_in_single(path);
   if (single)
     check(reach.from_zero, 24, "STL's single precision",

@@ -1,21 +1,22 @@
-// The cells of a block that have a point, and how they are numbered: the same for dual contouring, its vector code, the
-// uniform mesh and whoever looks points up.
+// The cells of a block that have a point, and how they are numbered: the same for dual contouring, its vector
+// code, the uniform mesh and whoever looks points up.
 #pragma once
 
 #include <cstdint>
 
 namespace hermesh {
 
-/// The active cells of a block of 8³ cells, and the numbers of their points, which ascend with the cells. The arrays are
-/// plain, for vector code is kept free of the standard library's functions, and the members are not initialized, so that
-/// many can be made without writing them twice.
+/// The active cells of a block of 8³ cells, and the numbers of their points, which ascend with the cells. The
+/// arrays are plain, for vector code is kept free of the standard library's functions, and the members are
+/// not initialized, so that many can be made without writing them twice.
 struct ActiveCells {
   std::uint64_t active[8];    ///< cells with a crossing edge, by their first corner: the words of a BlockMask
   std::uint16_t before[8];    ///< active cells before each word
   std::uint32_t first_point;  ///< number of the first active cell's point
 };
 
-// Both are inlined always, and without the standard library, because kernels of several levels of vector code call them.
+// Both are inlined always, and without the standard library, because kernels of several levels of vector code
+// call them.
 
 /// Fills in `before`. @return how many active cells there are
 [[gnu::always_inline]] inline std::uint32_t count_before(ActiveCells& cells) {

@@ -25,7 +25,8 @@ constexpr std::uint64_t last_layers(bool y, bool z) {
 }
 inline constexpr BlockMask kAllOutside{}, kAllInside{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
-/// The eight words of a mask to read, be it a BlockMask or the plain array of a struct that vector code reads, too.
+/// The eight words of a mask to read, be it a BlockMask or the plain array of a struct that vector code
+/// reads, too.
 using MaskWords = std::span<const std::uint64_t, 8>;
 
 constexpr int sample_index(int x, int y, int z) { return 64 * x + 8 * y + z; }
@@ -61,17 +62,19 @@ struct LatticePlace {
   std::int32_t block;  ///< negative where no block is there
   int sample;
 };
-/// The place at coordinates from −8 to 15 relative to a block's first sample; `neighbours` are the numbers of the blocks
-/// around that one, by neighbour_slot(), its own in the middle.
+/// The place at coordinates from −8 to 15 relative to a block's first sample; `neighbours` are the numbers of
+/// the blocks around that one, by neighbour_slot(), its own in the middle.
 constexpr LatticePlace locate(const std::array<std::int32_t, 27>& neighbours, int x, int y, int z) {
   // Arithmetic shifts make the offset of the block, −1, 0 or 1, of each.
   return {neighbours[neighbour_slot(x >> 3, y >> 3, z >> 3)], sample_index(x & 7, y & 7, z & 7)};
 }
 
-/// Values that stand in place of a block's index where there is no block: all samples there are outside, or all inside.
+/// Values that stand in place of a block's index where there is no block: all samples there are outside, or
+/// all inside.
 inline constexpr std::int32_t kUniformOutside = -1, kUniformInside = -2;
 
-/// The mask of the samples (dx,dy,dz) further on, each 0 or 1; `upper(ax,ay,az)`: the mask of the block at that offset.
+/// The mask of the samples (dx,dy,dz) further on, each 0 or 1; `upper(ax,ay,az)`: the mask of the block at
+/// that offset.
 template <class Upper>
 BlockMask shifted_mask(int dx, int dy, int dz, Upper&& upper) {
   BlockMask result;

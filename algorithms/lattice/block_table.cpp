@@ -5,8 +5,8 @@
 namespace hermesh {
 namespace {
 
-/// Fibonacci hashing (Knuth, vol. 3, §6.4): 2⁶⁴ divided by the golden ratio spreads neighbouring coordinates, and the
-/// shift brings the well mixed upper bits down, because the slot is taken from the lower ones.
+/// Fibonacci hashing (Knuth, vol. 3, §6.4): 2⁶⁴ divided by the golden ratio spreads neighbouring coordinates,
+/// and the shift brings the well mixed upper bits down, because the slot is taken from the lower ones.
 std::size_t hash(const BlockAt& at) {
   std::uint64_t h = 0;
   for (const std::int32_t c : at) {
@@ -65,8 +65,8 @@ BlockTable::BlockTable(const std::vector<BlockSet>& parts) {
   for (const BlockSet& part : parts)
     for (std::size_t i = 0; i < part.masks_.size(); ++i)
       tiles_.push_back({part.numbers_.tiles()[i], part.masks_[i], {}});
-  // Sorted by their coordinates, tiles of different sets stand beside each other, in an order that does not depend on
-  // how the work was spread over threads.
+  // Sorted by their coordinates, tiles of different sets stand beside each other, in an order that does not
+  // depend on how the work was spread over threads.
   std::sort(tiles_.begin(), tiles_.end(), [](const Tile& a, const Tile& b) { return a.at < b.at; });
   // One tile is kept of each place, with the blocks of all sets that have it.
   std::size_t kept = 0;
@@ -78,7 +78,8 @@ BlockTable::BlockTable(const std::vector<BlockSet>& parts) {
   }
   tiles_.resize(kept);
   tiles_.shrink_to_fit();
-  // Inserted in order, a tile gets as its number its place in `tiles_`, which find() and translation() rely on.
+  // Inserted in order, a tile gets as its number its place in `tiles_`, which find() and translation() rely
+  // on.
   for (Tile& tile : tiles_) {
     numbers_.insert(tile.at);
     for (int x = 0; x < 8; ++x) {

@@ -9,8 +9,8 @@
 
 namespace hermesh {
 
-/// Coordinates of a block, which are those of its first voxel divided by 8; or of a tile of 8³ blocks, which are those
-/// of its first block divided by 8.
+/// Coordinates of a block, which are those of its first voxel divided by 8; or of a tile of 8³ blocks, which
+/// are those of its first block divided by 8.
 using BlockAt = std::array<std::int32_t, 3>;
 
 /// Coordinates of the tile that holds the block.
@@ -37,8 +37,8 @@ class TileNumbers {
   std::vector<std::uint32_t> slots_;
 };
 
-/// Collects blocks in any order. A set is not safe to share between threads: each thread or piece of work has its
-/// own, and BlockTable joins them.
+/// Collects blocks in any order. A set is not safe to share between threads: each thread or piece of work has
+/// its own, and BlockTable joins them.
 class BlockSet {
  public:
   /// Adds a block. The result, tile · 512 + place in it, stands for the block within this set.
@@ -97,8 +97,8 @@ class BlockTable {
   }
   /// Coordinates of all blocks, by number.
   std::vector<BlockAt> blocks() const;
-  /// The number in this table of each tile of `part`, by the tile's number in `part`, which is one of the sets that the
-  /// table was made from.
+  /// The number in this table of each tile of `part`, by the tile's number in `part`, which is one of the
+  /// sets that the table was made from.
   std::vector<std::uint32_t> translation(const BlockSet& part) const;
   /// Number of the block for which insert() returned `code`; `translation` is that of its set.
   std::uint32_t number(const std::vector<std::uint32_t>& translation, std::uint32_t code) const {

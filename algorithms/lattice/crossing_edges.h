@@ -1,4 +1,5 @@
-// The crossing edges of a block and how they are numbered: as Hermite data keep their crossings, marching cubes its points.
+// The crossing edges of a block and how they are numbered: as Hermite data keep their crossings, marching
+// cubes its points.
 #pragma once
 
 #include <array>
@@ -10,8 +11,8 @@
 
 namespace hermesh {
 
-/// The crossing edges that a block owns, numbered by axis and then by first sample. (Without initializers, so that many can
-/// be made without writing them twice.)
+/// The crossing edges that a block owns, numbered by axis and then by first sample. (Without initializers, so
+/// that many can be made without writing them twice.)
 struct CrossingEdges {
   std::array<BlockMask, 3> crossing;                   ///< samples whose up-wind edge is crossed, by axis
   std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
@@ -19,8 +20,8 @@ struct CrossingEdges {
   /// Rank of a crossing edge among those of the block.
   std::uint32_t rank(int axis, int sample) const {
     const int word = sample >> 6;
-    return before[axis][word] +
-           static_cast<std::uint32_t>(std::popcount(crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
+    return before[axis][word] + static_cast<std::uint32_t>(std::popcount(
+                                    crossing[axis][word] & ((std::uint64_t{1} << (sample & 63)) - 1)));
   }
   /// Calls f(axis, sample) for each crossing edge, in the order of rank().
   template <class F>

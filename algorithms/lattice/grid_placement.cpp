@@ -15,8 +15,8 @@ using openvdb::Coord;
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 
-/// Extends the box by the leaf's active voxels, as Leaf::evalActiveBoundingBox() would by a look at one voxel after the
-/// other. Here a word of the mask is a layer along x, a byte of it a row along z.
+/// Extends the box by the leaf's active voxels, as Leaf::evalActiveBoundingBox() would by a look at one voxel
+/// after the other. Here a word of the mask is a layer along x, a byte of it a row along z.
 void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
   Coord lowest(8), highest(-1);
   std::uint64_t any_x = 0;
@@ -51,7 +51,8 @@ openvdb::CoordBBox active_box(const openvdb::FloatTree& tree) {
       if (box.isInside(lower->getNodeBoundingBox())) continue;
       for (auto tile = lower->cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Leaf::DIM);
       for (auto leaf = lower->cbeginChildOn(); leaf; ++leaf)
-        if (!box.isInside(openvdb::CoordBBox::createCube(leaf.getCoord(), Leaf::DIM))) include_active(*leaf, box);
+        if (!box.isInside(openvdb::CoordBBox::createCube(leaf.getCoord(), Leaf::DIM)))
+          include_active(*leaf, box);
     }
   }
   return box;
@@ -72,8 +73,8 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   Bounds world;
   if (!box.empty()) {
     for (int axis = 0; axis < 3; ++axis) {
-      // Far from index zero (four times the longest side of the data) the base moves along, so that index coordinates
-      // relative to it are small and exact. It is a multiple of 8, so that blocks remain blocks.
+      // Far from index zero (four times the longest side of the data) the base moves along, so that index
+      // coordinates relative to it are small and exact. It is a multiple of 8, so that blocks remain blocks.
       const double middle = 0.5 * (double(box.min()[axis]) + double(box.max()[axis]));
       const double reach = 4.0 * box.extents().asVec3d()[box.maxExtent()];
       result.base[axis] =

@@ -9,9 +9,9 @@
 
 namespace hermesh {
 
-/// Bounding box of the active voxels in index coordinates, as FloatTree::evalActiveVoxelBoundingBox() gives it, which
-/// reads where a leaf is from the leaf itself, and so waits for memory as often as there are leaves. Most leaves lie
-/// within the box of those before them, and then the node above tells.
+/// Bounding box of the active voxels in index coordinates, as FloatTree::evalActiveVoxelBoundingBox() gives
+/// it, which reads where a leaf is from the leaf itself, and so waits for memory as often as there are
+/// leaves. Most leaves lie within the box of those before them, and then the node above tells.
 openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
 
 /// Placement of a grid: its affine map, with the origin of single precision chosen near its active voxels.
@@ -19,7 +19,8 @@ openvdb::CoordBBox active_box(const openvdb::FloatTree& tree);
 IndexToWorld placement_of(const openvdb::FloatGrid& grid);
 IndexToWorld placement_of(const LevelSet& level_set);
 
-/// The map of a grid of cubic voxels of `voxel_size` whose sample (0, 0, 0) is at `origin`, both in world units.
+/// The map of a grid of cubic voxels of `voxel_size` whose sample (0, 0, 0) is at `origin`, both in world
+/// units.
 std::shared_ptr<openvdb::math::Transform> transform_at(const Eigen::Vector3d& origin, double voxel_size);
 
 }  // namespace hermesh

@@ -27,7 +27,8 @@ TEST(ActiveBox, IsThatOfVoxelsAndTilesAtAllLevels) {
           tree.touchLeaf(place);  // without an active voxel
           break;
         default:
-          for (int voxel = 0; voxel < 4; ++voxel) tree.setValue(place.offsetBy(at_most(9), at_most(9), at_most(9)), 0.5f);
+          for (int voxel = 0; voxel < 4; ++voxel)
+            tree.setValue(place.offsetBy(at_most(9), at_most(9), at_most(9)), 0.5f);
       }
     }
     openvdb::CoordBBox expected;

@@ -29,21 +29,22 @@ constexpr std::array<float, 512> make_no_samples() {
 }
 constexpr std::array<float, 512> kNoSamples = make_no_samples();
 
-/// How many leaves, and how many leaves' samples, are prefetched. To wait for one leaf after the other, and for the
-/// samples that it points to, would take longer than all the rest.
+/// How many leaves, and how many leaves' samples, are prefetched. To wait for one leaf after the other, and
+/// for the samples that it points to, would take longer than all the rest.
 constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
 
-/// Most pairs of blocks that may change their sign where neither holds samples. A few bytes in a file, as a damaged one
-/// has them, can stand for a surface of any size; extractors hold some 15 kB for the 64 edges of a pair (leaves, their
-/// copies, a crossing and a polygon each), so that this is a gibibyte, on any machine. Level sets have none, and a
-/// cube that is one tile reaches it at a width of 864 voxels.
+/// Most pairs of blocks that may change their sign where neither holds samples. A few bytes in a file, as a
+/// damaged one has them, can stand for a surface of any size; extractors hold some 15 kB for the 64 edges of
+/// a pair (leaves, their copies, a crossing and a polygon each), so that this is a gibibyte, on any machine.
+/// Level sets have none, and a cube that is one tile reaches it at a width of 864 voxels.
 constexpr double kMostTilePairs = 70e3;
 
-/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which there is a
-/// tile whose value `wanted` takes: the first block within, the first beyond, and the width in samples. Squares are
-/// as large as the tiles beyond.
+/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which
+/// there is a tile whose value `wanted` takes: the first block within, the first beyond, and the width in
+/// samples. Squares are as large as the tiles beyond.
 template <class Wanted, class F>
-void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::CoordBBox& tile, Wanted&& wanted, F&& f) {
+void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::CoordBBox& tile, Wanted&& wanted,
+                             F&& f) {
   using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
   using Node = LargeNode::ChildNodeType;
   openvdb::tree::ValueAccessor<const openvdb::FloatTree> access(tree);
@@ -51,8 +52,8 @@ void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::Coor
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto square = [&](auto&& self, Coord own, Coord there, int width) -> void {
-      // A square is divided where a node of its own width lies beyond, and left out where in the end a leaf does. A
-      // tile beyond that is wider than the square counts with the square's width.
+      // A square is divided where a node of its own width lies beyond, and left out where in the end a leaf
+      // does. A tile beyond that is wider than the square counts with the square's width.
       const bool divided = width > int(Node::DIM) ? access.probeConstNode<LargeNode>(there) != nullptr
                            : width > 8            ? access.probeConstNode<Node>(there) != nullptr
                                                   : access.probeConstLeaf(there) != nullptr;
@@ -91,8 +92,8 @@ InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
   const bool greater_is_inside =
       grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
   rule.scale = greater_is_inside ? -1.0f : 1.0f;
-  // The isovalue is rounded away from the inside, so that a comparison of floats decides as one with the isovalue
-  // itself does.
+  // The isovalue is rounded away from the inside, so that a comparison of floats decides as one with the
+  // isovalue itself does.
   constexpr float kLargest = std::numeric_limits<float>::max();
   rule.isovalue = static_cast<float>(std::clamp(isovalue, -double(kLargest), double(kLargest)));
   if (!greater_is_inside && rule.isovalue < isovalue) rule.isovalue = std::nextafter(rule.isovalue, kLargest);
@@ -102,21 +103,24 @@ InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
 
 std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
                                        RunContext& context) {
-  // Where two tiles differ in sign, one of them is unlike the background; the others may fill space without end.
+  // Where two tiles differ in sign, one of them is unlike the background; the others may fill space without
+  // end.
   const bool background = is_inside(tree.background());
   std::vector<openvdb::CoordBBox> tiles;
   openvdb::FloatTree::ValueAllCIter it = tree.cbeginValueAll();
   it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
     if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
-  // Counted first, before anything is listed: a damaged file is refused before it takes memory. Only the side that is
-  // unlike the background is walked over, so that each pair is met once.
+  // Counted first, before anything is listed: a damaged file is refused before it takes memory. Only the side
+  // that is unlike the background is walked over, so that each pair is met once.
   std::vector<double> pairs(tiles.size());
   const auto bordering = [&](std::size_t i, auto&& f) {
-    for_each_bordering_tile(tree, tiles[i], [&](float value) { return is_inside(value) == background; }, f);
+    for_each_bordering_tile(
+        tree, tiles[i], [&](float value) { return is_inside(value) == background; }, f);
   };
   parallel_blocks(tiles.size(), context, [&](std::size_t i) {
-    bordering(i, [&](const Coord&, const Coord&, int, int width) { pairs[i] += double(width / 8) * (width / 8); });
+    bordering(
+        i, [&](const Coord&, const Coord&, int, int width) { pairs[i] += double(width / 8) * (width / 8); });
   });
   const double crossed = std::accumulate(pairs.begin(), pairs.end(), 0.0);
   if (crossed > kMostTilePairs)
@@ -169,7 +173,8 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
     index.emplace(sources[i]->origin(), static_cast<std::int32_t>(i));
     counts[i] = sources[i]->getChildMask().countOn();
   }
-  // The scan turns counts into the number of each node's first leaf, so that nodes number their leaves side by side.
+  // The scan turns counts into the number of each node's first leaf, so that nodes number their leaves side
+  // by side.
   const std::uint64_t total = exclusive_scan(counts, "leaves");
   places_.resize(total);
   leaves_.resize(total);
@@ -209,8 +214,8 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       find_values(leaf);
     }
   });
-  // A second pass, because what lies around a node is copied from its neighbours' numbers, which must all be there;
-  // each node writes its own rim, which no other one reads.
+  // A second pass, because what lies around a node is copied from its neighbours' numbers, which must all be
+  // there; each node writes its own rim, which no other one reads.
   each_node([&](std::size_t i) { number_around(i); });
   nodes_in_order_.resize(sources.size());
   std::iota(nodes_in_order_.begin(), nodes_in_order_.end(), 0u);
@@ -224,13 +229,15 @@ void LeafPlaces::find_tiles(Node& node) const {
   for (int word = 0; word < kWords; ++word) {
     node.child[word] = node.source->getChildMask().getWord<std::uint64_t>(word);
     const auto* const table = node.source->getTable() + 64 * word;
-    // All slots are read, without branches. One with a child holds a pointer instead of a value, and what the rule
-    // makes of its bits is masked away.
+    // All slots are read, without branches. One with a child holds a pointer instead of a value, and what the
+    // rule makes of its bits is masked away.
     std::uint64_t inside = 0;
-    for (int bit = 0; bit < 64; ++bit) inside |= static_cast<std::uint64_t>(rule_(table[bit].getValue())) << bit;
+    for (int bit = 0; bit < 64; ++bit)
+      inside |= static_cast<std::uint64_t>(rule_(table[bit].getValue())) << bit;
     node.tile_inside[word] = inside & ~node.child[word];
     for (std::uint64_t left = node.tile_inside[word]; left != 0; left &= left - 1)
-      node.nearest_inside = std::max(node.nearest_inside, rule_.signed_value(table[std::countr_zero(left)].getValue()));
+      node.nearest_inside =
+          std::max(node.nearest_inside, rule_.signed_value(table[std::countr_zero(left)].getValue()));
   }
 }
 
@@ -289,8 +296,9 @@ LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& con
   number_leaves(context, false);
   read_signs(context);
   if (is_complete(context)) return;
-  // Rare: bands thinner than a voxel, tiles that were made by hand. A new leaf may meet further tiles of the other sign
-  // only where the tile it was made from did, so one round is enough; the loop does not rely on it.
+  // Rare: bands thinner than a voxel, tiles that were made by hand. A new leaf may meet further tiles of the
+  // other sign only where the tile it was made from did, so one round is enough; the loop does not rely on
+  // it.
   auto copy = std::make_shared<openvdb::FloatTree>(*tree_);
   do {
     for (const Coord& lower : missing_leaves(context)) copy->touchLeaf(lower);
@@ -319,8 +327,10 @@ void LeafTable::read_signs(RunContext& context) {
       find_values(i);
       for (std::size_t sample = 0; sample < 512; sample += kLine) __builtin_prefetch(values(i) + sample);
     };
-    for (std::size_t i = range.begin(); i < std::min(range.begin() + kLeavesAhead, range.end()); ++i) ask_for(i);
-    for (std::size_t i = range.begin(); i < std::min(range.begin() + kSamplesAhead, range.end()); ++i) find(i);
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kLeavesAhead, range.end()); ++i)
+      ask_for(i);
+    for (std::size_t i = range.begin(); i < std::min(range.begin() + kSamplesAhead, range.end()); ++i)
+      find(i);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       if (i + kLeavesAhead < range.end()) ask_for(i + kLeavesAhead);
       if (i + kSamplesAhead < range.end()) find(i + kSamplesAhead);
@@ -356,7 +366,8 @@ bool LeafTable::has_inactive_inside_nearer_than(float distance) const {
 
 BlockMask LeafPlaces::active(std::size_t leaf) const {
   BlockMask mask;
-  for (int word = 0; word < 8; ++word) mask[word] = leaves_[leaf]->getValueMask().getWord<std::uint64_t>(word);
+  for (int word = 0; word < 8; ++word)
+    mask[word] = leaves_[leaf]->getValueMask().getWord<std::uint64_t>(word);
   return mask;
 }
 
@@ -372,8 +383,8 @@ std::vector<LeafPlaces::Slab> LeafPlaces::slabs() const {
   return result;
 }
 
-/// True if two tiles of different sign touch, both within the node or one in it and one beyond. Rows of 16 along z are
-/// compared with their neighbours as bits.
+/// True if two tiles of different sign touch, both within the node or one in it and one beyond. Rows of 16
+/// along z are compared with their neighbours as bits.
 bool LeafPlaces::tiles_meet(const Node& node) const {
   struct Row {
     std::uint32_t tile, inside;
@@ -400,8 +411,8 @@ bool LeafPlaces::tiles_meet(const Node& node) const {
       met |= meet(own, {below.tile >> 15, below.inside >> 15}) & 1;
       met |= meet(own, y < 15 ? row_of(node, x, y + 1) : row_at(x, 16, 0));
       met |= meet(own, x < 15 ? row_of(node, x + 1, y) : row_at(16, y, 0));
-      // Pairs are met from below, but for those at the node's lower sides: what lies beyond may be a tile as large as
-      // the node, which compares nothing itself.
+      // Pairs are met from below, but for those at the node's lower sides: what lies beyond may be a tile as
+      // large as the node, which compares nothing itself.
       if (y == 0) met |= meet(own, row_at(x, -1, 0));
       if (x == 0) met |= meet(own, row_at(-1, y, 0));
     }
@@ -433,7 +444,8 @@ bool LeafPlaces::tiles_of_both_signs_meet(RunContext& context) const {
 
 /// True if every edge with a change of sign starts in a leaf.
 bool LeafTable::is_complete(RunContext& context) const {
-  // Edges that end in a leaf and start in none, then edges between two tiles; all others start in a leaf by themselves.
+  // Edges that end in a leaf and start in none, then edges between two tiles; all others start in a leaf by
+  // themselves.
   std::atomic<bool> complete{true};
   parallel_blocks(size(), context, [&](std::size_t i) {
     for (int axis = 0; axis < 3; ++axis)
@@ -509,9 +521,10 @@ std::vector<Coord> LeafTable::missing_leaves(RunContext& context) const {
 std::array<BlockMask, 3> LeafTable::crossing_edges(std::size_t leaf) const {
   std::array<BlockMask, 3> edges;
   for (int axis = 0; axis < 3; ++axis) {
-    const BlockMask above = shifted_mask(axis == 0, axis == 1, axis == 2, [&](int x, int y, int z) -> const BlockMask& {
-      return x + y + z == 0 ? inside(leaf) : signs(neighbour(leaf, x, y, z));
-    });
+    const BlockMask above =
+        shifted_mask(axis == 0, axis == 1, axis == 2, [&](int x, int y, int z) -> const BlockMask& {
+          return x + y + z == 0 ? inside(leaf) : signs(neighbour(leaf, x, y, z));
+        });
     for (std::size_t x = 0; x < 8; ++x) edges[std::size_t(axis)][x] = inside(leaf)[x] ^ above[x];
   }
   return edges;
@@ -522,9 +535,10 @@ void LeafTable::throw_no_leaf(std::size_t leaf, int x, int y, int z) const {
     return "(" + std::to_string(i) + ", " + std::to_string(j) + ", " + std::to_string(k) + ")";
   };
   const auto [first_x, first_y, first_z] = lower(leaf);
-  throw Error("an extractor looked up the sample " + at(x, y, z) + " of the leaf at " +
-              at(first_x, first_y, first_z) +
-              ", where the volume has no leaf; LeafPlaces::neighbour() tells what is outside or inside throughout");
+  throw Error(
+      "an extractor looked up the sample " + at(x, y, z) + " of the leaf at " +
+      at(first_x, first_y, first_z) +
+      ", where the volume has no leaf; LeafPlaces::neighbour() tells what is outside or inside throughout");
 }
 
 LevelSet with_leaves(const LevelSet& level_set, std::span<const std::array<std::int32_t, 3>> lowers) {

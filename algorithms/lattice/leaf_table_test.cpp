@@ -23,8 +23,8 @@ class LeafTableTest : public testing::Test {
     return LeafTable(make_level_set(grid), isovalue, context_);
   }
 
-  /// Every edge with a change of sign must start in a leaf: the last samples of a leaf and of each of its neighbours are
-  /// compared with what the tree itself says.
+  /// Every edge with a change of sign must start in a leaf: the last samples of a leaf and of each of its
+  /// neighbours are compared with what the tree itself says.
   static void expect_complete(const LeafTable& table, const openvdb::CoordBBox& box) {
     const auto inside = [&](const Coord& at) { return table.rule()(table.tree().getValue(at)); };
     for (auto it = box.begin(); it; ++it)
@@ -40,8 +40,8 @@ class LeafTableTest : public testing::Test {
 };
 
 TEST_F(LeafTableTest, NeighboursAndSignsAreTheTrees) {
-  const auto sphere =
-      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(90.0f, openvdb::Vec3f(3.0f, -70.0f, 5.0f), 1.0f);
+  const auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
+      90.0f, openvdb::Vec3f(3.0f, -70.0f, 5.0f), 1.0f);
   const LeafTable leaves = table(sphere);
   ASSERT_EQ(leaves.size(), sphere->tree().leafCount());
   std::size_t across_nodes = 0;
@@ -90,7 +90,8 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
     leaves.for_each_leaf(slab, [&](std::uint32_t leaf) { order.push_back(leaf); });
     for (std::size_t i = before; i < order.size(); ++i)
       ASSERT_EQ(leaves.lower(order[i])[0], leaves.lower(order[before])[0]);
-    std::vector<std::uint32_t> in_order(order.begin() + static_cast<std::ptrdiff_t>(before), order.end()), in_ranges;
+    std::vector<std::uint32_t> in_order(order.begin() + static_cast<std::ptrdiff_t>(before), order.end()),
+        in_ranges;
     leaves.for_each_range(slab, [&](std::uint32_t first, std::uint32_t end) {
       for (std::uint32_t leaf = first; leaf < end; ++leaf) in_ranges.push_back(leaf);
     });
@@ -98,7 +99,8 @@ TEST_F(LeafTableTest, SurroundingsAreAllNeighboursAndTheOrderOfPlaceIsLexicograp
     ASSERT_EQ(in_ranges, in_order);
   }
   ASSERT_EQ(order.size(), leaves.size());
-  for (std::size_t i = 1; i < order.size(); ++i) ASSERT_LT(leaves.lower(order[i - 1]), leaves.lower(order[i]));
+  for (std::size_t i = 1; i < order.size(); ++i)
+    ASSERT_LT(leaves.lower(order[i - 1]), leaves.lower(order[i]));
   const auto empty = openvdb::FloatGrid::create(3.0f);
   EXPECT_TRUE(table(empty).slabs().empty());
 }
@@ -119,7 +121,8 @@ TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
 }
 
 TEST_F(LeafTableTest, ALeafBesideATileOfTheOtherSignBringsTheTileIn) {
-  // One sample inside at the leaf's first corner: the edges that lead to it start in three neighbours without leaves.
+  // One sample inside at the leaf's first corner: the edges that lead to it start in three neighbours without
+  // leaves.
   const auto grid = openvdb::FloatGrid::create(3.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->tree().setValue(Coord(0, 0, 0), -1.0f);
@@ -159,7 +162,8 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
       if (level_set) grid->setGridClass(openvdb::GRID_LEVEL_SET);
       auto* leaf = grid->tree().touchLeaf(Coord(0));
       for (openvdb::Index i = 0; i < 512; ++i)
-        leaf->setValueOn(i, std::nextafter(isovalue, float(int(random() % 3) - 1)) + float(int(random() % 3) - 1));
+        leaf->setValueOn(
+            i, std::nextafter(isovalue, float(int(random() % 3) - 1)) + float(int(random() % 3) - 1));
       const LeafTable leaves = table(grid, isovalue);
       std::size_t number = 0;  // tiles beside it may have become leaves
       while (leaves.lower(number) != std::array<std::int32_t, 3>{}) ++number;
@@ -172,7 +176,9 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
     for (openvdb::Index i = 0; i < 512; ++i) {
       const auto grid = openvdb::FloatGrid::create(3.0f);
       const float infinite = std::numeric_limits<float>::infinity();
-      grid->tree().touchLeaf(Coord(0))->setValueOn(i, i % 3 == 0 ? infinite : i % 3 == 1 ? -infinite : infinite - infinite);
+      grid->tree().touchLeaf(Coord(0))->setValueOn(i, i % 3 == 0   ? infinite
+                                                      : i % 3 == 1 ? -infinite
+                                                                   : infinite - infinite);
       EXPECT_THROW(table(grid), Error) << i << " at " << name(level);
     }
   }

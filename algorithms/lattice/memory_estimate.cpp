@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/lattice/block_table.h"
 #include "algorithms/core/error.h"
+#include "algorithms/lattice/block_table.h"
 
 namespace hermesh {
 namespace {
@@ -58,8 +58,8 @@ struct Measured {
   double area = 0;  ///< square world units; no number if a corner is none
 };
 
-/// Gathers bounds and area of one triangle after the other. Corners stay in single precision for the bounds, which are
-/// exact in it; the area is summed in double precision.
+/// Gathers bounds and area of one triangle after the other. Corners stay in single precision for the bounds,
+/// which are exact in it; the area is summed in double precision.
 class Measure {
  public:
   void add(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
@@ -113,7 +113,8 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
   std::vector<BlockSet> parts((mesh.points.size() + kItemsPerTask - 1) / kItemsPerTask);
   const double scale = 1.0 / (8.0 * voxel_size);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
-    for (std::size_t i = part * kItemsPerTask; i < std::min(mesh.points.size(), (part + 1) * kItemsPerTask); ++i) {
+    for (std::size_t i = part * kItemsPerTask; i < std::min(mesh.points.size(), (part + 1) * kItemsPerTask);
+         ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
         // Held within the range of integers: estimate_band() does not check how far out a mesh lies.
@@ -207,10 +208,9 @@ void check_arguments(double voxel_size, double exterior_band, double interior_ba
   if (!std::isfinite(voxel_size) || voxel_size <= 0.0)
     throw Error("The voxel size must be a finite number above 0, not " + format("%g", voxel_size) + ".");
   if (voxel_size < kSmallestVoxel || voxel_size > double(std::numeric_limits<float>::max()))
-    throw Error(
-        "A voxel size of " + format("%g", voxel_size) +
-        " is outside of what OpenVDB's transforms take (1.45e-05 to 3.4e+38 world units): use larger "
-        "voxels, or scale the mesh.");
+    throw Error("A voxel size of " + format("%g", voxel_size) +
+                " is outside of what OpenVDB's transforms take (1.45e-05 to 3.4e+38 world units): use larger "
+                "voxels, or scale the mesh.");
   for (const double band : {exterior_band, interior_band})
     if (!std::isfinite(band) || band < 1.0)
       throw Error("A narrow band must be a finite number of voxels, at least 1, not " + format("%g", band) +
@@ -233,7 +233,7 @@ BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double 
   // The band lies around the surface on both sides, and one more sample where its ends fall between samples.
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
   const BandSize layer{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
-                      measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
+                       measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
 
   BandEstimate estimate;
   const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
@@ -263,7 +263,8 @@ std::optional<std::uint64_t> available_memory() {
   // The machine's own figure is in units of 1024 bytes.
   std::optional<std::uint64_t> available = field_of("/proc/meminfo", "MemAvailable");
   if (available) *available *= 1024;
-  // Control groups of version 2, then of version 1, then this process's limits: the least of all that are set holds.
+  // Control groups of version 2, then of version 1, then this process's limits: the least of all that are set
+  // holds.
   const std::string root = "/sys/fs/cgroup/";
   for (const auto& left :
        {left_in_group(root + "memory.max", root + "memory.current", root + "memory.stat", "inactive_file"),
@@ -277,13 +278,14 @@ std::optional<std::uint64_t> available_memory() {
 void check_fits_memory(double bytes, const std::string& what) {
   const std::optional<std::uint64_t> available = available_memory();
   if (available && bytes > double(*available))
-    throw Error(what + " would need about " + gibibytes(bytes) + " of memory, and " + gibibytes(double(*available)) +
-                " are available");
+    throw Error(what + " would need about " + gibibytes(bytes) + " of memory, and " +
+                gibibytes(double(*available)) + " are available");
 }
 
 void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                              double interior_band) {
-  // In this order each check can rely on those before: the estimate divides by the voxel size and takes finite corners.
+  // In this order each check can rely on those before: the estimate divides by the voxel size and takes
+  // finite corners.
   check_arguments(voxel_size, exterior_band, interior_band);
   if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
   const Measured measured = measure(mesh);

@@ -21,14 +21,14 @@ struct BandEstimate {
   double peak_bytes = 0.0;  ///< memory in use at most while the grid is made
 };
 
-/// Estimates the narrow band around a mesh; voxel size in world units, bands in voxels. The estimate rests on the
-/// surface's area, on the number of 8³ blocks that hold a corner of a polygon (for scattered small pieces), and on the
-/// bounding box (as the upper limit).
+/// Estimates the narrow band around a mesh; voxel size in world units, bands in voxels. The estimate rests on
+/// the surface's area, on the number of 8³ blocks that hold a corner of a polygon (for scattered small
+/// pieces), and on the bounding box (as the upper limit).
 BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                            double interior_band);
 
-/// Bytes that this process could still take: the machine's available memory, what its control group has left, or what
-/// its own limits (ulimit -v, -d) leave, whichever is less. Nothing when the system does not say.
+/// Bytes that this process could still take: the machine's available memory, what its control group has left,
+/// or what its own limits (ulimit -v, -d) leave, whichever is less. Nothing when the system does not say.
 std::optional<std::uint64_t> available_memory();
 
 /// Refuses what would take more memory than available_memory(); `what` begins the sentence.

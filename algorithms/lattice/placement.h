@@ -12,8 +12,8 @@ namespace hermesh {
 struct IndexToWorld {
   Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();  ///< voxel to world; any regular affine map
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();      ///< world position of `base`, less `origin`
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();      ///< origin of the meshes made from the grid, world units
-  std::array<std::int32_t, 3> base{};                    ///< index coordinates near the grid's middle or zero
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the meshes made from the grid, world units
+  std::array<std::int32_t, 3> base{};                ///< index coordinates near the grid's middle or zero
 
   /// Relative to `origin`, from index coordinates relative to `base`.
   Eigen::Vector3d local(const Eigen::Vector3d& index) const { return linear * index + offset; }

@@ -9,16 +9,18 @@ namespace {
 
 using namespace simd;
 
-// A comparison of magnitudes as whole numbers finds what is no number: with the sign bit cleared, floats are ordered as
-// their bits are, and infinity and all NaNs come after the largest finite number.
+// A comparison of magnitudes as whole numbers finds what is no number: with the sign bit cleared, floats are
+// ordered as their bits are, and infinity and all NaNs come after the largest finite number.
 //
-// A sample is compared with the isovalue instead of signed_value() with 0. Both decide alike, because the difference of
-// two floats that are not equal is never rounded to 0; and where greater is inside, the comparison is turned about.
+// A sample is compared with the isovalue instead of signed_value() with 0. Both decide alike, because the
+// difference of two floats that are not equal is never rounded to 0; and where greater is inside, the
+// comparison is turned about.
 
 bool read_leaf(const float* values, const InsideRule& rule, std::uint64_t* inside) {
   constexpr std::int32_t kMagnitude = 0x7fffffff, kLargestFinite = 0x7f7fffff;
   const Floats iso = all(rule.isovalue);
-  // The greatest magnitude of each lane is enough: one comparison after the loop tells whether any was not finite.
+  // The greatest magnitude of each lane is enough: one comparison after the loop tells whether any was not
+  // finite.
   Ints greatest{};
   // A word is a layer along x: 64 samples in a row of memory, whose comparisons are its bits in order.
   for (int word = 0; word < 8; ++word) {
@@ -35,7 +37,8 @@ bool read_leaf(const float* values, const InsideRule& rule, std::uint64_t* insid
   return !any(greatest > kLargestFinite);
 }
 
-// Rows are read for layers of edges across leaves. Nobody looks for samples that are not finite here; read_leaf() does.
+// Rows are read for layers of edges across leaves. Nobody looks for samples that are not finite here;
+// read_leaf() does.
 std::uint64_t read_rows(const float* values, std::size_t stride, const InsideRule& rule) {
   const Floats iso = all(rule.isovalue);
   std::uint64_t bits = 0;

@@ -9,9 +9,9 @@
 
 namespace hermesh {
 
-/// The rule which samples of a volume are inside. In a level set, samples less than the isovalue are. In any other
-/// volume the background is outside, and samples on the other side of the isovalue are inside, so that dense fog is. A
-/// sample exactly at the isovalue is outside.
+/// The rule which samples of a volume are inside. In a level set, samples less than the isovalue are. In any
+/// other volume the background is outside, and samples on the other side of the isovalue are inside, so that
+/// dense fog is. A sample exactly at the isovalue is outside.
 struct InsideRule {
   float isovalue = 0.0f;
   float scale = 1.0f;  ///< −1 where greater values are inside

@@ -1,8 +1,9 @@
-// Where a sample's side is asked for. A sample that lies on a polygon has no side of its own: parts of a model that meet
-// in a plane of samples would be cut apart along it, and a wall one voxel thick, whose samples all lie on it, would be
-// lost. So sides are those of the lattice moved by a hair in general position, and each sample belongs to the solid on
-// that side of the polygon (Edelsbrunner & Mücke, Simulation of Simplicity, ACM TOG 9(1), 1990). Of a box from 0 to n the
-// samples 0 … n − 1 are inside: every slab keeps as many layers of samples as it is voxels thick.
+// Where a sample's side is asked for. A sample that lies on a polygon has no side of its own: parts of a
+// model that meet in a plane of samples would be cut apart along it, and a wall one voxel thick, whose
+// samples all lie on it, would be lost. So sides are those of the lattice moved by a hair in general
+// position, and each sample belongs to the solid on that side of the polygon (Edelsbrunner & Mücke,
+// Simulation of Simplicity, ACM TOG 9(1), 1990). Of a box from 0 to n the samples 0 … n − 1 are inside: every
+// slab keeps as many layers of samples as it is voxels thick.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +12,9 @@
 
 namespace hermesh {
 
-/// The hair, in voxels. It is far above the tolerance of the crossing test (1e-9) and the rounding of coordinates, far
-/// below anything that a distance shows, and its components are in no ratio of small whole numbers, so that no polygon
-/// through samples at small slopes holds the moved ones, too.
+/// The hair, in voxels. It is far above the tolerance of the crossing test (1e-9) and the rounding of
+/// coordinates, far below anything that a distance shows, and its components are in no ratio of small whole
+/// numbers, so that no polygon through samples at small slopes holds the moved ones, too.
 inline constexpr std::array<double, 3> kSideShift = {3.1415927e-6, 2.2182818e-6, 1.2020569e-6};
 
 /// The place whose side sample (x, y, z) has, in voxels.

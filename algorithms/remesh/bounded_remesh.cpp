@@ -34,11 +34,13 @@ constexpr double kUniform = 0.6, kUsed = 0.97, kUnseen = 1.1;
 constexpr double kNear = 0.85, kFarthest = 4.0;
 /// Voxels of the first try that looks for what is thin and, where nobody says so, the smallest, in errors.
 constexpr double kFirstVoxel = 1.5, kSmallestVoxel = 0.125;
-/// How much larger voxels must be than these to be worth a try, for shapes that are plane or smooth; how many tries there are
-/// in which all but a few places are near, and the voxels of the next one, in those of this one.
+/// How much larger voxels must be than these to be worth a try, for shapes that are plane or smooth; how many
+/// tries there are in which all but a few places are near, and the voxels of the next one, in those of this
+/// one.
 constexpr double kWorthLarger = 2.0, kNextLarger = 0.8;
 constexpr int kLargerTries = 4;
-/// Share of the error that such a voxel's uniform mesh may use up in the mean: triangles are about as many more.
+/// Share of the error that such a voxel's uniform mesh may use up in the mean: triangles are about as many
+/// more.
 constexpr double kLittle = 0.02;
 /// Points of it that are asked first whether it does.
 constexpr std::size_t kAskedFirst = 1000;
@@ -46,7 +48,8 @@ constexpr std::size_t kAskedFirst = 1000;
 constexpr double kFewestVoxels = 16.0;
 /// Voxels of the next try where points did not tell what is too far, in those of this one.
 constexpr double kFinerBetween = 0.6;
-/// Least tolerance of what is collapsed again, in errors, and the triangles that must be left of it for another time.
+/// Least tolerance of what is collapsed again, in errors, and the triangles that must be left of it for
+/// another time.
 constexpr double kLeastShare = 0.02, kWorthAgain = 0.95;
 /// A tolerance that was lowered below this many voxels is of no more use.
 constexpr double kLeastTolerance = 0.02;
@@ -122,9 +125,9 @@ class BoundedRemesher {
   }
 
  private:
-  /// Whether the bound was reached with larger voxels than `first`, which is so where their uniform mesh already leaves the
-  /// collapses nearly all of the error: of plane parts and smooth ones. A try with twice the voxels costs a quarter.
-  /// Nothing is refused here: what larger voxels do not show, smaller ones may.
+  /// Whether the bound was reached with larger voxels than `first`, which is so where their uniform mesh
+  /// already leaves the collapses nearly all of the error: of plane parts and smooth ones. A try with twice
+  /// the voxels costs a quarter. Nothing is refused here: what larger voxels do not show, smaller ones may.
   bool try_larger(double first) {
     const OneProgress progress(context_, "try larger voxels");
     const std::size_t notes = context_.notes.size();
@@ -159,12 +162,13 @@ class BoundedRemesher {
     return false;
   }
 
-  /// The share of the error that a uniform mesh uses up in the mean over its points. `apart` says by point how far the surface
-  /// is from it and from the triangles around it; where the share is more than kLittle, some points and triangles may have
-  /// said so, and it is empty.
+  /// The share of the error that a uniform mesh uses up in the mean over its points. `apart` says by point
+  /// how far the surface is from it and from the triangles around it; where the share is more than kLittle,
+  /// some points and triangles may have said so, and it is empty.
   double share_used(const Attempt& now, const SurfaceDistance& surface, std::vector<double>& apart) {
     double used = mean_share(apart_at_points(now, surface, 1 + now.file_points.size() / kAskedFirst));
-    if (used <= kLittle) used = mean_share(apart_in_triangles(now, surface, 1 + now.fine.triangles().size() / kAskedFirst));
+    if (used <= kLittle)
+      used = mean_share(apart_in_triangles(now, surface, 1 + now.fine.triangles().size() / kAskedFirst));
     if (used > kLittle) return used;
     apart = apart_around_points(now, surface);
     return mean_share(apart);
@@ -194,8 +198,8 @@ class BoundedRemesher {
       if (explained(now, far)) return false;
       return smaller(voxel_size, *now.surface, std::clamp(kUniform * options_.error / worst, 0.35, 0.7), far);
     }
-    // Points tell nearly, and at once. Where the uniform mesh itself is too far between them, no tolerance helps, and
-    // collapses and their proof, which take most of the time, would be for nothing.
+    // Points tell nearly, and at once. Where the uniform mesh itself is too far between them, no tolerance
+    // helps, and collapses and their proof, which take most of the time, would be for nothing.
     if (const std::vector<Far> far = far_between_points(now, surface, uniform); !far.empty()) {
       if (explained(now, far)) return false;
       return smaller(voxel_size, *now.surface, kFinerBetween, far);
@@ -237,14 +241,15 @@ class BoundedRemesher {
     // Thin parts take about as long as three times the mesh, and as four vertices for each polygon.
     count_work(double(uniform.points.size()) * (made.thin ? 3.0 : 1.0) +
                (made.thin ? 4.0 * double(mesh_.triangle_count()) : 0.0));
-    Attempt result{
-        voxel_size,
-        std::make_shared<const SolidSurface>(surface_of(std::move(volume.boundary), keeps_thin ? std::span<const std::int8_t>() : turns_,
-                                                    options_.over_holes)),
-        file,
-        FineMesh(std::move(uniform.points), all_triangles(std::move(uniform.triangles), uniform.quads), context_),
-        {},
-        file.placement().origin - mesh_.origin};
+    Attempt result{voxel_size,
+                   std::make_shared<const SolidSurface>(
+                       surface_of(std::move(volume.boundary),
+                                  keeps_thin ? std::span<const std::int8_t>() : turns_, options_.over_holes)),
+                   file,
+                   FineMesh(std::move(uniform.points),
+                            all_triangles(std::move(uniform.triangles), uniform.quads), context_),
+                   {},
+                   file.placement().origin - mesh_.origin};
     if (result.surface->triangles.empty()) return std::nullopt;
     result.file_points = result.in_file(result.fine.points());
     return result;
@@ -264,22 +269,24 @@ class BoundedRemesher {
     return all;
   }
 
-  /// How far the points of a mesh are from the surface, or every `step`-th of them; world units, kFarthest errors where it
-  /// is more.
+  /// How far the points of a mesh are from the surface, or every `step`-th of them; world units, kFarthest
+  /// errors where it is more.
   std::vector<double> apart_at_points(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
     const Stage stage(context_, "compare");
     std::vector<double> apart((now.file_points.size() + step - 1) / step);
-    parallel_blocks(apart.size(), context_,
-                    [&](std::size_t i) { apart[i] = surface.at(now.place(i * step), kFarthest * options_.error); });
+    parallel_blocks(apart.size(), context_, [&](std::size_t i) {
+      apart[i] = surface.at(now.place(i * step), kFarthest * options_.error);
+    });
     return apart;
   }
   double mean_share(const std::vector<double>& apart) const {
     return std::accumulate(apart.begin(), apart.end(), 0.0) / (double(apart.size()) * options_.error);
   }
 
-  /// How far the triangles of a mesh are from the surface at most, in their middles and those of their sides, or every
-  /// `step`-th of them; as apart_at_points() says it.
-  std::vector<double> apart_in_triangles(const Attempt& now, const SurfaceDistance& surface, std::size_t step) {
+  /// How far the triangles of a mesh are from the surface at most, in their middles and those of their sides,
+  /// or every `step`-th of them; as apart_at_points() says it.
+  std::vector<double> apart_in_triangles(const Attempt& now, const SurfaceDistance& surface,
+                                         std::size_t step) {
     const Stage stage(context_, "compare");
     const std::vector<Triangle>& triangles = now.fine.triangles();
     std::vector<double> apart((triangles.size() + step - 1) / step);
@@ -293,7 +300,8 @@ class BoundedRemesher {
     return apart;
   }
 
-  /// How far the points of a mesh and the triangles around each of them are from the surface at most, as those two say it.
+  /// How far the points of a mesh and the triangles around each of them are from the surface at most, as
+  /// those two say it.
   std::vector<double> apart_around_points(const Attempt& now, const SurfaceDistance& surface) {
     std::vector<double> apart = apart_at_points(now, surface, 1);
     const std::vector<double> within = apart_in_triangles(now, surface, 1);
@@ -302,15 +310,17 @@ class BoundedRemesher {
     return apart;
   }
 
-  /// Where points of the surfaces are farther apart than the collapses can do with. `apart`, as of apart_at_points(), becomes
-  /// what counts at each point: what is farthest of the triangles around it and of the surface nearest to these.
+  /// Where points of the surfaces are farther apart than the collapses can do with. `apart`, as of
+  /// apart_at_points(), becomes what counts at each point: what is farthest of the triangles around it and of
+  /// the surface nearest to these.
   std::vector<Far> look(const Attempt& now, const SurfaceDistance& uniform, std::vector<double>& apart) {
     const Stage stage(context_, "compare");
     const double most = kFarthest * options_.error;
     std::vector<Far> far;
     const double limit = kNear * options_.error;
     for (std::size_t i = 0; i < apart.size(); ++i)
-      if (apart[i] > limit) far.push_back({now.place(i), apart[i], false, now.fine.around(std::uint32_t(i))[0]});
+      if (apart[i] > limit)
+        far.push_back({now.place(i), apart[i], false, now.fine.around(std::uint32_t(i))[0]});
 
     // The other way, each place of the surface counts at the corners of the uniform triangle that is nearest.
     std::vector<std::uint8_t> used(now.surface->points.size(), 0);
@@ -344,33 +354,42 @@ class BoundedRemesher {
     return far;
   }
 
-  /// Where triangles of the uniform mesh are farther from the surface than the error, or those of the surface from it.
+  /// Where triangles of the uniform mesh are farther from the surface than the error, or those of the surface
+  /// from it.
   std::vector<Far> far_between_points(const Attempt& now, const SurfaceDistance& surface,
                                       const SurfaceDistance& uniform) const {
     const Stage stage(context_, "compare between points");
     std::vector<Far> far;
     const double error = options_.error;
-    const auto to = surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_, {}, Wanted::any_bound);
+    const auto to = surface.hold(now.file_points, now.offset, now.fine.triangles(), error, context_, {},
+                                 Wanted::any_bound);
     for (const FarTriangle& f : to.far) far.push_back({f.place + now.offset, f.distance, false, f.triangle});
-    const auto from = uniform.hold(now.surface->points, -now.offset, now.surface->triangles, error, context_, free_pieces(),
-                                   Wanted::any_bound);
+    const auto from = uniform.hold(now.surface->points, -now.offset, now.surface->triangles, error, context_,
+                                   free_pieces(), Wanted::any_bound);
     for (const FarTriangle& f : from.far) far.push_back({f.place, f.distance, true, f.triangle});
     return far;
   }
 
-  /// Collapses with what is left of the error, again as long as that is worth it: the places where the first time fails, or
-  /// none and the mesh in the result.
-  std::vector<Far> collapse_all(const Attempt& uniform, const SurfaceDistance& surface, const std::vector<double>& apart) {
+  /// Collapses with what is left of the error, again as long as that is worth it: the places where the first
+  /// time fails, or none and the mesh in the result.
+  std::vector<Far> collapse_all(const Attempt& uniform, const SurfaceDistance& surface,
+                                const std::vector<double>& apart) {
     CertifiedMesh mesh;
     std::vector<Far> far = collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh);
     if (!far.empty()) return far;
-    // What is reached may be collapsed like what it came from, for the proof is against the polygons each time. Cubes and
-    // passes leave points on plane parts where two thirds may go; of a scan next to none are left.
+    // What is reached may be collapsed like what it came from, for the proof is against the polygons each
+    // time. Cubes and passes leave points on plane parts where two thirds may go; of a scan next to none are
+    // left.
     for (bool is_worth_it = true; is_worth_it;) {
       const BoundedMesh before = result_;
-      const Attempt now{uniform.voxel_size, uniform.surface, uniform.file, FineMesh(mesh.points, mesh.triangles, context_),
-                        uniform.in_file(mesh.points), uniform.offset};
-      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh).empty()) {
+      const Attempt now{uniform.voxel_size,
+                        uniform.surface,
+                        uniform.file,
+                        FineMesh(mesh.points, mesh.triangles, context_),
+                        uniform.in_file(mesh.points),
+                        uniform.offset};
+      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh)
+               .empty()) {
         const double work = result_.work;
         result_ = before;
         result_.work = work;
@@ -386,15 +405,17 @@ class BoundedRemesher {
   std::vector<float> tolerances(const Attempt& now, const std::vector<double>& apart, double least) const {
     std::vector<float> tolerance(apart.size());
     for (std::size_t i = 0; i < apart.size(); ++i)
-      tolerance[i] =
-          float(std::max(least * options_.error, kUsed * options_.error - kUnseen * apart[i]) / now.voxel_size);
+      tolerance[i] = float(std::max(least * options_.error, kUsed * options_.error - kUnseen * apart[i]) /
+                           now.voxel_size);
     return tolerance;
   }
 
-  /// Collapses, and the proof: the places where it fails, or none, and what came of it in `mesh` and in the result.
+  /// Collapses, and the proof: the places where it fails, or none, and what came of it in `mesh` and in the
+  /// result.
   std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, std::vector<float> tolerance,
                             CertifiedMesh& mesh) {
-    // A place of the mesh is then within the error by the triangle inequality, as far as the tolerances are right.
+    // A place of the mesh is then within the error by the triangle inequality, as far as the tolerances are
+    // right.
     std::vector<Far> far;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
       CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
@@ -507,7 +528,8 @@ class BoundedRemesher {
     if (!normal.allFinite() || normal.isZero()) return true;  // it has no area
     const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0,
                           step = kOffSurface * extent_ * normal;
-    const bool before = winding_->number().at(middle + step) > 0.5, behind = winding_->number().at(middle - step) > 0.5;
+    const bool before = winding_->number().at(middle + step) > 0.5,
+               behind = winding_->number().at(middle - step) > 0.5;
     // A sheet with nothing on either side is thickened where thin parts are kept.
     return before == behind && (before || options_.thin != ThinRule::keep);
   }
@@ -600,7 +622,8 @@ class BoundedRemesher {
     return false;
   }
 
-  /// The width that voxels have to show for a place to be near; infinity for a place of the mesh, and for what is near.
+  /// The width that voxels have to show for a place to be near; infinity for a place of the mesh, and for
+  /// what is near.
   double thickness_to_show(const SurfaceDistance& surface, const Far& at) const {
     if (!at.of_surface || at.distance <= options_.error) return std::numeric_limits<double>::infinity();
     return width_to_show(surface.tree(), at.triangle, at.place, options_.error, kOffSurface * extent_);
@@ -624,7 +647,8 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
   if (mesh.empty()) throw Error("there are no polygons to remesh");
   const std::size_t notes = context.notes.size();
   BoundedMesh made = BoundedRemesher(mesh, options, context).run();
-  const bool has_hole = std::ranges::any_of(made.unmet, [](const UnmetPlace& p) { return p.why == Unmet::hole; });
+  const bool has_hole =
+      std::ranges::any_of(made.unmet, [](const UnmetPlace& p) { return p.why == Unmet::hole; });
   if (!has_hole || options.thin != ThinRule::keep || options.signs != SignRule::winding_number) return made;
   // What is open encloses nothing, then, and becomes a shell.
   BoundedRemeshOptions open = options;

@@ -13,10 +13,10 @@
 // nothing of the error; these are tried first, for a try costs little beside the next. Else voxels are made
 // smaller until the uniform mesh is within most of the error both ways, as far as points of both tell, and
 // within the error between these, triangle by triangle (search/surface_distance.h). What is left of the error
-// at each place, and a little less, is the tolerance of the collapses there (certified_collapse/). The outcome
-// is held against the surface in the same way: that, and nothing before it, is the proof. Around places where
-// it fails the tolerance is lowered, or else the voxels are made smaller. What was reached is collapsed and
-// held again, as long as that is worth it.
+// at each place, and a little less, is the tolerance of the collapses there (certified_collapse/). The
+// outcome is held against the surface in the same way: that, and nothing before it, is the proof. Around
+// places where it fails the tolerance is lowered, or else the voxels are made smaller. What was reached is
+// collapsed and held again, as long as that is worth it.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,8 +45,8 @@ struct BoundedRemeshOptions {
   double most_work = std::numeric_limits<double>::infinity();
   double smallest_voxel = 0.0;     ///< world units: none is smaller; 0: an eighth of the error
   bool written_in_single = false;  ///< as in ExtractionInput
-  /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin parts and sheets are thickened
-  /// within the error. Holes that may not be closed then make the polygons around them sheets.
+  /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin parts and sheets
+  /// are thickened within the error. Holes that may not be closed then make the polygons around them sheets.
   ThinRule thin = ThinRule::drop;
 };
 
@@ -67,13 +67,13 @@ struct BoundedMesh {
                        ///< is not empty
   double error = 0.0;  ///< that was asked for, world units
   double to_surface = 0.0,
-         from_surface = 0.0;      ///< bounds of the distance, each way, that are proved; world units
-  double voxel_size = 0.0;        ///< world units
-  int rounds = 0;                 ///< how often voxels or tolerances were made smaller than those that suit any shape
-  double free_area = 0.0;         ///< area of polygons far from the mesh that bound nothing, world units²
-  double left_out_area = 0.0;     ///< area of polygons within the solid, and of double walls; world units²
-  bool over_holes = false;        ///< as it was asked for
-  double hole_area = 0.0;         ///< area of the caps that close holes, world units²
+         from_surface = 0.0;  ///< bounds of the distance, each way, that are proved; world units
+  double voxel_size = 0.0;    ///< world units
+  int rounds = 0;  ///< how often voxels or tolerances were made smaller than those that suit any shape
+  double free_area = 0.0;      ///< area of polygons far from the mesh that bound nothing, world units²
+  double left_out_area = 0.0;  ///< area of polygons within the solid, and of double walls; world units²
+  bool over_holes = false;     ///< as it was asked for
+  double hole_area = 0.0;      ///< area of the caps that close holes, world units²
   double work = 0.0;  ///< vertices of all meshes that were made and polygons of thin parts, a measure of time
   double thickness = 0.0;         ///< of what is too thin at the first unmet place, world units; 0: unknown
   std::optional<ThinParts> thin;  ///< what was thickened; none: nothing

@@ -93,9 +93,11 @@ TEST(BoundedRemesh, WhatLargeVoxelsDoNotShowIsThereAllTheSame) {
   PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 0.7, 0.6));
   const PolygonMesh shaft = box(Vector3d(0.4013, 0.3307, 0.2), Vector3d(0.4173, 0.3467, 0.5));
   const auto first = std::uint32_t(both.points.size());
-  for (std::size_t i = 0; i < shaft.points.size(); ++i) both.points.push_back((shaft.world(i) - both.origin).cast<float>());
+  for (std::size_t i = 0; i < shaft.points.size(); ++i)
+    both.points.push_back((shaft.world(i) - both.origin).cast<float>());
   // Facing inwards: a cavity.
-  for (const Triangle& t : shaft.triangles) both.triangles.push_back({first + t[0], first + t[2], first + t[1]});
+  for (const Triangle& t : shaft.triangles)
+    both.triangles.push_back({first + t[0], first + t[2], first + t[1]});
   const BoundedMesh made = remesh(both, {.error = 0.004});
   ASSERT_TRUE(made.unmet.empty());
   double nearest = 1;
@@ -174,8 +176,8 @@ TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
   EXPECT_LE(made.voxel_size, 0.02);
 }
 
-/// A box with a fin of a height over a diagonal of its lid, 2e-4 thick at the middle of its foot, nothing at its ends and its
-/// tip. (In a cube the diagonal would run through samples.)
+/// A box with a fin of a height over a diagonal of its lid, 2e-4 thick at the middle of its foot, nothing at
+/// its ends and its tip. (In a cube the diagonal would run through samples.)
 PolygonMesh box_with_fin(double height) {
   const double width = 0.83;
   PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, width, 1));
@@ -195,8 +197,14 @@ PolygonMesh box_with_fin(double height) {
   const Vector3d middle(0.5, 0.5 * width, 1), across = 1e-4 * Vector3d(width, -1, 0).normalized();
   const std::uint32_t foot = add(middle + across), other_foot = add(middle - across),
                       tip = add(middle + Vector3d(0, 0, height));
-  for (const Triangle& t : {Triangle{a, b, foot}, {b, c, foot}, {c, d, other_foot}, {d, a, other_foot},
-                            {a, foot, tip}, {foot, c, tip}, {c, other_foot, tip}, {other_foot, a, tip}})
+  for (const Triangle& t : {Triangle{a, b, foot},
+                            {b, c, foot},
+                            {c, d, other_foot},
+                            {d, a, other_foot},
+                            {a, foot, tip},
+                            {foot, c, tip},
+                            {c, other_foot, tip},
+                            {other_foot, a, tip}})
     mesh.triangles.push_back(t);
   return mesh;
 }
@@ -207,7 +215,8 @@ TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
   EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
   const Vector3d at = refused.unmet.front().place;
   EXPECT_GT(at.z(), 1.05);
-  // The sides are planes, so that the fin thins out evenly from the middle of its foot to its ends and its tip.
+  // The sides are planes, so that the fin thins out evenly from the middle of its foot to its ends and its
+  // tip.
   EXPECT_NEAR(refused.thickness, 2e-4 * (2.0 * std::min(at.x(), 1.0 - at.x()) - (at.z() - 1.0) / 0.5), 1e-6);
   EXPECT_EQ(refused.rounds, 0);
 }
@@ -243,7 +252,8 @@ PolygonMesh turned_star(int points) {
   };
   const std::uint32_t bottom = add(0, 0, 0), top = add(0, 0, 0.4), n = std::uint32_t(2 * points);
   for (std::uint32_t i = 0; i < n; ++i)
-    for (const double z : {0.0, 0.4}) add((1 + i % 2) * std::cos(2 * M_PI * i / n), (1 + i % 2) * std::sin(2 * M_PI * i / n), z);
+    for (const double z : {0.0, 0.4})
+      add((1 + i % 2) * std::cos(2 * M_PI * i / n), (1 + i % 2) * std::sin(2 * M_PI * i / n), z);
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % n);
     for (const Triangle& t : {Triangle{bottom, b, a}, {top, a + 1, b + 1}, {a, b, b + 1}, {a, b + 1, a + 1}})

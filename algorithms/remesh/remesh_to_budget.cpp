@@ -15,11 +15,11 @@
 namespace hermesh {
 namespace {
 
-/// Share of the extent that no error is below, for up to 3e5 triangles. A mesh with this bound is the polygons, except for
-/// the rounding of single precision.
+/// Share of the extent that no error is below, for up to 3e5 triangles. A mesh with this bound is the
+/// polygons, except for the rounding of single precision.
 constexpr double kExact = 1e-5;
-/// Errors, as shares of the extent, and points at most of tries whose mesh is mostly exact if all parts are plane. Large
-/// voxels are enough for these.
+/// Errors, as shares of the extent, and points at most of tries whose mesh is mostly exact if all parts are
+/// plane. Large voxels are enough for these.
 constexpr std::array<double, 3> kPlaneErrors = {6e-3, 1e-3, 1e-4};
 constexpr double kPointsOfPlane = 1e5;
 /// What a try that ends with an error counts for.
@@ -91,7 +91,7 @@ class Tries {
     Numbered(RunContext& context, int number) : context_(context), on_progress_(context.on_progress) {
       if (!on_progress_) return;
       context.on_progress = [this, prefix = "try " + std::to_string(number) + ": "](std::string_view stage,
-                                                                                  double fraction) {
+                                                                                    double fraction) {
         on_progress_(prefix + std::string(stage), fraction);
       };
     }
@@ -130,7 +130,8 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
   now.error = std::clamp(3.0 * extent / double(triangles), 1e-5 * extent, 0.1 * extent);
   double too_small = 0.0, enough = std::numeric_limits<double>::infinity();
   Tries tries(mesh, triangles, context);
-  double count_before = std::numeric_limits<double>::infinity(), error_before = 1.0;  // of the last try that fitted
+  double count_before = std::numeric_limits<double>::infinity(),
+         error_before = 1.0;  // of the last try that fitted
   const auto run_plane = [&](double share) {
     BoundedRemeshOptions plane = options;
     plane.error = share * extent;
@@ -155,7 +156,8 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
     }
     if (outcome == Outcome::fits) {
       enough = now.error;
-      // Smooth surfaces need triangles in inverse proportion to the error, and plane ones the same number for any.
+      // Smooth surfaces need triangles in inverse proportion to the error, and plane ones the same number for
+      // any.
       const bool may_be_plane = count * std::sqrt(now.error) < count_before * std::sqrt(error_before);
       if (may_be_plane && tries.best_bound() > exact && now.error > kPlaneErrors.back() * extent &&
           run_plane(kPlaneErrors.back()) == Outcome::fits) {

@@ -41,7 +41,7 @@ constexpr double kAlong = 0.7;     ///< the same for a sheet that goes on
 constexpr double kDeep =
     0.74;  ///< a position one voxel from a wall as thick as rays reach is farther than this from it
 constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
-constexpr double kNoWall = 1e-3;  ///< a wall thinner than this has no thickness to speak of
+constexpr double kNoWall = 1e-3;               ///< a wall thinner than this has no thickness to speak of
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
 std::string short_text(double value) {

@@ -21,11 +21,13 @@ constexpr double kWidest = 4.0;
 constexpr std::size_t kMostAround = 64;
 constexpr double kAround = 0.8;
 
-/// The width of the wall or of the gap at a place of a polygon: how far the next polygon is along the normal or against
-/// it, whichever is less. Infinity where there is none within four errors.
-double width_at(const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& from, double error, double least) {
+/// The width of the wall or of the gap at a place of a polygon: how far the next polygon is along the normal
+/// or against it, whichever is less. Infinity where there is none within four errors.
+double width_at(const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& from, double error,
+                double least) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const std::array<Eigen::Vector3d, 3> corner = {tree.corner(triangle, 0), tree.corner(triangle, 1), tree.corner(triangle, 2)};
+  const std::array<Eigen::Vector3d, 3> corner = {tree.corner(triangle, 0), tree.corner(triangle, 1),
+                                                 tree.corner(triangle, 2)};
   const Eigen::Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
   const double most = kWidest * error;
   double nearest = most;
@@ -51,13 +53,14 @@ double width_at(const TriangleTree& tree, std::uint32_t triangle, const Eigen::V
 
 }  // namespace
 
-double width_to_show(const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& place, double error,
-                     double least) {
+double width_to_show(const TriangleTree& tree, std::uint32_t triangle, const Eigen::Vector3d& place,
+                     double error, double least) {
   const double reach = kAround * error;
   std::vector<std::pair<std::uint32_t, Eigen::Vector3d>> around;
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(reach);
   tree.for_each_near(place - half, place + half, [&](std::uint32_t t) {
-    const Eigen::Vector3d a = tree.corner(t, 0), b = tree.corner(t, 1), c = tree.corner(t, 2), inner = (a + b + c) / 3.0;
+    const Eigen::Vector3d a = tree.corner(t, 0), b = tree.corner(t, 1), c = tree.corner(t, 2),
+                          inner = (a + b + c) / 3.0;
     // The place of the triangle that is most within, as far as that is near.
     const Eigen::Vector3d nearest = closest_point(place, a, b, c).position;
     const double left = reach - (nearest - place).norm(), way = (inner - nearest).norm();

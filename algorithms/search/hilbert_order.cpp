@@ -14,10 +14,10 @@
 namespace hermesh {
 namespace {
 
-constexpr int kBits = 10;                ///< bits of a cell's coordinate, and of a digit of the radix sort
-constexpr std::size_t kBatch = 256;      ///< triangles whose codes are computed together
+constexpr int kBits = 10;            ///< bits of a cell's coordinate, and of a digit of the radix sort
+constexpr std::size_t kBatch = 256;  ///< triangles whose codes are computed together
 constexpr std::size_t kKeysPerTask = 1 << 15;  ///< keys that one task sorts
-constexpr std::size_t kCrowded = 32;     ///< triangles in a cell beyond which it gets a curve of its own
+constexpr std::size_t kCrowded = 32;  ///< triangles in a cell beyond which it gets a curve of its own
 
 /// Code along the curve in the upper half, triangle number in the lower.
 using SortKey = std::uint64_t;
@@ -28,8 +28,8 @@ using Cells = std::array<std::array<std::uint32_t, kBatch>, 3>;
 /// z in turn (Skilling, Programming the Hilbert Curve, AIP Conf. Proc. 707, 2004). Without branches, over
 /// many cells at a time.
 void to_hilbert(Cells& cells) {
-  // Skilling's undoing of turns and reflections, from the largest cubes to the smallest: where the bit is set the
-  // lower bits of x are inverted, elsewhere they are exchanged with those of coordinate a.
+  // Skilling's undoing of turns and reflections, from the largest cubes to the smallest: where the bit is set
+  // the lower bits of x are inverted, elsewhere they are exchanged with those of coordinate a.
   for (std::uint32_t bit = 1u << (kBits - 1); bit > 1; bit >>= 1)
     for (int a = 0; a < 3; ++a)
       // Skilling's Gray encoding; his loop over bits is an exclusive or of prefixes here.
@@ -64,8 +64,8 @@ void for_chunks(std::size_t n, std::size_t size, F&& f) {
                     [&](std::size_t chunk) { f(chunk * size, std::min(n, (chunk + 1) * size)); });
 }
 
-/// Stable radix sort by code, from the least significant digit on. Each chunk counts its digits, then writes to places
-/// of its own, so the order does not depend on which thread does what.
+/// Stable radix sort by code, from the least significant digit on. Each chunk counts its digits, then writes
+/// to places of its own, so the order does not depend on which thread does what.
 void radix_sort(std::span<SortKey> keys) {
   constexpr std::size_t kDigits = std::size_t{1} << kBits;
   std::vector<SortKey> other(keys.size());
@@ -99,20 +99,20 @@ class CurveSorter {
   CurveSorter(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
       : points_(points), triangles_(triangles) {}
 
-  /// Sorts keys along a curve through the cube that holds the centers of their triangles. They come in order of
-  /// triangle number, and of equal codes the lower number stays first.
+  /// Sorts keys along a curve through the cube that holds the centers of their triangles. They come in order
+  /// of triangle number, and of equal codes the lower number stays first.
   void sort(std::span<SortKey> keys) const {
     const BoundsOf<float> box = bounds_of_centres(keys);
     const double side = (box.upper.cast<double>() - box.lower.cast<double>()).maxCoeff();
     if (!(side > 0)) return;  // keys of equal code are in order of number already
-    // Half a cell less than the cube holds, so that the farthest center lies in the last cell however the product is
-    // rounded.
+    // Half a cell less than the cube holds, so that the farthest center lies in the last cell however the
+    // product is rounded.
     const double cells_per_unit = ((1 << kBits) - 0.5) / side;
     for_chunks(keys.size(), kBatch, [&](std::size_t begin, std::size_t end) {
       compute_codes(keys.subspan(begin, end - begin), box.lower.cast<double>(), cells_per_unit);
     });
-    // Both sorts give the same order, by code and then by number; for few keys the counts of a radix sort would be
-    // most of its work.
+    // Both sorts give the same order, by code and then by number; for few keys the counts of a radix sort
+    // would be most of its work.
     if (keys.size() < kKeysPerTask)
       std::sort(keys.begin(), keys.end());
     else
@@ -155,8 +155,8 @@ class CurveSorter {
     }
   }
 
-  // The side of a cell is a thousandth of the cube's, so a few levels tell all centers apart that differ; equal ones
-  // end in sort(), which finds a cube of no size. Tasks sort spans that do not overlap.
+  // The side of a cell is a thousandth of the cube's, so a few levels tell all centers apart that differ;
+  // equal ones end in sort(), which finds a cube of no size. Tasks sort spans that do not overlap.
   void sort_crowded_cells(std::span<SortKey> keys) const {
     std::vector<std::span<SortKey>> crowded;
     for (std::size_t begin = 0, end; begin < keys.size(); begin = end) {

@@ -16,15 +16,17 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 // An end for what no search of this kind can tell, such as a place that is the limit away to the last digit.
 constexpr std::size_t kMostPieces = 4'000'000;
 constexpr double kSmallestPiece = 1.0 / 4096.0;  // of the limit
-/// Points of a piece are looked at in rows: how far, in limits, a place may be from the nearest of them, the parts that
-/// a side has at most, and the least height of a piece, in its longest side, so that rows are no closer than need be.
+/// Points of a piece are looked at in rows: how far, in limits, a place may be from the nearest of them, the
+/// parts that a side has at most, and the least height of a piece, in its longest side, so that rows are no
+/// closer than need be.
 constexpr double kBetweenRows = 0.8;
 constexpr int kMostParts = 16;
 constexpr double kLeastHeight = 0.3;
-/// Sides of a triangle of the soup, in limits, from which on pieces are cut along them: pieces of about a limit in size hold
-/// anyway.
+/// Sides of a triangle of the soup, in limits, from which on pieces are cut along them: pieces of about a
+/// limit in size hold anyway.
 constexpr double kLongSide = 2.0;
-/// How far, in limits, a piece must reach over such a side, and how far it must lie within it, to be cut there.
+/// How far, in limits, a piece must reach over such a side, and how far it must lie within it, to be cut
+/// there.
 constexpr double kReachesOver = 1.0 / 64.0;
 
 double radius_about(const Eigen::Vector3d& middle, const Corners& piece) {
@@ -66,7 +68,8 @@ class SurfaceDistance::Walk {
       stack_.pop_back();
       // What was nearest to the whole is most often near its parts, which saves the search.
       if (piece.nearest != TriangleTree::kNone && all_near(piece.corners, piece.nearest, upper)) continue;
-      if (wanted_ == Wanted::any_bound && !is_large(piece.nearest) && all_near_in_rows(piece.corners, upper)) continue;
+      if (wanted_ == Wanted::any_bound && !is_large(piece.nearest) && all_near_in_rows(piece.corners, upper))
+        continue;
       const Eigen::Vector3d middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
       const double radius = radius_about(middle, piece.corners);
       const NearestTriangle found = nearest(middle, piece.nearest, radius);
@@ -79,7 +82,8 @@ class SurfaceDistance::Walk {
         continue;
       }
       const bool is_last = ++pieces > kMostPieces || radius < kSmallestPiece * limit_;
-      // The last pieces where what is near meets what is free are a little too far, though their middles are not.
+      // The last pieces where what is near meets what is free are a little too far, though their middles are
+      // not.
       if (free_.is_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
         free_area +=
             0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
@@ -111,14 +115,17 @@ class SurfaceDistance::Walk {
     return true;
   }
 
-  /// Whether rows of points over a piece are so near, and so close to each other, that all of it is within the limit:
-  /// no place of a triangle is farther from the nearest of its corners than its circumradius. This takes a quarter of
-  /// the searches that halving does. False, soon, for what is too large, too slim or too far for that.
+  /// Whether rows of points over a piece are so near, and so close to each other, that all of it is within
+  /// the limit: no place of a triangle is farther from the nearest of its corners than its circumradius. This
+  /// takes a quarter of the searches that halving does. False, soon, for what is too large, too slim or too
+  /// far for that.
   bool all_near_in_rows(const Corners& piece, double& upper) {
     const Eigen::Vector3d u = piece[1] - piece[0], v = piece[2] - piece[0];
-    const double a = u.norm(), b = v.norm(), c = (v - u).norm(), longest = std::max({a, b, c}), twice_area = u.cross(v).norm();
+    const double a = u.norm(), b = v.norm(), c = (v - u).norm(), longest = std::max({a, b, c}),
+                 twice_area = u.cross(v).norm();
     if (!(twice_area >= kLeastHeight * longest * longest)) return false;
-    const double circumradius = a * b * c / (2.0 * twice_area), parts = std::ceil(circumradius / (kBetweenRows * limit_));
+    const double circumradius = a * b * c / (2.0 * twice_area),
+                 parts = std::ceil(circumradius / (kBetweenRows * limit_));
     if (!(parts >= 2.0 && parts <= kMostParts)) return false;
     const int n = int(parts);
     const double between = circumradius / n, enough = (limit_ - between) * (limit_ - between);
@@ -133,10 +140,11 @@ class SurfaceDistance::Walk {
     return true;
   }
 
-  /// The triangle nearest to p, or one that is near enough for all about p. The distance to `known`, which is near,
-  /// saves most of the search.
+  /// The triangle nearest to p, or one that is near enough for all about p. The distance to `known`, which is
+  /// near, saves most of the search.
   NearestTriangle nearest(const Eigen::Vector3d& p, std::uint32_t known, double radius) const {
-    const double most = limit_ - radius, enough = wanted_ == Wanted::any_bound && most > 0.0 ? most * most : -1.0;
+    const double most = limit_ - radius,
+                 enough = wanted_ == Wanted::any_bound && most > 0.0 ? most * most : -1.0;
     if (known == TriangleTree::kNone) return tree_.nearest(p, search_, enough);
     const double squared =
         squared_distance(p, tree_.corner(known, 0), tree_.corner(known, 1), tree_.corner(known, 2));
@@ -152,15 +160,16 @@ class SurfaceDistance::Walk {
 
   bool is_large(std::uint32_t triangle) const {
     if (triangle == TriangleTree::kNone) return false;
-    const Eigen::Vector3d a = tree_.corner(triangle, 0), b = tree_.corner(triangle, 1), c = tree_.corner(triangle, 2);
+    const Eigen::Vector3d a = tree_.corner(triangle, 0), b = tree_.corner(triangle, 1),
+                          c = tree_.corner(triangle, 2);
     const double least = kLongSide * kLongSide * limit_ * limit_;
     return (b - a).squaredNorm() > least || (c - b).squaredNorm() > least || (a - c).squaredNorm() > least;
   }
 
-  /// Cuts a piece by the plane through a side of a triangle of the soup, upright on it, that it reaches over most. What is
-  /// over the triangle alone is then near it, so that a plane part is shown to be near another by as many pieces as their
-  /// triangles overlap in, however small the limit. False, and nothing cut, where the triangle is small or too low under the
-  /// piece.
+  /// Cuts a piece by the plane through a side of a triangle of the soup, upright on it, that it reaches over
+  /// most. What is over the triangle alone is then near it, so that a plane part is shown to be near another
+  /// by as many pieces as their triangles overlap in, however small the limit. False, and nothing cut, where
+  /// the triangle is small or too low under the piece.
   bool cut_along(const Corners& piece, std::uint32_t triangle) {
     if (!is_large(triangle)) return false;
     const Corners at = {tree_.corner(triangle, 0), tree_.corner(triangle, 1), tree_.corner(triangle, 2)};
@@ -184,7 +193,8 @@ class SurfaceDistance::Walk {
     if (!found) return false;
     // One corner is on one side of the plane, two are on the other.
     int lone = 0;
-    while ((over[lone] > 0) == (over[(lone + 1) % 3] > 0) || (over[lone] > 0) == (over[(lone + 2) % 3] > 0)) ++lone;
+    while ((over[lone] > 0) == (over[(lone + 1) % 3] > 0) || (over[lone] > 0) == (over[(lone + 2) % 3] > 0))
+      ++lone;
     const int i = (lone + 1) % 3, j = (lone + 2) % 3;
     const auto on_plane = [&](int other) -> Eigen::Vector3d {
       return piece[lone] + over[lone] / (over[lone] - over[other]) * (piece[other] - piece[lone]);

@@ -37,7 +37,8 @@ struct FreePieces {
   double radius = 0.0;
 };
 
-/// What is asked for: the bound of all that is near as small as comes out, or whatever is within the limit, sooner.
+/// What is asked for: the bound of all that is near as small as comes out, or whatever is within the limit,
+/// sooner.
 enum class Wanted { small_bound, any_bound };
 
 /// A triangle soup that distances are measured to.
@@ -45,12 +46,12 @@ enum class Wanted { small_bound, any_bound };
 /// **Why a limit holds** for a piece of a triangle: where the piece's three corners are within the limit of
 /// one triangle of the soup, all of the piece is, for the distance to a convex set is a convex function; and
 /// where the distance of the piece's middle and the piece's radius add up to no more than the limit, by the
-/// triangle inequality, as it does where points in rows over the piece are near enough for how far they are from each
-/// other. Pieces for which none of these holds are cut along the sides of the triangle below where that is large, so that
-/// the first rule holds for what is over it, and halved elsewhere. (Compare Tang, Lee and Kim, Interactive
-/// Hausdorff Distance Computation for General Polygonal Models, 2009.) What has come to more than four
-/// million pieces, or to pieces smaller than a 4096th of the limit, counts as far. The limit is lowered by
-/// 1e-7 of the soup's extent for rounding.
+/// triangle inequality, as it does where points in rows over the piece are near enough for how far they are
+/// from each other. Pieces for which none of these holds are cut along the sides of the triangle below where
+/// that is large, so that the first rule holds for what is over it, and halved elsewhere. (Compare Tang, Lee
+/// and Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009.) What has come to
+/// more than four million pieces, or to pieces smaller than a 4096th of the limit, counts as far. The limit
+/// is lowered by 1e-7 of the soup's extent for rounding.
 class SurfaceDistance {
  public:
   /// Keeps references to the points (any units, about any origin) and triangles, which are finite and not

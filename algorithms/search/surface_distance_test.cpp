@@ -92,11 +92,13 @@ TEST(SurfaceDistance, PlanePartsAreShownToBeNearHoweverSmallTheLimit) {
 }
 
 TEST(SurfaceDistance, WhatIsJustTooFarIsFarAtEverySizeAndTurn) {
-  // A triangle that is cut into few parts or many, at a slant to the square: one corner alone is too far, then none.
+  // A triangle that is cut into few parts or many, at a slant to the square: one corner alone is too far,
+  // then none.
   const Soup to = square(4, 0, 40);
   for (const float side : {0.1f, 0.3f, 0.5f, 1.0f, 2.5f})
     for (const float slim : {1.0f, 0.5f, 0.05f}) {
-      const Soup from{{{0.7f, 0.7f, 0.05f}, {0.7f + side, 0.8f, 0.0f}, {0.8f, 0.7f + slim * side, 0.1f}}, {{0, 1, 2}}};
+      const Soup from{{{0.7f, 0.7f, 0.05f}, {0.7f + side, 0.8f, 0.0f}, {0.8f, 0.7f + slim * side, 0.1f}},
+                      {{0, 1, 2}}};
       EXPECT_EQ(hold(from, to, 0.0995).far.size(), 1u) << side << ' ' << slim;
       EXPECT_TRUE(hold(from, to, 0.1005).far.empty()) << side << ' ' << slim;
     }

@@ -24,8 +24,8 @@ TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vecto
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c) {
   const std::array<Eigen::Vector3d, 3> corners = {a, b, c};
-  // The best of the three sides, then the foot of the perpendicular, if it lies within: on a degenerate triangle the
-  // sides alone are right.
+  // The best of the three sides, then the foot of the perpendicular, if it lies within: on a degenerate
+  // triangle the sides alone are right.
   TrianglePoint best = on_segment(p, corners, 0, 1);
   const auto offer = [&](const TrianglePoint& other) {
     if ((other.position - p).squaredNorm() < (best.position - p).squaredNorm()) best = other;

@@ -11,8 +11,8 @@ struct TrianglePoint {
   Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
 };
 
-/// The point of the triangle a b c that is nearest to p; of a degenerate triangle that of its segments, or the point
-/// that it is. Any unit, the same for all.
+/// The point of the triangle a b c that is nearest to p; of a degenerate triangle that of its segments, or
+/// the point that it is. Any unit, the same for all.
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c);
 

@@ -46,8 +46,8 @@ void clear(TriangleTree::BoxPack& pack) {
   std::fill_n(&pack.upper[0][0], 3 * kFan, -kInfinity);
 }
 
-/// Boxes still to be visited, the one to visit next on top. Every level adds three more at most, and 2³² triangles
-/// have 15 levels: 46 visits.
+/// Boxes still to be visited, the one to visit next on top. Every level adds three more at most, and 2³²
+/// triangles have 15 levels: 46 visits.
 class VisitStack {
  public:
   struct Visit {
@@ -61,8 +61,8 @@ class VisitStack {
     const std::size_t bottom = size_;
     for (std::size_t k = 0; k < kFan; ++k) {
       if (!(squared[k] <= bound)) continue;
-      // Insertion keeps them in order; there are four at most. An empty box, which only an infinite bound lets in,
-      // comes to lie below all others, and its turn comes when a triangle has been found.
+      // Insertion keeps them in order; there are four at most. An empty box, which only an infinite bound
+      // lets in, comes to lie below all others, and its turn comes when a triangle has been found.
       std::size_t at = size_++;
       for (; at > bottom && visits_[at - 1].squared < squared[k]; --at) visits_[at] = visits_[at - 1];
       visits_[at] = {squared[k], {static_cast<std::uint32_t>(pack * kFan + k), level}};
@@ -116,8 +116,8 @@ TriangleTree::TriangleTree(std::span<const Eigen::Vector3f> points, std::span<co
 }
 
 void TriangleTree::build_boxes() {
-  // The number of packs of each level follows from the number of triangles alone, so all of them are there before the
-  // first box is known.
+  // The number of packs of each level follows from the number of triangles alone, so all of them are there
+  // before the first box is known.
   std::size_t total = 0;
   for (std::size_t boxes = (order_.size() + kLeafSize - 1) / kLeafSize; boxes > 0;) {
     const std::size_t packs = (boxes + kFan - 1) / kFan;
@@ -168,8 +168,8 @@ NearestTriangle TriangleTree::nearest(const Eigen::Vector3d& p, double upper_bou
   push(packs_.size() - 1, level_count() - 1);
   while (!stack.empty()) {
     const auto [squared, ref] = stack.pop();
-    // The bound may have shrunk since the box was pushed. A box just as far away as the best triangle is opened all
-    // the same: it may hold one of lower number, which wins among equals.
+    // The bound may have shrunk since the box was pushed. A box just as far away as the best triangle is
+    // opened all the same: it may hold one of lower number, which wins among equals.
     if (squared > best.squared) continue;
     if (ref.level > 0) {
       push(child_pack(ref), ref.level - 1);

@@ -21,12 +21,13 @@ struct NearestTriangle {
   std::uint32_t triangle;  ///< its number, TriangleTree::kNone if nothing is within the bound
 };
 
-/// Bounding volume hierarchy over triangles. They are sorted along the Hilbert curve through the centers of their
-/// boxes; every eight consecutive ones make a leaf, and every four consecutive boxes of a level make a box of the
-/// level above. So there are no links, and the tree is the same for every number of threads. Points, and with them
-/// boxes, are single precision in the caller's units; index space is point * scale, rounded once to double precision,
-/// so that a scaled box holds its scaled points without any slack. The tree refers to the caller's arrays, which have
-/// to outlive it. It takes about 8 bytes a triangle, and while it is built about 16 more.
+/// Bounding volume hierarchy over triangles. They are sorted along the Hilbert curve through the centers of
+/// their boxes; every eight consecutive ones make a leaf, and every four consecutive boxes of a level make a
+/// box of the level above. So there are no links, and the tree is the same for every number of threads.
+/// Points, and with them boxes, are single precision in the caller's units; index space is point * scale,
+/// rounded once to double precision, so that a scaled box holds its scaled points without any slack. The tree
+/// refers to the caller's arrays, which have to outlive it. It takes about 8 bytes a triangle, and while it
+/// is built about 16 more.
 class TriangleTree {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -41,14 +42,15 @@ class TriangleTree {
     std::uint32_t box, level;
   };
 
-  /// Builds the tree of `triangles`, of which there are fewer than 2^32 − 1, over finite `points`. `scale` is the
-  /// number of voxels per unit of the points, positive.
+  /// Builds the tree of `triangles`, of which there are fewer than 2^32 − 1, over finite `points`. `scale` is
+  /// the number of voxels per unit of the points, positive.
   TriangleTree(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles, double scale);
 
-  /// The triangle nearest to p, in index space, that is no farther than the bound; of several that are equally near
-  /// the one of lowest number. The distance is that to the triangles with each corner moved by a few units in the last
-  /// place of the longest side, whatever their shape: slivers, segments and points are triangles, too. Whoever is
-  /// content with any triangle that is no farther than `enough_squared` gets the first that is met, sooner.
+  /// The triangle nearest to p, in index space, that is no farther than the bound; of several that are
+  /// equally near the one of lowest number. The distance is that to the triangles with each corner moved by a
+  /// few units in the last place of the longest side, whatever their shape: slivers, segments and points are
+  /// triangles, too. Whoever is content with any triangle that is no farther than `enough_squared` gets the
+  /// first that is met, sooner.
   NearestTriangle nearest(const Eigen::Vector3d& p,
                           double upper_bound_squared = std::numeric_limits<double>::infinity(),
                           double enough_squared = -1.0) const;
@@ -152,8 +154,8 @@ class TriangleTree {
   std::span<const Triangle> triangles_;
   double scale_;
   std::vector<std::uint32_t> order_;  ///< triangle numbers along the curve
-  std::vector<BoxPack> packs_;      ///< level by level, the leaves' first
-  std::vector<std::size_t> first_;  ///< first pack of each level
+  std::vector<BoxPack> packs_;        ///< level by level, the leaves' first
+  std::vector<std::size_t> first_;    ///< first pack of each level
 };
 
 /// Squared distance from p to the triangle abc, which may be degenerate, in the units of the points squared.

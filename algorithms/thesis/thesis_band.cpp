@@ -39,8 +39,8 @@ void merge_block(BandBlock& into, const BandBlock& from) {
 
 }  // namespace
 
-/// Tells by the Voronoi regions of the corners, sides and inside where the nearest point is (Ericson, Real-Time
-/// Collision Detection, §5.1.5).
+/// Tells by the Voronoi regions of the corners, sides and inside where the nearest point is (Ericson,
+/// Real-Time Collision Detection, §5.1.5).
 Vector3d closest_point(const GridTriangle& triangle, const Vector3d& p) {
   const auto& [a, b, c] = triangle;
   const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -68,8 +68,8 @@ std::int32_t Band::find_or_add(const Voxel& lower) {
 void Band::merge(Band other, const RunContext& context) {
   for (std::unique_ptr<BandBlock>& theirs : other.blocks_) {
     context.check();
-    // Blocks that only the other grid has move over whole; each that was merged is freed at once, so that memory does
-    // not double.
+    // Blocks that only the other grid has move over whole; each that was merged is freed at once, so that
+    // memory does not double.
     const auto [entry, is_new] = numbers_.try_emplace(theirs->lower, size());
     if (is_new) {
       blocks_.push_back(std::move(theirs));
@@ -84,8 +84,8 @@ void Band::link(std::int32_t first, const RunContext& context) {
   parallel_blocks(std::size_t(size() - first), context, [&](std::size_t i) {
     BandBlock& own = *blocks_[first + std::int32_t(i)];
     for (int slot = 0; slot < 27; ++slot) {
-      // Lookups only read the map, and each thread writes to its own block. The other direction, below, is for one
-      // thread, for an old block may have several new neighbours.
+      // Lookups only read the map, and each thread writes to its own block. The other direction, below, is
+      // for one thread, for an old block may have several new neighbours.
       const auto there =
           numbers_.find({own.lower[0] + 8 * (slot / 9 - 1), own.lower[1] + 8 * (slot / 3 % 3 - 1),
                          own.lower[2] + 8 * (slot % 3 - 1)});
@@ -114,7 +114,8 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
         const BlockMask& m = *masks[neighbour_slot(x >> 3, y >> 3, dz)];
         return std::uint32_t(m[x & 7] >> (8 * (y & 7))) & 0xff;
       };
-      // Ten voxels along z in one word: the neighbour's last, this block's eight, the other neighbour's first.
+      // Ten voxels along z in one word: the neighbour's last, this block's eight, the other neighbour's
+      // first.
       rows_[x + 1][y + 1] = bits(-1) >> 7 | bits(0) << 1 | (bits(1) & 1) << 9;
     }
 }

@@ -11,9 +11,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "algorithms/lattice/block_mask.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/lattice/block_mask.h"
 #include "algorithms/thesis/thesis_voxelizer.h"
 
 namespace hermesh::thesis {
@@ -96,9 +96,11 @@ class Band {
 
   /// The number of the block whose first voxel is `lower`, made if there is none.
   std::int32_t find_or_add(const Voxel& lower);
-  /// Merges another grid into this one: the smaller distance wins in every voxel, of equal ones this grid's own.
+  /// Merges another grid into this one: the smaller distance wins in every voxel, of equal ones this grid's
+  /// own.
   void merge(Band other, const RunContext& context);
-  /// Fills in the neighbours of every block from number `first` on, and makes these known to their neighbours.
+  /// Fills in the neighbours of every block from number `first` on, and makes these known to their
+  /// neighbours.
   void link(std::int32_t first, const RunContext& context);
   /// Frees a block that nobody will ask for any more.
   void release(std::int32_t number) { blocks_[number].reset(); }

@@ -24,8 +24,8 @@ bool reaches(const BlockMask& mask, int slot) {
   return found != 0;
 }
 
-/// Makes the blocks that the neighbours of the last layer lie in. One thread does, in the order of the blocks, so
-/// that numbers are the same on every run.
+/// Makes the blocks that the neighbours of the last layer lie in. One thread does, in the order of the
+/// blocks, so that numbers are the same on every run.
 void add_blocks(Band& band, const RunContext& context) {
   const std::int32_t before = band.size();
   for (std::int32_t number = 0; number < before; ++number) {
@@ -50,9 +50,9 @@ struct Expansion {
   const Triangles& triangles;
   Limits limits;
 
-  /// Adds a voxel as algorithm 5 does: by the triangle of the neighbour that is nearest to the surface, whether or
-  /// not that triangle is the nearest to the voxel. Threads write distances only where none is set, which nobody
-  /// reads.
+  /// Adds a voxel as algorithm 5 does: by the triangle of the neighbour that is nearest to the surface,
+  /// whether or not that triangle is the nearest to the voxel. Threads write distances only where none is
+  /// set, which nobody reads.
   void add_voxel(BandBlock& block, int sample) const {
     Place closest{nullptr, 0};
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -72,8 +72,8 @@ struct Expansion {
     if (outside) add(block.found_outside, sample);
   }
 
-  /// Tries the voxels around the last layer. What is found waits until all blocks are done, so that a layer sees only
-  /// the layers before it.
+  /// Tries the voxels around the last layer. What is found waits until all blocks are done, so that a layer
+  /// sees only the layers before it.
   void find_voxels(BandBlock& block) const {
     block.found = block.found_outside = {};
     const BlockMask near = PaddedMask(band, block, &BandBlock::layer).face_and_edge_neighbours();

@@ -6,10 +6,10 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/core/stopwatch.h"
-#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 #include "algorithms/fracture/labelled_solid.h"
 #include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/dense/dense_combine.h"
+#include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
 
 namespace hermesh {
 namespace {
@@ -17,8 +17,8 @@ namespace {
 using At = Cutters::At;
 using Codes = std::array<CutCode, 512>;
 
-/// A part of space as a solid: all blocks of a box around the object, those of the outermost layer being outside of
-/// every solid.
+/// A part of space as a solid: all blocks of a box around the object, those of the outermost layer being
+/// outside of every solid.
 class CodeSolid {
  public:
   CodeSolid(const FloatHermite& object, const Cutters& cutters, CutCode code)
@@ -32,18 +32,20 @@ class CodeSolid {
         upper[a] = std::max(upper[a], leaf.lower[a]);
       }
     for (int a = 0; a < 3; ++a) {
-      // Two blocks beyond the object's on every side: an empty layer, which closes the solid, and one between it and
-      // the object, so that the closing faces cut nothing of the object.
+      // Two blocks beyond the object's on every side: an empty layer, which closes the solid, and one between
+      // it and the object, so that the closing faces cut nothing of the object.
       first_[a] = lower[a] - 16;
       size_[a] = (upper[a] - lower[a]) / 8 + 5;
     }
     masks_.resize(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]));
   }
 
-  /// Signs of all blocks first, since an edge at a block's upper side needs those of the next block; then crossings.
+  /// Signs of all blocks first, since an edge at a block's upper side needs those of the next block; then
+  /// crossings.
   FloatHermite run(RunContext& context) {
     parallel_blocks(masks_.size(), context, [&](std::size_t b) {
-      // Most blocks hold nothing of one cell among hundreds, and to say so is far cheaper than all their codes.
+      // Most blocks hold nothing of one cell among hundreds, and to say so is far cheaper than all their
+      // codes.
       if (is_border(b) || !cutters_.may_hold(lower_of(b), code_)) return;
       Codes codes;
       cutters_.codes(lower_of(b), codes);
@@ -121,8 +123,8 @@ class CodeSolid {
     return result;
   }
 
-  /// A crossing, whose normal looks out of the solid. Where the box cuts the solid off there is no crossing to ask
-  /// for; the middle of the edge will do.
+  /// A crossing, whose normal looks out of the solid. Where the box cuts the solid off there is no crossing
+  /// to ask for; the middle of the edge will do.
   EdgeCrossing crossing(const SignLeaf& leaf, int sample, int axis, CutCode first, CutCode second) const {
     const At at{leaf.lower[0] + (sample >> 6), leaf.lower[1] + ((sample >> 3) & 7),
                 leaf.lower[2] + (sample & 7)};
@@ -131,8 +133,8 @@ class CodeSolid {
     if (first != second)
       if (const auto found = cutters_.crossing(at, axis, first, second)) result = found->crossing;
     const bool inside_first = test(leaf.inside, sample);
-    // From inside to outside the normal points along the edge, from outside to inside against it. A cutter does not
-    // know which of its sides the solid is on.
+    // From inside to outside the normal points along the edge, from outside to inside against it. A cutter
+    // does not know which of its sides the solid is on.
     if ((result.normal[axis] >= 0) != inside_first)
       for (float& n : result.normal) n = -n;
     return result;
@@ -170,7 +172,8 @@ class InTurn {
         hand_over_(hand_over),
         context_(context),
         rest_(converted<Data>(object, context)) {
-    // The meshes report by themselves; here their figures are summed, so that there is one sentence for all pieces.
+    // The meshes report by themselves; here their figures are summed, so that there is one sentence for all
+    // pieces.
     meshing_.cancel = context.cancel;
   }
 

@@ -43,13 +43,13 @@ void for_each_batch(const GridTriangle& t, std::vector<Voxel>& voxels, F&& visit
   if (n <= 1)
     for (const Eigen::Vector3d& corner : t) put(nearest_voxel(corner));
   else
-    // Segment i runs at barycentric weight i/n off the first corner. In double precision a sum of three products, so
-    // that halves may round either way (rasterize_by_samples() says what follows).
+    // Segment i runs at barycentric weight i/n off the first corner. In double precision a sum of three
+    // products, so that halves may round either way (rasterize_by_samples() says what follows).
     for (std::int64_t i = 0; i <= n; ++i) {
       for (std::int64_t j = 0; j <= i; ++j)
         put(nearest_voxel((double(n - i) * t[0] + double(i - j) * t[1] + double(j) * t[2]) / double(n)));
-      // A large triangle is handed over in parts, so that its voxels are never all in memory; a voxel in two parts is
-      // added twice, to no effect.
+      // A large triangle is handed over in parts, so that its voxels are never all in memory; a voxel in two
+      // parts is added twice, to no effect.
       if (voxels.size() < kVoxelsAtOnce) continue;
       make_unique(voxels);
       visit(voxels);
@@ -75,8 +75,8 @@ std::vector<Voxel> rasterize_by_samples(const GridTriangle& triangle) {
 namespace hermesh::thesis {
 namespace {
 
-// The m subsets of §5.2. More than most machines have threads, and a constant, for the order in which voxels are
-// updated has an effect on distances (algorithm 2).
+// The m subsets of §5.2. More than most machines have threads, and a constant, for the order in which voxels
+// are updated has an effect on distances (algorithm 2).
 constexpr std::size_t kSubsets = 32;
 
 /// A subset's grid while it is written. A voxel and its neighbours lie in up to eight blocks, which differ in
@@ -115,8 +115,8 @@ class SubsetGrid {
     return {*cached, sample_index(v[0] & 7, v[1] & 7, v[2] & 7)};
   }
 
-  /// Updates a voxel next to a boundary voxel as algorithm 2 does. One that is nearer than ½ to an earlier triangle
-  /// is left alone, even if the new triangle is nearer: the print's trap. (0.25 is ½ squared.)
+  /// Updates a voxel next to a boundary voxel as algorithm 2 does. One that is nearer than ½ to an earlier
+  /// triangle is left alone, even if the new triangle is nearer: the print's trap. (0.25 is ½ squared.)
   void add_neighbour(const Voxel& voxel) {
     const auto [block, sample] = at(voxel);
     if (test(block.set, sample) && (block.squared_distance[sample] < 0.25f || block.triangle[sample] == id_))
@@ -124,7 +124,8 @@ class SubsetGrid {
     update(block, sample, voxel);
   }
 
-  /// Takes the triangle's distance if it is the smaller one. The first one always is: unset distances are infinite.
+  /// Takes the triangle's distance if it is the smaller one. The first one always is: unset distances are
+  /// infinite.
   void update(BandBlock& block, int sample, const Voxel& voxel) {
     const Eigen::Vector3d p = centre(voxel);
     const auto squared = float((closest_point(triangle_, p) - p).squaredNorm());
@@ -184,8 +185,8 @@ struct Rasterizer {
     return grid.take();
   }
 
-  /// Rasterises the subsets from `first` to before `end` into one grid: the parallel reduction of §3.4. The tree of
-  /// merges is fixed, and a branch is merged as soon as it is done, so few grids are alive at a time.
+  /// Rasterises the subsets from `first` to before `end` into one grid: the parallel reduction of §3.4. The
+  /// tree of merges is fixed, and a branch is merged as soon as it is done, so few grids are alive at a time.
   Band rasterize_subsets(std::size_t first, std::size_t end) {
     if (end - first == 1) return rasterize_subset(first);
     const std::size_t middle = first + (end - first) / 2;

@@ -24,8 +24,8 @@ int sample_on_line(int axis, int u, int v, int k) {
   return sample_index(local[0], local[1], local[2]);
 }
 
-/// Marks the first voxel with a distance of every line along a column of blocks, unless it is a boundary voxel. Each
-/// of the 64 lines has a bit in `pending` until its first voxel is met.
+/// Marks the first voxel with a distance of every line along a column of blocks, unless it is a boundary
+/// voxel. Each of the 64 lines has a bit in `pending` until its first voxel is met.
 template <class Iterator>
 void mark_first_voxels(Band& band, int axis, bool backwards, Iterator begin, Iterator end) {
   std::uint64_t pending = ~std::uint64_t(0);
@@ -51,8 +51,8 @@ void mark_seeds(Band& band, int axis, const RunContext& context) {
     const Voxel& lower = band.block(std::int32_t(i)).lower;
     order[i] = {{lower[(axis + 1) % 3], lower[(axis + 2) % 3], lower[axis]}, std::int32_t(i)};
   });
-  // Sorted by line and then along it, the blocks of a column are consecutive, and columns share no block: each is one
-  // thread's.
+  // Sorted by line and then along it, the blocks of a column are consecutive, and columns share no block:
+  // each is one thread's.
   tbb::parallel_sort(order.begin(), order.end());
   std::vector<std::size_t> columns;  // where each begins
   for (std::size_t i = 0; i < order.size(); ++i)
@@ -80,8 +80,8 @@ bool flood_block(const Band& band, BandBlock& block) {
   }
 }
 
-/// Floods block by block, and looks again at the blocks next to one that changed, until none changes. The outside
-/// only grows, so that the end is the same in any order.
+/// Floods block by block, and looks again at the blocks next to one that changed, until none changes. The
+/// outside only grows, so that the end is the same in any order.
 void flood(Band& band, const RunContext& context) {
   std::deque<std::int32_t> queue;
   std::vector<bool> queued(band.size(), true);
@@ -114,8 +114,8 @@ struct BoundarySigns {
     return closest_point(triangles[block.triangle[sample]], p) - p;
   }
 
-  /// Whether the vector of a neighbour that the flood marked makes an angle below the sign angle with the voxel's
-  /// own: both then look at the surface from one side.
+  /// Whether the vector of a neighbour that the flood marked makes an angle below the sign angle with the
+  /// voxel's own: both then look at the surface from one side.
   bool is_outside(const BandBlock& block, int sample) const {
     Vector3d own = Vector3d::Zero();
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -129,8 +129,8 @@ struct BoundarySigns {
     return false;
   }
 
-  /// Judges the boundary voxels of a block by the flood's marks alone. Results wait in `found_outside`, so that no
-  /// voxel sees what was found for another.
+  /// Judges the boundary voxels of a block by the flood's marks alone. Results wait in `found_outside`, so
+  /// that no voxel sees what was found for another.
   void evaluate(BandBlock& block) const {
     block.found_outside = {};
     for_each_bit(block.boundary, [&](int sample) {

@@ -5,8 +5,8 @@
 
 namespace hermesh::thesis {
 
-/// Rasterises (§5.2, algorithms 1 and 2): boundary voxels and their neighbours, with distances and triangles. The
-/// blocks are linked.
+/// Rasterises (§5.2, algorithms 1 and 2): boundary voxels and their neighbours, with distances and triangles.
+/// The blocks are linked.
 /// @throws Cancelled.
 Band rasterize(const Triangles& triangles, RunContext& context);
 
@@ -14,12 +14,13 @@ Band rasterize(const Triangles& triangles, RunContext& context);
 /// @throws Cancelled.
 void determine_signs(Band& band, const Triangles& triangles, double sign_angle, RunContext& context);
 
-/// Cleans up (§5.4, algorithms 3 and 4): takes voxels out of BandBlock::set that self-intersections left inside.
+/// Cleans up (§5.4, algorithms 3 and 4): takes voxels out of BandBlock::set that self-intersections left
+/// inside.
 /// @throws Cancelled.
 void remove_unwanted_voxels(Band& band, RunContext& context);
 
-/// Expands the band (§5.5, algorithm 5) by layers of new voxels as long as one lies within its side's width. The
-/// widths are in voxels.
+/// Expands the band (§5.5, algorithm 5) by layers of new voxels as long as one lies within its side's width.
+/// The widths are in voxels.
 /// @throws Cancelled.
 void expand(Band& band, const Triangles& triangles, double exterior, double interior, RunContext& context);
 

@@ -9,11 +9,11 @@
 #include <string>
 #include <utility>
 
-#include "algorithms/core/option_table.h"
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/thesis/thesis_stages.h"
 #include "algorithms/thesis/thesis_volumes.h"
 
@@ -26,11 +26,13 @@ using IdLeaf = openvdb::Int32Tree::LeafNodeType;
 /// The numbers of triangles in the mesh, by those in the local copy.
 struct Numbers {
   std::vector<std::uint32_t> shuffled;  ///< none where both are the same
-  std::int32_t operator()(std::uint32_t id) const { return std::int32_t(shuffled.empty() ? id : shuffled[id]); }
+  std::int32_t operator()(std::uint32_t id) const {
+    return std::int32_t(shuffled.empty() ? id : shuffled[id]);
+  }
 };
 
-/// Numbers from 0 on, shuffled by Fisher & Yates, spelled out because std::shuffle gives another order on another
-/// standard library.
+/// Numbers from 0 on, shuffled by Fisher & Yates, spelled out because std::shuffle gives another order on
+/// another standard library.
 std::vector<std::uint32_t> shuffled(std::size_t count, std::uint64_t seed, const RunContext& context) {
   std::vector<std::uint32_t> numbers(count);
   std::iota(numbers.begin(), numbers.end(), 0u);
@@ -42,8 +44,8 @@ std::vector<std::uint32_t> shuffled(std::size_t count, std::uint64_t seed, const
   return numbers;
 }
 
-/// Stage 1 of §5.1: triangles in the grid's local space, whose unit is a voxel and whose origin the mesh's. `numbers`
-/// are those of the mesh in the order of the triangles, or none where the order is the mesh's.
+/// Stage 1 of §5.1: triangles in the grid's local space, whose unit is a voxel and whose origin the mesh's.
+/// `numbers` are those of the mesh in the order of the triangles, or none where the order is the mesh's.
 thesis::Triangles local_copy(const VoxelizationInput& input, std::uint64_t shuffle_seed,
                              std::vector<std::uint32_t>& numbers) {
   const Stage stage(input.context, "local copy");
@@ -72,9 +74,10 @@ struct Leaves {
   std::unique_ptr<IdLeaf> nearest;
 };
 
-/// Makes leaves of the band's distances with their signs and, where `numbers` says so, of their triangles. Inactive
-/// values are for signedFloodFill to set.
-Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, double voxel_size, const Numbers* numbers) {
+/// Makes leaves of the band's distances with their signs and, where `numbers` says so, of their triangles.
+/// Inactive values are for signedFloodFill to set.
+Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, double voxel_size,
+                   const Numbers* numbers) {
   const openvdb::Coord lower(block.lower[0], block.lower[1], block.lower[2]);
   Leaves leaves{std::make_unique<Leaf>(lower, float(widths.exterior * voxel_size)),
                 numbers ? std::make_unique<IdLeaf>(lower, -1) : nullptr};
@@ -97,8 +100,8 @@ void place(openvdb::GridBase& grid, const char* name, const VoxelizationInput& i
 }
 
 /// The grids in world units. It frees the band block by block, so that it and they are never whole at a time.
-Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const VoxelizationInput& input, bool is_signed,
-                        const Numbers* numbers) {
+Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const VoxelizationInput& input,
+                        bool is_signed, const Numbers* numbers) {
   const Stage stage(input.context, "level set");
   const auto outside = float(widths.exterior * input.voxel_size),
              inside = float(-widths.interior * input.voxel_size);
@@ -129,8 +132,8 @@ void forget_signs(thesis::Band& band) {
   for (std::int32_t i = 0; i < band.size(); ++i) band.block(i).outside = band.block(i).set;
 }
 
-/// Whether more than a hundredth of the voxels is inside. A closed mesh has about as many inside as outside; of an
-/// open mesh a few remain.
+/// Whether more than a hundredth of the voxels is inside. A closed mesh has about as many inside as outside;
+/// of an open mesh a few remain.
 bool has_inside(const thesis::Band& band) {
   std::size_t set = 0, outside = 0;
   for (std::int32_t i = 0; i < band.size(); ++i) {
@@ -146,7 +149,8 @@ const OptionTable<ThesisVoxelizerOptions>& option_table() {
   static const auto table =
       OptionTable<Options>()
           .number("sign_angle", &Options::sign_angle, {.minimum = 1e-6, .maximum = 180.0},
-                  "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; larger makes "
+                  "degrees: a boundary voxel is outside below this angle to an outside neighbour's vector; "
+                  "larger makes "
                   "more outside",
                   {"signs=flood-fill"})
           // A seed is a whole number of up to 1e15, which a double holds exactly.
@@ -155,9 +159,11 @@ const OptionTable<ThesisVoxelizerOptions>& option_table() {
           .choice("signs", &Options::signs, {{"flood-fill", true}, {"unsigned", false}},
                   "stage 3: flood-fill from outside and angles (§5.3), or unsigned distances")
           .choice("clean_up", &Options::clean_up, {{"true", true}, {"false", false}},
-                  "stage 4: whether voxels that self-intersections left inside are removed (§5.4)", {"signs=flood-fill"})
+                  "stage 4: whether voxels that self-intersections left inside are removed (§5.4)",
+                  {"signs=flood-fill"})
           .choice("expansion", &Options::expansion, {{"true", true}, {"false", false}},
-                  "stage 5: whether the band is expanded to its widths (§5.5); else it is about a voxel wide to either "
+                  "stage 5: whether the band is expanded to its widths (§5.5); else it is about a voxel wide "
+                  "to either "
                   "side, or less where less is asked for");
   return table;
 }
@@ -166,9 +172,12 @@ const OptionTable<ThesisVoxelizerOptions>& option_table() {
 
 std::vector<OptionSpec> thesis_voxelizer_options() { return option_table().specs(); }
 
-ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) { return option_table().read(options); }
+ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) {
+  return option_table().read(options);
+}
 
-Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options, bool nearest) {
+Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options,
+                                 bool nearest) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);
   // A negation, so that an angle that is no number is refused, too.
   if (!(options.sign_angle > 0.0 && options.sign_angle <= 180.0))

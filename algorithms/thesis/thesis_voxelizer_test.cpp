@@ -15,8 +15,8 @@
 #include <thread>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/thesis/thesis_volumes.h"
 #include "algorithms/search/triangle_point.h"
+#include "algorithms/thesis/thesis_volumes.h"
 
 namespace hermesh {
 namespace {
@@ -253,9 +253,9 @@ TEST(ThesisVoxelizer, NoShellLeaksWhereSamplesLieHalfwayBetweenVoxels) {
   }
 }
 
-// Trap T8 a third time. Half the box's depth is 12.5 voxels, or 12.499999999999998 in double precision, so that d_T is
-// 25 and samples are one voxel apart and halfway between voxels. Of two neighbours one may round up and the other down,
-// to voxels that are two apart, and the flood goes through the voxel between.
+// Trap T8 a third time. Half the box's depth is 12.5 voxels, or 12.499999999999998 in double precision, so
+// that d_T is 25 and samples are one voxel apart and halfway between voxels. Of two neighbours one may round
+// up and the other down, to voxels that are two apart, and the flood goes through the voxel between.
 TEST(ThesisVoxelizer, ShellsLeakWhereRoundingTakesSamplesTwoVoxelsApart) {
   constexpr double kVoxel = 1.1, kDepth = 13.75 / kVoxel;
   const std::vector<Voxel> face =
@@ -365,14 +365,16 @@ TEST(ThesisVoxelizer, WithoutSignsDistancesArePositive) {
   EXPECT_FLOAT_EQ(without->tree().getValue({0, 0, 0}), 3.0f);
 }
 
-// §5.1: the triangle of each voxel is the one that its distance is from, whatever the order that they came in.
+// §5.1: the triangle of each voxel is the one that its distance is from, whatever the order that they came
+// in.
 TEST(ThesisVoxelizer, EachVoxelHasTheTriangleOfItsDistance) {
   initialize_openvdb();
   const PolygonMesh mesh = joined(cube(9.3), sphere(6.0, 2, Vector3d(4, 3, 8)));
   const std::vector<Triangle> triangles = triangulated(mesh);
   for (const std::uint64_t seed : {0, 7}) {
     RunContext context;
-    const Voxelization made = thesis_voxelization({mesh, 0.5, 3.0, 3.0, context}, {.shuffle_seed = seed}, true);
+    const Voxelization made =
+        thesis_voxelization({mesh, 0.5, 3.0, 3.0, context}, {.shuffle_seed = seed}, true);
     ASSERT_TRUE(made.nearest);
     EXPECT_EQ(made.nearest->getName(), "triangle-id");
     EXPECT_TRUE(made.nearest->tree().hasSameTopology(made.distance->tree()));
@@ -381,7 +383,9 @@ TEST(ThesisVoxelizer, EachVoxelHasTheTriangleOfItsDistance) {
       ASSERT_GE(*id, 0);
       ASSERT_LT(std::size_t(*id), triangles.size());
       seen.insert(*id);
-      const auto at = [&](int corner) -> Vector3d { return mesh.points[triangles[std::size_t(*id)][corner]].cast<double>(); };
+      const auto at = [&](int corner) -> Vector3d {
+        return mesh.points[triangles[std::size_t(*id)][corner]].cast<double>();
+      };
       const Vector3d p = 0.5 * position(id.getCoord());
       const double distance = (closest_point(p, at(0), at(1), at(2)).position - p).norm();
       ASSERT_NEAR(std::abs(made.distance->tree().getValue(id.getCoord())), distance, 1e-5);

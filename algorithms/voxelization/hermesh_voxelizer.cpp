@@ -6,8 +6,8 @@
 namespace hermesh {
 namespace {
 
-// The caller has checked the value against the choices below, so what is none of these three is "auto". An input made
-// without options, as tests make it, has declared none, and is "auto" too.
+// The caller has checked the value against the choices below, so what is none of these three is "auto". An
+// input made without options, as tests make it, has declared none, and is "auto" too.
 SignRule sign_rule(const Options& options) {
   if (options.is("signs", "flood-fill")) return SignRule::flood_fill;
   if (options.is("signs", "winding-number")) return SignRule::winding_number;
@@ -30,7 +30,8 @@ std::vector<OptionSpec> hermesh_voxelizer_options() {
 }
 
 VoxelizeOptions voxelize_options(const VoxelizationInput& input) {
-  // `nearest` stays off: a LevelSet has no place for triangles. Who wants them calls voxelize() itself (outputs/).
+  // `nearest` stays off: a LevelSet has no place for triangles. Who wants them calls voxelize() itself
+  // (outputs/).
   return {.voxel_size = input.voxel_size,
           .exterior_band = input.exterior_band,
           .interior_band = input.interior_band,
@@ -38,7 +39,8 @@ VoxelizeOptions voxelize_options(const VoxelizationInput& input) {
 }
 
 LevelSet hermesh_voxelizer(const VoxelizationInput& input) {
-  // Without an inside the grid is "udf" and not of class level set; where signs were asked for, a note says why.
+  // Without an inside the grid is "udf" and not of class level set; where signs were asked for, a note says
+  // why.
   return make_level_set(voxelize(input.mesh, voxelize_options(input), input.context).distance);
 }
 

@@ -3,24 +3,26 @@
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/distance/band.h"
+#include "algorithms/voxelization/distance/wide_band.h"
 #include "algorithms/voxelization/inside/interior_faces.h"
 #include "algorithms/voxelization/inside/signs.h"
-#include "algorithms/voxelization/distance/wide_band.h"
 
 namespace hermesh {
 namespace {
 
-/// Where a band is wider than `kWideBand` voxels, the triangles look for the voxels within `kNearBand` alone, which is as far
-/// as they get by looking at the blocks next to theirs, and each voxel beyond looks for its triangle (wide_band.h).
+/// Where a band is wider than `kWideBand` voxels, the triangles look for the voxels within `kNearBand` alone,
+/// which is as far as they get by looking at the blocks next to theirs, and each voxel beyond looks for its
+/// triangle (wide_band.h).
 constexpr double kWideBand = 16.0, kNearBand = 6.0;
 
-/// Where the surface runs through samples, the other end of a crossed edge is a whole voxel away from it: not below the width of
-/// a band of one voxel, yet with a sign that only a leaf can hold. In voxels, and a hair more (sample_side.h).
+/// Where the surface runs through samples, the other end of a crossed edge is a whole voxel away from it: not
+/// below the width of a band of one voxel, yet with a sign that only a leaf can hold. In voxels, and a hair
+/// more (sample_side.h).
 constexpr double kEndOfEdge = 1.001;
 
 /// Widths of the band in world units.
@@ -36,9 +38,10 @@ struct Widths {
         end_of_edge(float(kEndOfEdge * voxel_size)) {}
 };
 
-/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side. Returns whether the leaf is
-/// still needed: it has an active voxel, or one that may be the end of a crossed edge.
-bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths, const kernels::Kernels& kernels) {
+/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side. Returns
+/// whether the leaf is still needed: it has an active voxel, or one that may be the end of a crossed edge.
+bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths,
+               const kernels::Kernels& kernels) {
   // A wider band has such ends among its active voxels.
   const float* values = leaf.buffer().data();
   const bool has_end = std::min(widths.exterior, widths.interior) < widths.end_of_edge &&
@@ -63,8 +66,8 @@ PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_
   return mesh;
 }
 
-/// Lowers the leaf's distances to `values`, and activates the voxels that are active there. The inactive voxels of
-/// either hold the reach, which is never the smaller one where the other is active.
+/// Lowers the leaf's distances to `values`, and activates the voxels that are active there. The inactive
+/// voxels of either hold the reach, which is never the smaller one where the other is active.
 void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
   float* own = leaf.buffer().data();
   for (unsigned i = 0; i < 512; ++i) own[i] = std::min(own[i], values[i]);
@@ -76,8 +79,8 @@ void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
 /// Adds the distances to the caps of the holes, and the blocks that only a cap is near.
 void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band,
               RunContext& context) {
-  // The caps are a mesh of their own with its own blocks; where the mesh has a leaf, too, the two bands merge, and a
-  // voxel keeps its nearest triangle even if the cap is nearer.
+  // The caps are a mesh of their own with its own blocks; where the mesh has a leaf, too, the two bands
+  // merge, and a voxel keeps its nearest triangle even if the cap is nearer.
   const PolygonMesh caps = to_mesh(signs.caps, voxel_size);
   const IndexSoup soup(caps, voxel_size);
   TriangleBins bins(soup, reach, context);
@@ -91,8 +94,8 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
       lower(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
       continue;
     }
-    // A block that the table has, but without a voxel near the mesh, is there twice from now on; only the new entry
-    // has a leaf.
+    // A block that the table has, but without a voxel near the mesh, is there twice from now on; only the new
+    // entry has a leaf.
     band.leaves.push_back(std::move(near_caps.leaves[i]));
     band.blocks.push_back(near_caps.blocks[i]);
     signs.inside.push_back(known != BlockTable::kNone ? BlockMask(signs.inside[known])
@@ -106,8 +109,9 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
 
 bool has(const BlockMask& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
 
-/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: a way from
-/// outside to an interior face passes the solid's boundary first, so the sheet is never the nearest to them.
+/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: a way
+/// from outside to an interior face passes the solid's boundary first, so the sheet is never the nearest to
+/// them.
 void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
   for (unsigned i = 0; i < 512; ++i) {
@@ -118,15 +122,14 @@ void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& in
   leaf.setValueMask(mask);
 }
 
-/// Computes the distances of the voxels inside once more without what does not bound the solid. It goes leaf by leaf,
-/// since all of the new ones at once could outweigh a small volume.
+/// Computes the distances of the voxels inside once more without what does not bound the solid. It goes leaf
+/// by leaf, since all of the new ones at once could outweigh a small volume.
 InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
-                                   BandWork work, Band& band, RunContext& context) {
-  InteriorFaces sheets =
-      find_interior_faces(soup, bins, band, signs, work.reach, work.voxel_size, context);
+                                       BandWork work, Band& band, RunContext& context) {
+  InteriorFaces sheets = find_interior_faces(soup, bins, band, signs, work.reach, work.voxel_size, context);
   if (sheets.triangles.empty()) return sheets;
-  // First without any triangle that is inner, if only in part. Each call back writes to its own block's leaf, so that
-  // threads need no lock.
+  // First without any triangle that is inner, if only in part. Each call back writes to its own block's leaf,
+  // so that threads need no lock.
   work.blocks = &sheets.blocks;
   work.without = &sheets.triangles;
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
@@ -138,8 +141,8 @@ InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins
       if (has(inside, v)) (*band.nearest[found.block])[v] = found.nearest[v];
   });
   if (sheets.pieces.triangles.empty()) return sheets;
-  // Then the outer pieces of the triangles that were cut are put back. They lie within their triangles, so that
-  // whatever is within their reach has a block in `bins`.
+  // Then the outer pieces of the triangles that were cut are put back. They lie within their triangles, so
+  // that whatever is within their reach has a block in `bins`.
   const IndexSoup pieces(sheets.pieces, work.voxel_size);
   TriangleBins piece_bins(pieces, work.reach, context);
   work.blocks = work.without = nullptr;
@@ -178,8 +181,8 @@ openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool
     if (leaf) grid->tree().addLeaf(leaf.release());
   grid->setName(is_signed ? "sdf" : "udf");
   if (!is_signed) return grid;
-  // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the sign of
-  // the side they lie on, and its width.
+  // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the
+  // sign of the side they lie on, and its width.
   openvdb::tools::signedFloodFillWithValues(grid->tree(), widths.exterior, -widths.interior, true, 1, 1);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return grid;
@@ -192,8 +195,8 @@ struct Boundary {
   std::vector<TriangleCorners> caps;
 };
 
-/// Finds the sides and makes `band` signed. The order matters: the caps come after the interior faces, whose search
-/// replaces distances by those to the mesh alone; the signs last, once every distance is the least.
+/// Finds the sides and makes `band` signed. The order matters: the caps come after the interior faces, whose
+/// search replaces distances by those to the mesh alone; the signs last, once every distance is the least.
 Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, TriangleBins& bins,
               const Widths& widths, Band& band, RunContext& context) {
   const Stage stage(context, "signs");
@@ -274,11 +277,13 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   }
   // Without signs `near` is as wide as asked.
   const bool is_wider = result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior);
-  if (is_wider || (options.boundary && result.is_signed)) result.boundary = boundary_triangles(soup, boundary);
+  if (is_wider || (options.boundary && result.is_signed))
+    result.boundary = boundary_triangles(soup, boundary);
   if (is_wider) {
     const Stage stage(context, "wide band");
     band = {};
-    widen_band(result.boundary, options.voxel_size, near, wide, *result.distance, result.nearest.get(), context);
+    widen_band(result.boundary, options.voxel_size, near, wide, *result.distance, result.nearest.get(),
+               context);
     if (!options.boundary) result.boundary = {};
   }
   result.distance->setTransform(transform_at(mesh.origin, options.voxel_size));
@@ -298,10 +303,11 @@ Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, R
   const BandWidths wide{options.exterior_band, options.interior_band}, exterior{wide.exterior, wide.exterior};
   if (options.signs == SignRule::none) return voxelize_within(mesh, outside_only, exterior, context);
   const bool is_wide = std::max(wide.exterior, wide.interior) > kWideBand;
-  const BandWidths near = is_wide ? BandWidths{std::min(wide.exterior, kNearBand), std::min(wide.interior, kNearBand)} : wide;
+  const BandWidths near =
+      is_wide ? BandWidths{std::min(wide.exterior, kNearBand), std::min(wide.interior, kNearBand)} : wide;
   Voxelization result = voxelize_within(mesh, options, near, context);
-  // No inside was found. What is there already is right where the search went as far as the exterior band, no more
-  // and no less.
+  // No inside was found. What is there already is right where the search went as far as the exterior band, no
+  // more and no less.
   const bool is_as_wide = !is_wide && wide.interior == wide.exterior && wide.exterior >= kEndOfEdge;
   if (result.is_signed || is_as_wide) return result;
   return voxelize_within(mesh, outside_only, exterior, context);

@@ -22,26 +22,27 @@ struct VoxelizeOptions {
 
 /// The grids that voxelize() makes, on one lattice.
 struct Voxelization {
-  /// Distance in world units, negative inside, in a grid named "sdf", or "udf" without signs. Its transform scales by
-  /// the voxel size and moves by the mesh's origin.
+  /// Distance in world units, negative inside, in a grid named "sdf", or "udf" without signs. Its transform
+  /// scales by the voxel size and moves by the mesh's origin.
   openvdb::FloatGrid::Ptr distance;
   /// False without signs: none were asked for, or the polygons give no inside.
   bool is_signed = true;
-  /// The number of the mesh's nearest triangle (as triangulated() numbers them) for each voxel that is active in
-  /// `distance`, or −1 where only the cap of a hole is near, in a grid named "triangle-id" with background −1. Null
-  /// unless asked for.
+  /// The number of the mesh's nearest triangle (as triangulated() numbers them) for each voxel that is active
+  /// in `distance`, or −1 where only the cap of a hole is near, in a grid named "triangle-id" with background
+  /// −1. Null unless asked for.
   openvdb::Int32Grid::Ptr nearest;
-  /// The triangles that distances inside are measured to: the mesh's, numbered as triangulated() does, without those that
-  /// are inner for certain, the outer pieces of those that are inner in part, and the caps of holes. Empty unless asked
-  /// for, and without signs.
+  /// The triangles that distances inside are measured to: the mesh's, numbered as triangulated() does,
+  /// without those that are inner for certain, the outer pieces of those that are inner in part, and the caps
+  /// of holes. Empty unless asked for, and without signs.
   BoundaryTriangles boundary = {};
 };
 
-/// Narrow band of distances to any polygons: in any order and orientation, twice, degenerate, intersecting, open.
-/// Every voxel nearer to the surface than the band is wide is active, no other, and its value is the distance to the
-/// nearest triangle that bounds the solid, right to 1e-5 voxel. A voxel on a polygon is on the side that
-/// sample_side.h gives it; inside, its distance is kLeastDepth voxels, so that it carries a sign. Without signs the
-/// exterior band's width counts. The bytes are the same at any thread count and any level of vector code.
+/// Narrow band of distances to any polygons: in any order and orientation, twice, degenerate, intersecting,
+/// open. Every voxel nearer to the surface than the band is wide is active, no other, and its value is the
+/// distance to the nearest triangle that bounds the solid, right to 1e-5 voxel. A voxel on a polygon is on
+/// the side that sample_side.h gives it; inside, its distance is kLeastDepth voxels, so that it carries a
+/// sign. Without signs the exterior band's width counts. The bytes are the same at any thread count and any
+/// level of vector code.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context);
 

@@ -72,9 +72,10 @@ struct Errors {
   std::size_t checked = 0;
 };
 
-/// Compares every voxel of the box with the tree of triangles, which is exact in double precision, and independent of
-/// blocks and vector code.
-inline Errors compare(const PolygonMesh& mesh, const Voxelization& v, double voxel_size, double band, int margin) {
+/// Compares every voxel of the box with the tree of triangles, which is exact in double precision, and
+/// independent of blocks and vector code.
+inline Errors compare(const PolygonMesh& mesh, const Voxelization& v, double voxel_size, double band,
+                      int margin) {
   const std::vector<Triangle> triangles = triangulated(mesh);
   const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
   const Bounds bounds = hermesh::bounds(mesh);

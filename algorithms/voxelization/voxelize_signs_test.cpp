@@ -1,4 +1,5 @@
-// On which side of the polygons voxelize() says that samples are: shells, holes, clefts, and meshes without an inside.
+// On which side of the polygons voxelize() says that samples are: shells, holes, clefts, and meshes without
+// an inside.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -159,8 +160,8 @@ TEST(VoxelizeSigns, VoxelsOneBehindTheOtherInASlitAreOutside) {
 }
 
 TEST(VoxelizeSigns, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
-  // A chamber around (0, 0, z) with a narrow passage that turns twice before it ends at y = 8.2; no straight way leads
-  // through it. Plugged, it is a cavity.
+  // A chamber around (0, 0, z) with a narrow passage that turns twice before it ends at y = 8.2; no straight
+  // way leads through it. Plugged, it is a cavity.
   const auto block = [](double gap, bool plugged) {
     PolygonMesh mesh = box({-8.2, -8.2, -6.3}, {-0.3, 8.2, 6.3});
     append(mesh, box({-0.5, -8.2, -6.3}, {8.2, -0.3, 6.3}));
@@ -183,12 +184,13 @@ TEST(VoxelizeSigns, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
 }
 
 TEST(VoxelizeSigns, APocketThatLooksIntoASharpCreaseFromWithinIsNotOutside) {
-  // A closed prism, inside out, that narrows to a crease on the lattice: a hair off one of the walls there is behind
-  // the other.
+  // A closed prism, inside out, that narrows to a crease on the lattice: a hair off one of the walls there is
+  // behind the other.
   PolygonMesh mesh;
   for (const float z : {-1.3f, 1.3f})
-    for (const Vector3f& p : {Vector3f(3.5f, 0, z), Vector3f(3.2f, 0.0685714286f, z), Vector3f(-3.5f, 1.6f, z),
-                              Vector3f(-3.5f, -1.6f, z), Vector3f(3.2f, -0.0685714286f, z)})
+    for (const Vector3f& p :
+         {Vector3f(3.5f, 0, z), Vector3f(3.2f, 0.0685714286f, z), Vector3f(-3.5f, 1.6f, z),
+          Vector3f(-3.5f, -1.6f, z), Vector3f(3.2f, -0.0685714286f, z)})
       mesh.points.push_back(p);
   for (std::uint32_t i = 0; i < 5; ++i) {
     const std::uint32_t j = (i + 1) % 5;

@@ -103,7 +103,8 @@ void check_soups(int count, unsigned seed) {
   EXPECT_GT(checked, 50u * std::size_t(count));
 }
 
-/// Its corners lie on a line but for rounding, so that its normal is noise, and no end of it may be lost by that.
+/// Its corners lie on a line but for rounding, so that its normal is noise, and no end of it may be lost by
+/// that.
 TEST(Voxelize, ANeedleHasTheBandAroundBothEnds) {
   PolygonMesh needle;
   needle.points = {{1.9281562566757202f, 0.71781373023986816f, 2.6251864433288574f},
@@ -112,12 +113,14 @@ TEST(Voxelize, ANeedleHasTheBandAroundBothEnds) {
   needle.triangles = {{0, 1, 2}};
   RunContext context;
   const Voxelization v = voxelize(
-      needle, {.voxel_size = 0.37, .exterior_band = 1.5, .interior_band = 1.5, .signs = SignRule::none}, context);
+      needle, {.voxel_size = 0.37, .exterior_band = 1.5, .interior_band = 1.5, .signs = SignRule::none},
+      context);
   const auto accessor = v.distance->getConstAccessor();
   for (int step = 0; step <= 100; ++step) {
     const Eigen::Vector3f at = needle.points[0] + 0.01f * float(step) * (needle.points[1] - needle.points[0]);
     const Eigen::Vector3d voxels = at.cast<double>() / 0.37;
-    const openvdb::Coord c(int(std::lround(voxels.x())), int(std::lround(voxels.y())), int(std::lround(voxels.z())));
+    const openvdb::Coord c(int(std::lround(voxels.x())), int(std::lround(voxels.y())),
+                           int(std::lround(voxels.z())));
     EXPECT_TRUE(accessor.isValueOn(c)) << c;
   }
 }

@@ -39,8 +39,8 @@ TEST(Voxelize, BoxByHand) {
 }
 
 TEST(Voxelize, ABandOfOneVoxelHasTheSignsOfFacesOnSamples) {
-  // Faces between two leaves: of the edges that they cross, one end is the only voxel of its leaf that matters, a whole voxel
-  // away and so not active.
+  // Faces between two leaves: of the edges that they cross, one end is the only voxel of its leaf that
+  // matters, a whole voxel away and so not active.
   for (const VoxelizeOptions& options : {VoxelizeOptions{.exterior_band = 1, .interior_band = 1},
                                          VoxelizeOptions{.exterior_band = 1, .interior_band = 3},
                                          VoxelizeOptions{.exterior_band = 3, .interior_band = 1}})
@@ -51,7 +51,8 @@ TEST(Voxelize, ABandOfOneVoxelHasTheSignsOfFacesOnSamples) {
       for (int x = -most; x <= most; ++x)
         for (int y = -most; y <= most; ++y)
           for (int z = -most; z <= most; ++z) {
-            const double should = std::clamp(at(wide, x, y, z), -options.interior_band, options.exterior_band);
+            const double should =
+                std::clamp(at(wide, x, y, z), -options.interior_band, options.exterior_band);
             ASSERT_EQ(at(narrow, x, y, z), should) << openvdb::Coord(x, y, z) << ' ' << half;
           }
     }
@@ -236,7 +237,8 @@ TEST(Voxelize, UnionOfABoxAndATurnedOne) {
 }
 
 TEST(Voxelize, InsideTwoBoxesThatCrossDistancesAreThoseToTheirUnion) {
-  const Vector3d low[2] = {{-20.3, -6.2, -7.4}, {-5.7, -18.6, -3.3}}, high[2] = {{20.3, 6.2, 7.4}, {8.1, 17.2, 12.9}};
+  const Vector3d low[2] = {{-20.3, -6.2, -7.4}, {-5.7, -18.6, -3.3}},
+                 high[2] = {{20.3, 6.2, 7.4}, {8.1, 17.2, 12.9}};
   PolygonMesh mesh = box(low[0], high[0]);
   append(mesh, box(low[1], high[1]));
   const Voxelization v = run(mesh);
@@ -281,7 +283,8 @@ TEST(Voxelize, InsideATorusThatCrossesItselfDistancesAreThoseToItsOuterPart) {
       const double u = 2 * std::numbers::pi * i / kRings, v = 2 * std::numbers::pi * j / kSides;
       const double rho = kMajor + kMinor * std::cos(v);
       mesh.points.push_back(
-          Vector3d(rho * std::cos(u) + 0.31, rho * std::sin(u) - 0.17, kMinor * std::sin(v) + 0.23).cast<float>());
+          Vector3d(rho * std::cos(u) + 0.31, rho * std::sin(u) - 0.17, kMinor * std::sin(v) + 0.23)
+              .cast<float>());
       const auto at = [&](std::uint32_t k, std::uint32_t l) { return (k % kRings) * kSides + l % kSides; };
       mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
       mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
@@ -312,14 +315,16 @@ TEST(Voxelize, SaysWhereTrianglesCrossMoreOftenThanThereAreSamples) {
   std::mt19937 random(7);
   PolygonMesh mesh;
   for (std::uint32_t i = 0; i < 2100; ++i) {
-    mesh.points.push_back(16.0f * Eigen::Vector3f(float(random()), float(random()), float(random())) / float(random.max()));
+    mesh.points.push_back(16.0f * Eigen::Vector3f(float(random()), float(random()), float(random())) /
+                          float(random.max()));
     if (i % 3 == 2) mesh.triangles.push_back({i - 2, i - 1, i});
   }
   RunContext context;
   voxelize(mesh, {}, context);
-  EXPECT_EQ(std::ranges::count_if(context.notes,
-                                  [](const std::string& note) { return note.find("cross one another") != note.npos; }),
-            1);
+  EXPECT_EQ(
+      std::ranges::count_if(
+          context.notes, [](const std::string& note) { return note.find("cross one another") != note.npos; }),
+      1);
 }
 
 // ---- The same bytes.

@@ -82,7 +82,8 @@ FloatHermite exact_hermite(const PlacedShape& shape, const LevelSet& level_set, 
       .value = [&](const Vector3d& p) { return shape.bounded_distance(p); },
       .gradient = [&](const Vector3d& p) -> Vector3d { return shape.nearest(p).normal; }};
   const auto sample = [](const Eigen::Vector3i& at) { return std::array{at[0], at[1], at[2]}; };
-  return sample_function(surface, placement_of(*level_set.grid().grid), sample(box.lower), sample(box.upper), 1e-9, context);
+  return sample_function(surface, placement_of(*level_set.grid().grid), sample(box.lower), sample(box.upper),
+                         1e-9, context);
 }
 
 BandErrors band_errors(const PlacedShape& shape, const LevelSet& level_set, double near,

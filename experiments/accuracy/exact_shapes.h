@@ -36,8 +36,8 @@ class ExactShape {
   /// Signed distance to the surface, negative inside; exact where |distance| is below exact_within().
   virtual double distance(const Eigen::Vector3d& p) const = 0;
   virtual double exact_within() const { return 1e300; }
-  /// A function with the sign of distance() that is never larger in size than the distance, and whose slope is at most 1:
-  /// the distance itself where that is one everywhere.
+  /// A function with the sign of distance() that is never larger in size than the distance, and whose slope
+  /// is at most 1: the distance itself where that is one everywhere.
   virtual double bounded_distance(const Eigen::Vector3d& p) const { return distance(p); }
 
   virtual std::optional<double> area() const = 0;    ///< none: it has no closed form

@@ -510,18 +510,19 @@ Measurement order_measurement() {
   tables.push_back({"normal-codes",
                     "orders of codes of normals in their step, at resolutions of 4 to 10 bits a component",
                     "code: error", codes});
-  tables.push_back({"optimum",
-                    "triangles over the fewest that lie as near to the surface",
-                    "shape, variant and tolerance, R/h",
-                    {{"size", "R/h", "voxels in the unit of length"},
-                     {"triangles", "triangles", "of the mesh, mean over three places"},
-                     {"error_max", "max [vx]", "largest distance from the mesh to the surface, mean"},
-                     {"error_rms", "rms [vx]", "distance from the mesh to the surface, root mean square, mean"},
-                     {"error_mean", "mean [vx]", "signed distance from the mesh to the surface, positive outside, mean"},
-                     {"times_optimum", "÷ optimum",
-                      "triangles over the fewest that have the mesh's own largest error, mean"},
-                     {"times_optimum_min", "from", "smallest of the three places"},
-                     {"times_optimum_max", "to", "largest of the three places"}}});
+  tables.push_back(
+      {"optimum",
+       "triangles over the fewest that lie as near to the surface",
+       "shape, variant and tolerance, R/h",
+       {{"size", "R/h", "voxels in the unit of length"},
+        {"triangles", "triangles", "of the mesh, mean over three places"},
+        {"error_max", "max [vx]", "largest distance from the mesh to the surface, mean"},
+        {"error_rms", "rms [vx]", "distance from the mesh to the surface, root mean square, mean"},
+        {"error_mean", "mean [vx]", "signed distance from the mesh to the surface, positive outside, mean"},
+        {"times_optimum", "÷ optimum",
+         "triangles over the fewest that have the mesh's own largest error, mean"},
+        {"times_optimum_min", "from", "smallest of the three places"},
+        {"times_optimum_max", "to", "largest of the three places"}}});
   return {.name = "order",
           .summary =
               "orders of accuracy on shapes whose truth is known, of meshes, level sets and codes of normals",

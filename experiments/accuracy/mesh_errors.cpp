@@ -26,17 +26,18 @@ double angle(const Vector3d& a, const Vector3d& b) {
   return 2.0 * std::asin(std::min(1.0, 0.5 * (a - b).norm()));
 }
 
-/// Radon's rule of seven points on a triangle, which is exact for polynomials of degree 5 (Radon 1948): its middle, and two
-/// triples with one barycentric coordinate of 1 − 2a and two of a. The square of the distance between a flat triangle and a
-/// curved surface is of degree 4; the rule of corners, middles of sides and the middle, of degree 3, makes it up to three
-/// times as large where the mean is 0.
+/// Radon's rule of seven points on a triangle, which is exact for polynomials of degree 5 (Radon 1948): its
+/// middle, and two triples with one barycentric coordinate of 1 − 2a and two of a. The square of the distance
+/// between a flat triangle and a curved surface is of degree 4; the rule of corners, middles of sides and the
+/// middle, of degree 3, makes it up to three times as large where the mean is 0.
 constexpr double kRoot15 = 3.872983346207417;
 constexpr double kMiddle = 9.0 / 40.0;
-constexpr std::array<std::array<double, 2>, 2> kTriples = {{{(6 - kRoot15) / 21, (155 - kRoot15) / 1200},
-                                                            {(6 + kRoot15) / 21, (155 + kRoot15) / 1200}}};
+constexpr std::array<std::array<double, 2>, 2> kTriples = {
+    {{(6 - kRoot15) / 21, (155 - kRoot15) / 1200}, {(6 + kRoot15) / 21, (155 + kRoot15) / 1200}}};
 
-/// Calls f(point, weight, whether it is the piece's middle) for Radon's rule on each piece of a triangle, and with a weight
-/// of 0 for the corners and the middles of the sides, where distances are largest; weights add up to 1.
+/// Calls f(point, weight, whether it is the piece's middle) for Radon's rule on each piece of a triangle, and
+/// with a weight of 0 for the corners and the middles of the sides, where distances are largest; weights add
+/// up to 1.
 template <class F>
 void for_each_sample(const Corners& corners, double length, const F& f) {
   const double longest = std::max(
@@ -47,9 +48,11 @@ void for_each_sample(const Corners& corners, double length, const F& f) {
   const Vector3d u = (corners[1] - corners[0]) / n, v = (corners[2] - corners[0]) / n;
   const auto piece = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
     for (const Vector3d& p : {a, b, c}) f(p, 0.0, false);
-    for (const Vector3d& p : {Vector3d(0.5 * (a + b)), Vector3d(0.5 * (b + c)), Vector3d(0.5 * (c + a))}) f(p, 0.0, false);
+    for (const Vector3d& p : {Vector3d(0.5 * (a + b)), Vector3d(0.5 * (b + c)), Vector3d(0.5 * (c + a))})
+      f(p, 0.0, false);
     for (const auto& [at, weight] : kTriples)
-      for (const Vector3d& odd : {a, b, c}) f(Vector3d(at * (a + b + c) + (1 - 3 * at) * odd), share * weight, false);
+      for (const Vector3d& odd : {a, b, c})
+        f(Vector3d(at * (a + b + c) + (1 - 3 * at) * odd), share * weight, false);
     f(Vector3d((a + b + c) / 3.0), share * kMiddle, true);
   };
   for (int i = 0; i < n; ++i)

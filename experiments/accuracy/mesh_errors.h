@@ -41,9 +41,9 @@ struct MeshErrors {
 };
 
 /// Measures a mesh. `length`: of pieces into which long triangles are cut before distances are taken at the
-/// corners, the middles of the sides and inside of each piece (squares by the rule that is exact for polynomials of
-/// degree 5), and how densely the surface and its creases are sampled; the voxel size is a good one. The
-/// same result at any number of threads.
+/// corners, the middles of the sides and inside of each piece (squares by the rule that is exact for
+/// polynomials of degree 5), and how densely the surface and its creases are sampled; the voxel size is a
+/// good one. The same result at any number of threads.
 /// @throws Error for a mesh without a triangle where the shape is described; Cancelled.
 MeshErrors mesh_errors(const PolygonMesh& mesh, const PlacedShape& shape, double length, RunContext& context);
 

@@ -25,10 +25,9 @@ const LevelSet& sphere(int resolution) {
   return found->second;
 }
 
-/// What is wrong with a mesh of the sphere: it must keep its promises (nobody looks for self-intersections here, which
-/// takes longer than the rest) and be one component of the sphere's volume. The
-/// tolerance is that of a polygonal sphere of this size: chords lie inside by a share of about one over the
-/// squared resolution.
+/// What is wrong with a mesh of the sphere: it must keep its promises (nobody looks for self-intersections
+/// here, which takes longer than the rest) and be one component of the sphere's volume. The tolerance is that
+/// of a polygonal sphere of this size: chords lie inside by a share of about one over the squared resolution.
 std::optional<std::string> fault(const Extractor& extractor, const PolygonMesh& mesh, int resolution) {
   RunContext context;
   const auto& [report, check] = judge(to_mesh_file(mesh), extractor.promises, kCounts, context);
@@ -48,7 +47,8 @@ void extract_sphere(benchmark::State& state, const Extractor& extractor, int res
     return extract(level_set, nullptr, recipe, context).mesh;
   };
   try {
-    if (const auto wrong = fault(extractor, extract_once(), resolution)) throw Error(extractor.name + ": " + *wrong);
+    if (const auto wrong = fault(extractor, extract_once(), resolution))
+      throw Error(extractor.name + ": " + *wrong);
     for ([[maybe_unused]] auto iteration : state) benchmark::DoNotOptimize(extract_once());
   } catch (const std::exception& error) {
     ++failures;

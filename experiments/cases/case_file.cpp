@@ -96,8 +96,9 @@ class CaseFileReader {
     for (const toml::node& item : *files) {
       const toml::table& file = table(item);
       check_keys(file, {"file", "sha256", "from", "source", "licence"});
-      result.files.push_back({text(file, "file"), text(file, "sha256"), file.contains("from") ? text(file, "from") : "",
-                              text(file, "source"), text(file, "licence")});
+      result.files.push_back({text(file, "file"), text(file, "sha256"),
+                              file.contains("from") ? text(file, "from") : "", text(file, "source"),
+                              text(file, "licence")});
     }
   }
 

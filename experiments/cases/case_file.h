@@ -17,7 +17,8 @@ namespace hermesh {
 struct CaseFile {
   std::string name;    ///< in the data folder and in the cache
   std::string sha256;  ///< hash of the file's bytes
-  std::string from;    ///< where fetch_data.sh gets the file; empty for a file that only the data folder can have
+  std::string
+      from;  ///< where fetch_data.sh gets the file; empty for a file that only the data folder can have
   std::string source, licence;  ///< where the file comes from, and on which terms
 };
 
@@ -28,8 +29,8 @@ struct RawSamples {
   std::array<double, 3> spacing{1.0, 1.0, 1.0};  ///< mm
 };
 
-/// A case is either files, of which the first that is to be had wins, with a stand-in (a recipe that takes a number of
-/// triangles) for when none is; or a recipe; or another case, changed.
+/// A case is either files, of which the first that is to be had wins, with a stand-in (a recipe that takes a
+/// number of triangles) for when none is; or a recipe; or another case, changed.
 struct CaseRecipe {
   std::string name, summary;
   std::vector<CaseFile> files;
@@ -37,11 +38,11 @@ struct CaseRecipe {
   std::string stand_in;
   std::string recipe;
   RecipeParameters parameters;
-  std::string changed_case;  ///< the case that is changed to make this one
-  std::string change;        ///< "close_holes_of" or "agree_faces_of": what is done to it
+  std::string changed_case;       ///< the case that is changed to make this one
+  std::string change;             ///< "close_holes_of" or "agree_faces_of": what is done to it
   bool is_volume = false;         ///< samples instead of polygons; its stand-in is one of volume_cases.h
   std::optional<RawSamples> raw;  ///< layout of a volume's samples where the file does not say
-  std::string sha256;  ///< hash of a generated mesh's arrays
+  std::string sha256;             ///< hash of a generated mesh's arrays
 };
 
 /// Reads the recipes of a file such as cases.toml.

@@ -18,7 +18,8 @@ namespace hermesh {
 struct CaseInfo {
   std::string name;
   std::string summary;  ///< one line
-  std::string kind;     ///< "file" or "generated"; "volume" for what volume_cases.h loads and load_case() does not
+  std::string
+      kind;  ///< "file" or "generated"; "volume" for what volume_cases.h loads and load_case() does not
 };
 
 /// A case made ready. Every table says `origin`, so that nobody takes a stand-in for the real thing.
@@ -33,9 +34,9 @@ struct LoadedCase {
 /// All cases of cases.toml, in its order. @throws Error naming the file and line of a mistake.
 std::vector<CaseInfo> list_cases();
 
-/// Loads a case: from $HERMESH_DATA, or from the cache (filled from a package registry on first use), or else as its
-/// procedural stand-in of the same size. A name that is no case but a path to a mesh file is read as that
-/// file.
+/// Loads a case: from $HERMESH_DATA, or from the cache (filled from a package registry on first use), or else
+/// as its procedural stand-in of the same size. A name that is no case but a path to a mesh file is read as
+/// that file.
 /// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
 LoadedCase load_case(const std::string& name, RunContext& context);
 
@@ -51,10 +52,12 @@ class DataMissing : public Error {
 /// Makes stand-ins an error from now on, in the whole process: loading one throws DataMissing.
 void require_data(bool required);
 bool data_are_required();
-/// @throws DataMissing naming the case and `reason`, why none of its files is to be had, if data are required.
+/// @throws DataMissing naming the case and `reason`, why none of its files is to be had, if data are
+/// required.
 void check_stand_in_allowed(const std::string& name, const std::string& reason);
 
-/// Whether a file of the case is in the data folder, the cache or a registry, so that no stand-in would be taken.
+/// Whether a file of the case is in the data folder, the cache or a registry, so that no stand-in would be
+/// taken.
 /// @throws Error for an unknown name, or a file whose SHA-256 is not the stated one.
 bool is_at_hand(const std::string& name, RunContext& context);
 
@@ -66,8 +69,8 @@ struct LocatedFile {
   std::string origin, sha256;  ///< as in LoadedCase
 };
 
-/// Looks for the files of a case in the data folder, the cache and the package registry. Returns nothing where none of
-/// them has one; then `reasons` says why.
+/// Looks for the files of a case in the data folder, the cache and the package registry. Returns nothing
+/// where none of them has one; then `reasons` says why.
 /// @throws Error for a file whose SHA-256 is not the stated one.
 std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& reasons, RunContext& context);
 

@@ -274,8 +274,8 @@ TEST_F(CasesTest, TheRecipesOfTheProjectAreInOrder) {
     }
 }
 
-/// Generated cases must have the stated hash, which load_case() compares. Ten million triangles take too long for every
-/// run, and so does one million where nothing is optimised.
+/// Generated cases must have the stated hash, which load_case() compares. Ten million triangles take too long
+/// for every run, and so does one million where nothing is optimised.
 TEST_F(CasesTest, GeneratedCasesHaveTheStatedHash) {
 #ifdef NDEBUG
   constexpr double most = 1e6;

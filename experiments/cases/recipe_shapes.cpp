@@ -8,8 +8,8 @@ namespace hermesh::recipes {
 
 using Eigen::Vector3d;
 
-/// Cosine and sine by Taylor series on an eighth of a turn around a quarter, where sixteen powers are exact to the last
-/// bit or so; multiples of a quarter turn are exact.
+/// Cosine and sine by Taylor series on an eighth of a turn around a quarter, where sixteen powers are exact
+/// to the last bit or so; multiples of a quarter turn are exact.
 std::pair<double, double> on_circle(double turns) {
   const double quarter = std::round(4.0 * turns);
   const double angle = (turns - quarter / 4.0) * 2.0 * std::numbers::pi;

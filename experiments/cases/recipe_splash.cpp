@@ -1,5 +1,5 @@
-// A splash: droplets, sheets and ligaments in the proportions of the fluid simulation of tables 9.3 and 9.4, which is not
-// to be had (Aldén 2011, §9.2).
+// A splash: droplets, sheets and ligaments in the proportions of the fluid simulation of tables 9.3 and 9.4,
+// which is not to be had (Aldén 2011, §9.2).
 #include <algorithm>
 #include <cmath>
 
@@ -31,7 +31,8 @@ struct Crown {
   /// A place on the sheet's middle: `up` from 0 below the water to 1 at the rim.
   Vector3d middle(double turns, double up, double aside) const {
     const auto [c, s] = on_circle(turns);
-    const double reach = radius * (0.85 + flare * up * up) + 0.004 * noise({3.0 * c, 3.0 * s, 4.0 * up}) + aside;
+    const double reach =
+        radius * (0.85 + flare * up * up) + 0.004 * noise({3.0 * c, 3.0 * s, 4.0 * up}) + aside;
     return {x + reach * c, kWater - 0.012 + (height * rim(turns) + 0.012) * up, z + reach * s};
   }
 };
@@ -49,7 +50,8 @@ PolygonMesh facing_outwards(PolygonMesh part) {
   for (const auto& [a, b, c] : part.triangles) {
     const Vector3d p = part.points[a].cast<double>() - origin, q = part.points[b].cast<double>() - origin,
                    r = part.points[c].cast<double>() - origin;
-    volume += p.dot(Vector3d(q.y() * r.z() - q.z() * r.y(), q.z() * r.x() - q.x() * r.z(), q.x() * r.y() - q.y() * r.x()));
+    volume += p.dot(Vector3d(q.y() * r.z() - q.z() * r.y(), q.z() * r.x() - q.x() * r.z(),
+                             q.x() * r.y() - q.y() * r.x()));
   }
   if (volume < 0.0)
     for (Triangle& triangle : part.triangles) std::swap(triangle[1], triangle[2]);
@@ -58,7 +60,8 @@ PolygonMesh facing_outwards(PolygonMesh part) {
 
 /// A closed sheet around the crown's ring: outside upwards, inside downwards, thicker at its rim.
 PolygonMesh sheet_of(const Crown& crown, double detail) {
-  const auto around = static_cast<std::uint32_t>(400 * detail), upward = static_cast<std::uint32_t>(40 * detail);
+  const auto around = static_cast<std::uint32_t>(400 * detail),
+             upward = static_cast<std::uint32_t>(40 * detail);
   PolygonMesh mesh;
   for (std::uint32_t i = 0; i < around; ++i)
     for (std::uint32_t j = 0; j < 2 * upward; ++j) {
@@ -85,11 +88,14 @@ PolygonMesh pool_of_waves(const GradientNoise& noise, double detail) {
     for (std::uint32_t j = 0; j <= nz; ++j)
       for (std::uint32_t i = 0; i <= nx; ++i) {
         const double x = kHalf.x() * (2.0 * i / nx - 1.0), z = kHalf.z() * (2.0 * j / nz - 1.0);
-        const double wave = 0.006 * noise({18.0 * x, 0.3, 18.0 * z}) + 0.002 * noise({70.0 * x, 0.7, 70.0 * z});
+        const double wave =
+            0.006 * noise({18.0 * x, 0.3, 18.0 * z}) + 0.002 * noise({70.0 * x, 0.7, 70.0 * z});
         add_point(mesh, {x, upper ? kWater + wave : -kHalf.y(), z});
       }
   const std::uint32_t layer = (nx + 1) * (nz + 1);
-  const auto at = [&](std::uint32_t i, std::uint32_t j, bool upper) { return j * (nx + 1) + i + (upper ? layer : 0); };
+  const auto at = [&](std::uint32_t i, std::uint32_t j, bool upper) {
+    return j * (nx + 1) + i + (upper ? layer : 0);
+  };
   for (std::uint32_t j = 0; j < nz; ++j)
     for (std::uint32_t i = 0; i < nx; ++i) {
       add_quad(mesh, at(i, j, true), at(i, j + 1, true), at(i + 1, j + 1, true), at(i + 1, j, true));
@@ -109,7 +115,9 @@ PolygonMesh pool_of_waves(const GradientNoise& noise, double detail) {
 /// The path of what flies off a rim.
 struct Flight {
   Vector3d start, velocity;
-  Vector3d at(double time) const { return start + time * velocity - Vector3d(0, 0.5 * kGravity * time * time, 0); }
+  Vector3d at(double time) const {
+    return start + time * velocity - Vector3d(0, 0.5 * kGravity * time * time, 0);
+  }
 };
 
 Flight flight_from(const Crown& crown, Random& random) {
@@ -145,7 +153,8 @@ PolygonMesh ligament(const Flight& flight, Random& random, double detail) {
                    v(along.y() * u.z() - along.z() * u.y(), along.z() * u.x() - along.x() * u.z(),
                      along.x() * u.y() - along.y() * u.x());
     const double round = std::sqrt(std::min(1.0, 24.0 * std::min(share, 1.0 - share)));
-    const double radius = thick * round * (1.0 - 0.7 * share) * (1.0 + 0.3 * on_circle(beads * share + phase).second);
+    const double radius =
+        thick * round * (1.0 - 0.7 * share) * (1.0 + 0.3 * on_circle(beads * share + phase).second);
     for (std::uint32_t i = 0; i < around; ++i) {
       const auto [c, s] = on_circle(double(i) / around);
       add_point(mesh, centre(share) + radius * (c * u + s * v));
@@ -180,8 +189,12 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   constexpr int kMostTries = 1000;  // where no place is left there are fewer crowns
   for (int tries = 0; crowns.size() < parameters.at("crowns") && tries < kMostTries; ++tries) {
     const double radius = random.uniform(0.025, 0.07), reach = 1.5 * radius;
-    const Crown crown{random.uniform(reach - kHalf.x(), kHalf.x() - reach), random.uniform(reach - 0.5, 0.5 - reach), radius,
-                      random.uniform(0.03, 0.13), random.uniform(0.1, 0.5), random.uniform(0.0016, 0.004),
+    const Crown crown{random.uniform(reach - kHalf.x(), kHalf.x() - reach),
+                      random.uniform(reach - 0.5, 0.5 - reach),
+                      radius,
+                      random.uniform(0.03, 0.13),
+                      random.uniform(0.1, 0.5),
+                      random.uniform(0.0016, 0.004),
                       GradientNoise(random.bits())};
     const auto meets = [&](const Crown& other) {
       const double apart = reach + 1.5 * other.radius, x = crown.x - other.x, z = crown.z - other.z;
@@ -204,7 +217,8 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   }
   constexpr double kTop = 0.004;
   if (wanted(4))
-    add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop, detail);  // so that the box is as high as it should be
+    add_droplet(mesh, {0.0, kHalf.y() - kTop, 0.0}, kTop,
+                detail);  // so that the box is as high as it should be
   std::vector<std::pair<Vector3d, double>> droplets;
   // Where no room is left there are fewer.
   std::size_t tries = 0, most = 20 * static_cast<std::size_t>(parameters.at("droplets"));

@@ -83,14 +83,16 @@ std::span<const Recipe> all_recipes() {
         {"about_z", "degrees", 0, -360, 360}},
        recipes::sheets},
       {"splash",
-       "water: a pool with waves, crowns thrown up from it, ligaments drawn from the crowns' rims and droplets, all of them "
+       "water: a pool with waves, crowns thrown up from it, ligaments drawn from the crowns' rims and "
+       "droplets, all of them "
        "closed and overlapping; 0.268 x 0.347 x 1 times the length",
        {{"length", "along z, world units", 10, 1e-6, 1e6},
         {"crowns", "thin sheets, thrown up in a ring", 14, 0, 1000},
         {"ligaments", "threads", 400, 0, 1e5},
         {"droplets", "most of them the smallest", 6000, 1, 1e6},
         {"detail", "1 gives some two million triangles", 1, 0.1, 10},
-        {"part", "0 for all, or the pool (1), the crowns (2), the ligaments (3) or the droplets (4) alone", 0, 0, 4},
+        {"part", "0 for all, or the pool (1), the crowns (2), the ligaments (3) or the droplets (4) alone", 0,
+         0, 4},
         {"seed", "of all places and shapes", 1, 0, 1e9}},
        recipes::splash},
       {"uv-sphere",

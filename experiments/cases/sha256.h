@@ -15,8 +15,8 @@ std::string sha256_of_file(const std::filesystem::path& path);
 /// The hash of the characters.
 std::string sha256_of_text(std::string_view text);
 
-/// The hash of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points, the
-/// triangles, the quads, all little-endian.
+/// The hash of the arrays: the numbers of points, triangles and quads (64 bits each), the origin, the points,
+/// the triangles, the quads, all little-endian.
 std::string sha256_of_mesh(const PolygonMesh& mesh);
 
 }  // namespace hermesh

@@ -16,7 +16,8 @@ ShellOutput shell_output(const std::string& command) {
   FILE* const pipe = popen(command.c_str(), "r");
   if (!pipe) return result;
   std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) result.text.append(buffer.data(), size);
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    result.text.append(buffer.data(), size);
   result.status = pclose(pipe);
   while (result.text.ends_with('\n')) result.text.pop_back();
   return result;

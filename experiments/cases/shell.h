@@ -9,7 +9,7 @@ namespace hermesh {
 std::string shell_quoted(const std::string& text);
 
 struct ShellOutput {
-  int status = -1;   ///< as wait() gives it: 0 when the command was done; −1 where no shell could be started
+  int status = -1;  ///< as wait() gives it: 0 when the command was done; −1 where no shell could be started
   std::string text;  ///< the standard output, without the line breaks that end it
 };
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/io/import/import_volume.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cases/case_file.h"
 #include "experiments/cases/cases.h"
 
@@ -16,7 +16,8 @@ using openvdb::Coord;
 
 /// A number from 0 to 1 for each lattice point (a finalizer of MurmurHash3).
 double lattice_noise(int x, int y, int z) {
-  std::uint32_t h = std::uint32_t(x) * 0x9e3779b1u ^ std::uint32_t(y) * 0x85ebca77u ^ std::uint32_t(z) * 0xc2b2ae3du;
+  std::uint32_t h =
+      std::uint32_t(x) * 0x9e3779b1u ^ std::uint32_t(y) * 0x85ebca77u ^ std::uint32_t(z) * 0xc2b2ae3du;
   h = (h ^ (h >> 16)) * 0x85ebca6bu;
   h = (h ^ (h >> 13)) * 0xc2b2ae35u;
   return double((h ^ (h >> 16)) >> 8) / 0x1p24;
@@ -49,7 +50,8 @@ LevelSet make_scan() {
   grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
   for (const Coord& at : openvdb::CoordBBox(Coord(0), Coord(95, 95, 63))) {
     const double radius = distance_to(at, 47.3, 48.1, 18.2) + 8.0 * noise(at, 12);
-    const double bone = std::max(0.0, 1.0 - std::fabs(radius - 36.0) / 5.0), flesh = radius < 42.0 ? 200.0 : 0.0;
+    const double bone = std::max(0.0, 1.0 - std::fabs(radius - 36.0) / 5.0),
+                 flesh = radius < 42.0 ? 200.0 : 0.0;
     const double value = flesh + 600.0 * bone + 150.0 * noise(at, 5) * (radius < 33.0 ? 1.0 : 0.1);
     grid->tree().setValue(at, static_cast<float>(std::floor(std::min(value, 999.0))));
   }
@@ -119,7 +121,8 @@ LoadedVolume load_volume(const std::string& name, RunContext& context) {
   if (const auto located = locate_files(*recipe, reasons, context))
     return {name, read_volume(*recipe, located->path, context), located->origin, located->sha256};
   check_stand_in_allowed(name, reasons);
-  return {name, make_volume_stand_in(recipe->stand_in), "stand-in: " + recipe->stand_in + ", because " + reasons, ""};
+  return {name, make_volume_stand_in(recipe->stand_in),
+          "stand-in: " + recipe->stand_in + ", because " + reasons, ""};
 }
 
 std::vector<std::string> volume_choices() {

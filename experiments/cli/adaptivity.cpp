@@ -3,9 +3,9 @@
 #include <sstream>
 #include <vector>
 
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cli/cli11.h"
 
 namespace hermesh::cli {
@@ -77,28 +77,30 @@ void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments) {
                         "A .vdb that says where: in a level set where it is negative, in any other scalar "
                         "grid where it differs from the background");
   group
-      ->add_option(
-          "--frustum", arguments.frustum,
-          std::string("Instead of a mask what a camera sees: ") + kFrustumForm +
-              "; position, point looked at, vertical angle in degrees, width over height, planes in world units")
+      ->add_option("--frustum", arguments.frustum,
+                   std::string("Instead of a mask what a camera sees: ") + kFrustumForm +
+                       "; position, point looked at, vertical angle in degrees, width over height, planes in "
+                       "world units")
       ->excludes(mask);
   group
       ->add_option("--frustum-resolution", arguments.frustum_resolution,
                    "Voxels along the longest side of the frustum's mask (default: 84)")
       ->check(CLI::Range(8, 4096));
   group
-      ->add_option("--outside", arguments.outside,
-                   "Outside the mask 'simplify' (the default) merges as far as the topology allows "
-                   "(manifold-dual-contouring: up to 8 voxels), 'nothing' makes no polygons, so that the "
-                   "mesh is open, with a boundary that may touch itself, and 'everywhere' keeps the bound there, too")
+      ->add_option(
+          "--outside", arguments.outside,
+          "Outside the mask 'simplify' (the default) merges as far as the topology allows "
+          "(manifold-dual-contouring: up to 8 voxels), 'nothing' makes no polygons, so that the "
+          "mesh is open, with a boundary that may touch itself, and 'everywhere' keeps the bound there, too")
       ->check(CLI::IsMember({"everywhere", "simplify", "nothing"}));
-  group->add_option("--tolerance-grid", arguments.tolerance_grid,
-                    "A .vdb whose values, none of them negative, scale the extractor's bound; beyond its data the "
-                    "background does");
+  group->add_option(
+      "--tolerance-grid", arguments.tolerance_grid,
+      "A .vdb whose values, none of them negative, scale the extractor's bound; beyond its data the "
+      "background does");
 }
 
-std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments, const Extractor& extractor,
-                                               Session& session) {
+std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments,
+                                               const Extractor& extractor, Session& session) {
   const bool has_mask = !arguments.mask.empty() || !arguments.frustum.empty();
   if (!arguments.outside.empty() && !has_mask) throw UsageError("--outside needs --mask or --frustum");
   if (arguments.frustum_resolution && arguments.frustum.empty())
@@ -108,10 +110,12 @@ std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& argume
   AdaptivityField field;
   field.outside = !has_mask ? AdaptivityField::Outside::everywhere
                             : read_outside(arguments.outside.empty() ? "simplify" : arguments.outside);
-  if (!arguments.mask.empty()) field.mask = read_part(arguments.mask, &AdaptivityField::mask, field.outside, session);
+  if (!arguments.mask.empty())
+    field.mask = read_part(arguments.mask, &AdaptivityField::mask, field.outside, session);
   if (!arguments.frustum.empty()) {
     try {
-      field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution.value_or(kFrustumResolution), session.context);
+      field.mask = frustum_mask(read_frustum(arguments.frustum),
+                                arguments.frustum_resolution.value_or(kFrustumResolution), session.context);
     } catch (const Error& error) {
       throw UsageError(std::string("--frustum: ") + error.what());
     }

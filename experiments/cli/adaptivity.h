@@ -17,9 +17,9 @@ struct AdaptivityArguments {
 
 void add_adaptivity_options(CLI::App& command, AdaptivityArguments& arguments);
 
-/// The field that the options ask for, or none. @throws UsageError for options that contradict one another, a frustum
-/// that is none, or an extractor that is not adaptive; Error for a file that cannot be used.
-std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments, const Extractor& extractor,
-                                               Session& session);
+/// The field that the options ask for, or none. @throws UsageError for options that contradict one another, a
+/// frustum that is none, or an extractor that is not adaptive; Error for a file that cannot be used.
+std::optional<AdaptivityField> read_adaptivity(const AdaptivityArguments& arguments,
+                                               const Extractor& extractor, Session& session);
 
 }  // namespace hermesh::cli

@@ -45,9 +45,10 @@ void add_bound_options(CLI::App& command, CLI::App& size, BoundArguments& argume
       "Let the mesh close holes, where no polygon is near that a distance could be proved to; the distance "
       "there is to the surface on which the winding number is 1/2");
   group
-      ->add_option("--limit-points", arguments.most_points,
-                   "Points of the finest mesh at most (default: 3e7, some 9 GiB, with --error, and 4e5 in each "
-                   "try with --triangles); the bound is refused where it needs more")
+      ->add_option(
+          "--limit-points", arguments.most_points,
+          "Points of the finest mesh at most (default: 3e7, some 9 GiB, with --error, and 4e5 in each "
+          "try with --triangles); the bound is refused where it needs more")
       ->check(CLI::Range(1e3, 1e9));
   group
       ->add_option("--smallest-voxel", arguments.smallest_voxel,
@@ -61,7 +62,8 @@ void check_bound_options(const CLI::App& command, const BoundArguments& argument
                          const VoxelizeArguments& voxelizing, const std::string& units) {
   refuse_idle(command,
               {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
-               "--isovalue", "--max-loss", "--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid"},
+               "--isovalue", "--max-loss", "--mask", "--frustum", "--frustum-resolution", "--outside",
+               "--tolerance-grid"},
               "with --error and --triangles the method is chosen for the bound");
   sign_rule(voxelizing);
   if (!arguments.error.empty()) error_in_world_units(arguments.error, units, 1.0);
@@ -93,12 +95,13 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const double diagonal = bounds(mesh).size().norm();
-  BoundedRemeshOptions options{.signs = sign_rule(voxelizing),
-                               .over_holes = arguments.over_holes,
-                               .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
-                               .smallest_voxel = arguments.smallest_voxel,
-                               .written_in_single = is_written_in_single(paths.out),
-                               .thin = voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
+  BoundedRemeshOptions options{
+      .signs = sign_rule(voxelizing),
+      .over_holes = arguments.over_holes,
+      .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
+      .smallest_voxel = arguments.smallest_voxel,
+      .written_in_single = is_written_in_single(paths.out),
+      .thin = voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
   if (!arguments.triangles) options.error = error_in_world_units(arguments.error, session.units, diagonal);
   const Stopwatch watch;
   const BoundedMesh made = about_file(paths.in, [&] {
@@ -109,8 +112,10 @@ int run_bounded(const Paths& paths, const BoundArguments& arguments, const Voxel
   });
   session.context.check();
   const std::string budget =
-      arguments.triangles ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: " : "";
-  if (!made.unmet.empty()) throw Error("'" + paths.in + "': " + budget + explanation(made) + "; nothing was written");
+      arguments.triangles ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: "
+                          : "";
+  if (!made.unmet.empty())
+    throw Error("'" + paths.in + "': " + budget + explanation(made) + "; nothing was written");
   session.context.figure("error_asked", made.error);
   session.context.figure("certified_to_polygons", made.to_surface);
   session.context.figure("certified_from_polygons", made.from_surface);

@@ -49,8 +49,8 @@ TEST_F(AdaptivityTest, AFrustumLimitsTheBound) {
 
 TEST_F(AdaptivityTest, AMaskFromAFile) {
   EXPECT_GT(points({"--mask", "sphere.vdb", "--outside", "nothing"}), 0);
-  EXPECT_EQ(run({"remesh", "sphere.off", "out.obj", "--voxel-size", "0.1", "--extractor", "adaptive-dual-contouring",
-                 "--mask", "sphere.vdb"})
+  EXPECT_EQ(run({"remesh", "sphere.off", "out.obj", "--voxel-size", "0.1", "--extractor",
+                 "adaptive-dual-contouring", "--mask", "sphere.vdb"})
                 .exit_code,
             0);
 }
@@ -62,20 +62,25 @@ TEST_F(AdaptivityTest, AMaskWithPerspectiveIsRefusedWhereItIsLookedAt) {
       openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), /*taper=*/0.5, /*depth=*/1.0, /*voxelDim=*/0.1));
   grid->tree().setValue(openvdb::Coord(1, 2, 3), -1.0f);
   openvdb::io::File(path("perspective.vdb").string()).write({grid});
-  expect_refused({"--mask", "perspective.vdb"}, 1, "perspective.vdb': the mask has a transform with perspective");
+  expect_refused({"--mask", "perspective.vdb"}, 1,
+                 "perspective.vdb': the mask has a transform with perspective");
   EXPECT_EQ(points({"--mask", "perspective.vdb", "--outside", "everywhere"}), points({}));
 }
 
 TEST_F(AdaptivityTest, AnImportedToleranceGridMayHoldZeros) {
   // Its background lies just below them.
   write("zero.raw", std::string(8, '\0'));
-  ASSERT_EQ(run({"import", "zero.raw", "zero.vdb", "--dims", "2,2,2", "--type", "uint8", "--spacing", "1,1,1"}).exit_code, 0);
+  ASSERT_EQ(
+      run({"import", "zero.raw", "zero.vdb", "--dims", "2,2,2", "--type", "uint8", "--spacing", "1,1,1"})
+          .exit_code,
+      0);
   EXPECT_GT(points({"-o", "threshold=1", "--tolerance-grid", "zero.vdb"}), points({"-o", "threshold=1"}));
 }
 
 TEST_F(AdaptivityTest, BadInputIsSaidInASentence) {
   expect_refused({"--mask", "missing.vdb"}, 1, "does not exist");
-  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1, "sphere.vdb': the scale of the tolerance is negative or not finite");
+  expect_refused({"--tolerance-grid", "sphere.vdb"}, 1,
+                 "sphere.vdb': the scale of the tolerance is negative or not finite");
   expect_refused({"--mask", ""}, 2, "--mask was given an empty value");
   expect_refused({"--outside", "nothing"}, 2, "needs --mask or --frustum");
   expect_refused({"--frustum", "0,0,3 0,0,0 60 1 0.1"}, 2, "it must be");
@@ -83,7 +88,8 @@ TEST_F(AdaptivityTest, BadInputIsSaidInASentence) {
   expect_refused({"--frustum", "0,0,3 0,0,0 x 1 0.1 9"}, 2, "not a number");
   expect_refused({"--frustum", "0,0,3 0,0,0 190 1 0.1 9"}, 2, "between 0 and 180");
   expect_refused({"--frustum", "0,0,3 0,0,0 60 1 0.1 9", "--mask", "sphere.vdb"}, 2, "--mask");
-  expect_refused({"--frustum", "50,0,3 60,0,0 20 1 0.1 9", "--outside", "nothing"}, 1, "no surface inside the mask");
+  expect_refused({"--frustum", "50,0,3 60,0,0 20 1 0.1 9", "--outside", "nothing"}, 1,
+                 "no surface inside the mask");
   EXPECT_EQ(extract({"--mask", "sphere.vdb"}, "marching-cubes").exit_code, 2);
 }
 

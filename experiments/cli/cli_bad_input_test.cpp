@@ -204,8 +204,10 @@ TEST_F(BadInputTest, Usage) {
   expect_refusal(1, {"run", "guarantee", "--out", "rows", "--set", "jugde=no"}, {"jugde", "judge"});
   // What a variable of a script that was not set leaves.
   expect_refusal(2, {"validate", "cube.off", "--reference", ""}, {"--reference", "empty"});
-  expect_refusal(2, {"import", "x.raw", "x.vdb", "--dims", "2,2,2", "--type", "uint8", "--offset", "99999999999999999999"},
-                 {"--offset"});
+  expect_refusal(
+      2,
+      {"import", "x.raw", "x.vdb", "--dims", "2,2,2", "--type", "uint8", "--offset", "99999999999999999999"},
+      {"--offset"});
   expect_refusal(2, {"report", ".", "--format", "pdf"}, {"--format", "md"});
   expect_refusal(2, {"report", ".", "--meshes", "all"}, {"--meshes", "--format html"});
   expect_refusal(2, {"report", ".", "--format", "html", "--meshes", "some"}, {"--meshes", "all, none"});

@@ -33,7 +33,8 @@ TEST_F(CliBoundedTest, TheJudgeFindsTheErrorKept) {
 TEST_F(CliBoundedTest, UnitsSayWhatTheNumbersAre) {
   write_cube();
   // With units the world is in metres.
-  const Outcome outcome = run({"remesh", "cube.off", "out.ply", "--error", "1mm", "--units", "inch", "--json"});
+  const Outcome outcome =
+      run({"remesh", "cube.off", "out.ply", "--error", "1mm", "--units", "inch", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NEAR(Json::parse(outcome.out).at("figures").at("error_asked").get<double>(), 0.001, 1e-9);
 }

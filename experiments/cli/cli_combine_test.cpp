@@ -55,7 +55,8 @@ TEST_F(CombineTest, AResultThinnerThanAVoxelIsNotCalledEmpty) {
   write_box("b.off", 0.01, 1.0);  // between the samples at 0 and 0.05
   const Outcome outcome = combine("intersection");
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("is thinner than a voxel everywhere, nothing was written"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("is thinner than a voxel everywhere, nothing was written"), std::string::npos)
+      << outcome.err;
   EXPECT_FALSE(files().contains("out.ply"));
 }
 
@@ -78,15 +79,17 @@ TEST_F(CombineTest, WhatIsLostBetweenSamplesIsSaid) {
 TEST_F(CombineTest, AnOperandWithoutInsideIsRefused) {
   write_box("a.off", -1.0, 1.0);
   write("sheet.off", "OFF\n4 1 0\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n4 0 1 2 3\n");
-  const std::vector<std::string> keep = {"combine", "union", "a.off", "sheet.off", "kept.ply", "--voxel-size", "0.1"};
+  const std::vector<std::string> keep = {"combine",  "union",        "a.off", "sheet.off",
+                                         "kept.ply", "--voxel-size", "0.1"};
   EXPECT_EQ(run(keep).exit_code, 0) << "an open sheet becomes a shell";
   const Outcome outcome =
       run({"combine", "union", "a.off", "sheet.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("'sheet.off': it has no inside"), std::string::npos) << outcome.err;
-  EXPECT_EQ(run({"combine", "union", "a.off", "a.off", "out.ply", "--voxel-size", "0.1", "--signs", "unsigned"})
-                .exit_code,
-            2);
+  EXPECT_EQ(
+      run({"combine", "union", "a.off", "a.off", "out.ply", "--voxel-size", "0.1", "--signs", "unsigned"})
+          .exit_code,
+      2);
   EXPECT_FALSE(files().contains("out.ply"));
 }
 
@@ -104,26 +107,28 @@ TEST_F(CombineTest, OptionsOfTheExtractorHaveAnEffect) {
   write_box("a.off", -1.03, 0.31);
   write_sphere();
   const auto bytes = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words = {"combine", "union", "a.off", "sphere.off", "out.ply", "--voxel-size", "0.11"};
+    std::vector<std::string> words = {"combine", "union",        "a.off", "sphere.off",
+                                      "out.ply", "--voxel-size", "0.11"};
     words.insert(words.end(), more.begin(), more.end());
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     return read("out.ply");
   };
   std::set<std::string> different = {bytes({})};
-  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
-           {"-o", "hermite=level-set"},
-           {"-o", "representation=sparse"},
-           {"-o", "representation=sparse", "-o", "normals=nearest"},
-           {"-o", "tolerance=0"},
-           {"--extractor", "dual-contouring"},
-           {"--extractor", "marching-cubes"},
-           {"--extractor", "marching-cubes", "-o", "crossings=exact"}})
+  for (const std::vector<std::string>& more :
+       std::vector<std::vector<std::string>>{{"-o", "hermite=level-set"},
+                                             {"-o", "representation=sparse"},
+                                             {"-o", "representation=sparse", "-o", "normals=nearest"},
+                                             {"-o", "tolerance=0"},
+                                             {"--extractor", "dual-contouring"},
+                                             {"--extractor", "marching-cubes"},
+                                             {"--extractor", "marching-cubes", "-o", "crossings=exact"}})
     EXPECT_TRUE(different.insert(bytes(more)).second) << more.back();
-  const Outcome idle =
-      run({"combine", "union", "a.off", "sphere.off", "out.ply", "--voxel-size", "0.11", "-o", "normals=nearest"});
+  const Outcome idle = run({"combine", "union", "a.off", "sphere.off", "out.ply", "--voxel-size", "0.11",
+                            "-o", "normals=nearest"});
   EXPECT_EQ(idle.exit_code, 2);
-  EXPECT_NE(idle.err.find("has no effect without representation=sparse or fixed"), std::string::npos) << idle.err;
+  EXPECT_NE(idle.err.find("has no effect without representation=sparse or fixed"), std::string::npos)
+      << idle.err;
 }
 
 TEST_F(CombineTest, TheJudgeReadsTheFile) {
@@ -146,7 +151,8 @@ TEST_F(CombineTest, SolidsTooFarApartForOneMeshAreRefusedAndOthersKeepTheirShape
   write_box("far.off", 500.0, 502.0);
   ASSERT_EQ(run({"combine", "union", "a.off", "far.off", "out.ply", "--voxel-size", "0.05"}).exit_code, 0);
   EXPECT_NEAR(volume(), 16.0, 0.01);
-  ASSERT_EQ(run({"combine", "difference", "far.off", "a.off", "out.ply", "--voxel-size", "0.05"}).exit_code, 0);
+  ASSERT_EQ(run({"combine", "difference", "far.off", "a.off", "out.ply", "--voxel-size", "0.05"}).exit_code,
+            0);
   EXPECT_NEAR(volume(), 8.0, 0.005);
 }
 
@@ -154,9 +160,10 @@ TEST_F(CombineTest, AWrongOperationOrOptionIsAUsageError) {
   write_box("a.off", -1.0, 1.0);
   write_box("b.off", 0.0, 2.0);
   EXPECT_EQ(combine("xor").exit_code, 2);
-  EXPECT_EQ(run({"combine", "union", "a.off", "b.off", "out.ply", "--voxel-size", "0.1", "-o", "placement=best"})
-                .exit_code,
-            2);
+  EXPECT_EQ(
+      run({"combine", "union", "a.off", "b.off", "out.ply", "--voxel-size", "0.1", "-o", "placement=best"})
+          .exit_code,
+      2);
   EXPECT_EQ(run({"combine", "union", "a.off", "missing.off", "out.ply", "--voxel-size", "0.1"}).exit_code, 1);
   EXPECT_FALSE(files().contains("out.ply"));
 }

@@ -26,7 +26,8 @@ class DamageTest : public ProgramTest {
     fs::copy_file(fs::path(HERMESH_TEST_INPUTS) / name, target);
     return name;
   }
-  /// Expects the program to end with one short line without control characters on stderr, after notes if need be.
+  /// Expects the program to end with one short line without control characters on stderr, after notes if need
+  /// be.
   void expect_refusal(int exit_code, const Arguments& arguments, const std::vector<std::string>& words) {
     std::string command = "hermesh";
     for (const std::string& argument : arguments) command += " " + argument;
@@ -64,7 +65,8 @@ TEST_F(DamageTest, ATileOf4096CubedIsWeighedBeforeItIsMade) {
             std::string::npos);
   // However much memory the machine has: the surface has 100 million faces.
   for (const char* extractor : {"dual-contouring", "marching-cubes", "manifold-dual-contouring"})
-    expect_refusal(1, {"extract", file, "out.ply", "--extractor", extractor}, {file, "100663296 faces of voxels"});
+    expect_refusal(1, {"extract", file, "out.ply", "--extractor", extractor},
+                   {file, "100663296 faces of voxels"});
   expect_refusal(1, {"fracture", file, "out", "--cutters", "planes:1"}, {file, "100663296 faces of voxels"});
 }
 

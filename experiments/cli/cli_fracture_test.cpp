@@ -102,7 +102,8 @@ TEST_F(FractureTest, OtherMethods) {
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_GE(ledger().at("pieces").size(), 4u) << method;
     // Eq. 7.1 leaves polygons that bound nothing, so that the printed pieces' volume means less.
-    EXPECT_NEAR(ledger().at("pieces_volume").get<double>(), 8.0, method == std::string("openvdb") ? 0.2 : 0.8);
+    EXPECT_NEAR(ledger().at("pieces_volume").get<double>(), 8.0,
+                method == std::string("openvdb") ? 0.2 : 0.8);
     std::filesystem::remove_all(path("out"));
   }
 }
@@ -112,8 +113,8 @@ TEST_F(FractureTest, TheThesisTakesARuleAndAThreshold) {
   std::map<std::string, std::size_t> sizes;
   for (const std::string rule : {"printed", "repaired"})
     for (const std::string tolerance : {"0", "0.3"}) {
-      const Outcome outcome = fracture({"--cutters", "voronoi:4", "--method", "thesis", "--rule", rule, "--tolerance",
-                                        tolerance, "--no-picture"});
+      const Outcome outcome = fracture({"--cutters", "voronoi:4", "--method", "thesis", "--rule", rule,
+                                        "--tolerance", tolerance, "--no-picture"});
       ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
       EXPECT_EQ(ledger().at("rule"), rule);
       EXPECT_EQ(outcome.err.find("bound nothing") != std::string::npos, rule == "printed") << outcome.err;

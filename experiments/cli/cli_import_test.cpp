@@ -4,8 +4,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/io/import/files_for_tests.h"
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {
@@ -21,21 +21,23 @@ class ImportTest : public ProgramTest {
     const std::set<std::string> before = files();
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
-  // Notes may come before it.
-  EXPECT_NE(outcome.err.find("hermesh: "), std::string::npos);
-  EXPECT_EQ(outcome.err.find('\n', outcome.err.find("hermesh: ")), outcome.err.size() - 1) << outcome.err;
+    // Notes may come before it.
+    EXPECT_NE(outcome.err.find("hermesh: "), std::string::npos);
+    EXPECT_EQ(outcome.err.find('\n', outcome.err.find("hermesh: ")), outcome.err.size() - 1) << outcome.err;
     for (const std::string& word : words) EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
     EXPECT_EQ(files(), before);
   }
   Json judged(const std::string& mesh) { return Json::parse(run({"validate", mesh, "--json"}).out); }
 
-  /// A ball of radius 6.3 that the box's upper end in z cuts, as integers; 20 x 19 x 12 samples of 1 x 1 x 2 mm.
+  /// A ball of radius 6.3 that the box's upper end in z cuts, as integers; 20 x 19 x 12 samples of 1 x 1 x 2
+  /// mm.
   static NiftiBytes ball(bool big_endian = false) {
     std::vector<std::int16_t> values;
     for (int z = 0; z < 12; ++z)
       for (int y = 0; y < 19; ++y)
         for (int x = 0; x < 20; ++x)
-          values.push_back(static_cast<std::int16_t>(100 * (6.3 - std::hypot(x - 10.0, y - 9.0, 2.0 * z - 20.0))));
+          values.push_back(
+              static_cast<std::int16_t>(100 * (6.3 - std::hypot(x - 10.0, y - 9.0, 2.0 * z - 20.0))));
     return NiftiBytes(big_endian).dims({20, 19, 12}).type(4, 16).put<float>(88, 2.0f).samples(values);
   }
 };
@@ -59,7 +61,9 @@ TEST_F(ImportTest, NiftiToMeshClosedAndOpen) {
   for (const Eigen::Vector3d& point : mesh.points) highest = std::max(highest, point.z());
   EXPECT_NEAR(highest, 23.0, 1e-6);  // half a voxel of 2 mm beyond the sample at 22 mm
 
-  ASSERT_EQ(run({"extract", "ball.vdb", "open.ply", "--extractor", "marching-cubes", "--ends", "open"}).exit_code, 0);
+  ASSERT_EQ(
+      run({"extract", "ball.vdb", "open.ply", "--extractor", "marching-cubes", "--ends", "open"}).exit_code,
+      0);
   EXPECT_GT(judged("open.ply").at("boundary_edges"), 0);
   EXPECT_EQ(judged("open.ply").at("euler_characteristic"), 1);
   expect_refusal(2, {"extract", "ball.vdb", "out.ply", "--ends", "ajar"}, {"--ends", "ajar"});
@@ -69,8 +73,8 @@ TEST_F(ImportTest, RawIsTheSameVolume) {
   write_bytes(path("ball.nii"), ball().bytes());
   write_bytes(path("ball.raw"), ball().bytes());
   ASSERT_EQ(run({"import", "ball.nii", "a.vdb"}).exit_code, 0);
-  const Outcome raw = run({"import", "ball.raw", "b.vdb", "--dims", "20,19,12", "--type", "int16le", "--spacing", "1,1,2",
-                           "--offset", "352"});
+  const Outcome raw = run({"import", "ball.raw", "b.vdb", "--dims", "20,19,12", "--type", "int16le",
+                           "--spacing", "1,1,2", "--offset", "352"});
   ASSERT_EQ(raw.exit_code, 0) << raw.err;
   for (const char* name : {"a", "b"})
     ASSERT_EQ(run({"extract", name + std::string(".vdb"), name + std::string(".ply")}).exit_code, 0);
@@ -94,8 +98,10 @@ TEST_F(ImportTest, BadInputIsRefusedInASentence) {
   expect_refusal(2, {"import", "a.nii", "out.vdb", "--dims", "1,2,3"}, {"--type"});
   expect_refusal(2, {"import", "a.nii", "out.vdb", "--dims", "1,2", "--type", "int8"}, {"--dims", "1,2"});
   expect_refusal(2, {"import", "a.nii", "out.vdb", "--dims", "1,2,3", "--type", "int7"}, {"int7", "float64"});
-  expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "100000,100000,100000", "--type", "int8"}, {"a.nii", "too short"});
-  expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "2,2,2", "--type", "int8"}, {"a.nii", "goes on"});
+  expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "100000,100000,100000", "--type", "int8"},
+                 {"a.nii", "too short"});
+  expect_refusal(1, {"import", "a.nii", "out.vdb", "--dims", "2,2,2", "--type", "int8"},
+                 {"a.nii", "goes on"});
   expect_refusal(2, {"import", "nan.nii", "out.vdb", "--replace-nan", "1e39"},
                  {"--replace-nan", "single precision"});
   const Outcome replaced = run({"import", "nan.nii", "nan.vdb", "--replace-nan", "-5"});
@@ -113,9 +119,11 @@ TEST_F(ImportTest, AnIsovalueBeyondTheDataSaysSo) {
 
 TEST_F(ImportTest, AttributesOfTheVolumeReachTheMesh) {
   write("t.obj",
-        "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nvn -1 0 0\nvn 0 -1 0\nvn 0 0 -1\nvn 1 1 1\n"
+        "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nvn -1 0 0\nvn 0 -1 0\nvn 0 0 -1\nvn 1 1 "
+        "1\n"
         "usemtl clay\nf 1//3 3//3 2//3\nf 1//2 2//2 4//2\nusemtl tin\nf 1//1 4//1 3//1\nf 2//4 3//4 4//4\n");
-  ASSERT_EQ(run({"voxelize", "t.obj", "t.vdb", "--resolution", "30", "--grids", "sdf,attributes,closest-point,triangle-id"})
+  ASSERT_EQ(run({"voxelize", "t.obj", "t.vdb", "--resolution", "30", "--grids",
+                 "sdf,attributes,closest-point,triangle-id"})
                 .exit_code,
             0);
   const Outcome outcome = run({"extract", "t.vdb", "t.ply", "--attributes", "all"});
@@ -141,7 +149,8 @@ TEST_F(ImportTest, AttributesOfTheVolumeReachTheMesh) {
   EXPECT_EQ(read_mesh_file(path("one.ply"), context, {.attributes = true}).attributes.size(), 1u);
   expect_refusal(1, {"extract", "t.vdb", "out.ply", "--attributes", "warmth"}, {"warmth", "colour"});
   expect_refusal(2, {"extract", "t.vdb", "out.obj", "--attributes", "all"}, {"out.obj", "only .ply"});
-  expect_refusal(2, {"extract", "t.vdb", "out.ply", "--attributes", "colour,colour"}, {"--attributes", "colour twice"});
+  expect_refusal(2, {"extract", "t.vdb", "out.ply", "--attributes", "colour,colour"},
+                 {"--attributes", "colour twice"});
 }
 
 }  // namespace

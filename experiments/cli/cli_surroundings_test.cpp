@@ -1,5 +1,5 @@
-// What the program does to the files and streams around it: nothing is overwritten, followed or waited for that the user
-// did not ask for.
+// What the program does to the files and streams around it: nothing is overwritten, followed or waited for
+// that the user did not ask for.
 #include <fcntl.h>
 #include <pty.h>
 #include <unistd.h>
@@ -32,9 +32,9 @@ class SurroundingsTest : public ProgramTest {
 
 TEST_F(SurroundingsTest, ClosedStreamsAreErrors) {
   write_sphere();
-  for (const char* script :
-       {"$H remesh - out.off --resolution 8 <&-", "$H validate - <&-", "$H remesh sphere.off - --resolution 8 >&-",
-        "$H info sphere.off >&-", "$H remesh - - --resolution 8 <&- >&-"}) {
+  for (const char* script : {"$H remesh - out.off --resolution 8 <&-", "$H validate - <&-",
+                             "$H remesh sphere.off - --resolution 8 >&-", "$H info sphere.off >&-",
+                             "$H remesh - - --resolution 8 <&- >&-"}) {
     const Outcome outcome = run_shell(std::string("timeout 20 ") + script);
     EXPECT_EQ(outcome.exit_code, 1) << script << outcome.err;
     EXPECT_NE(outcome.err, "") << script;
@@ -64,8 +64,8 @@ TEST_F(SurroundingsTest, LogAndReportAreNoFilesOfTheCommand) {
   expect_usage_error(with(remesh, {"--log", "x.json", "--json=x.json"}));
   expect_usage_error({"--log", "cube.off", "validate", "sphere.off", "--reference", "cube.off"});
   expect_usage_error({"validate", "sphere.off", "cube.off", "--log", "cube.off"});
-  expect_usage_error({"fracture", "sphere.off", "pieces", "--resolution", "8", "--cutters", "mesh:cube.off", "--log",
-                      "cube.off"});
+  expect_usage_error({"fracture", "sphere.off", "pieces", "--resolution", "8", "--cutters", "mesh:cube.off",
+                      "--log", "cube.off"});
   expect_usage_error({"run", "sphere.off", "--log", "sphere.off"});
   // A log of earlier runs is continued.
   for (int i = 0; i < 2; ++i)
@@ -84,37 +84,46 @@ TEST_F(SurroundingsTest, InputsAreOverwrittenOnRequestOnly) {
   expect_usage_error({"remesh", "sphere.off", "--out-dir", ".", "--pattern", "{name}", "--resolution", "8"});
   expect_usage_error({"remesh", "sphere.off", "--out-dir", "out", "--resolution", "8", "--overwrite-input"});
   ASSERT_EQ(run({"remesh", "sphere.off", "out.off", "--resolution", "8"}).exit_code, 0);
-  EXPECT_EQ(run({"remesh", "sphere.off", "sphere.off", "--resolution", "8", "--overwrite-input"}).exit_code, 0);
+  EXPECT_EQ(run({"remesh", "sphere.off", "sphere.off", "--resolution", "8", "--overwrite-input"}).exit_code,
+            0);
   EXPECT_EQ(read("sphere.off"), read("out.off"));
-  EXPECT_EQ(run({"combine", "union", "sphere.off", "cube.off", "cube.off", "--resolution", "8", "--overwrite-input"})
+  EXPECT_EQ(run({"combine", "union", "sphere.off", "cube.off", "cube.off", "--resolution", "8",
+                 "--overwrite-input"})
                 .exit_code,
             0);
 }
 
 TEST_F(SurroundingsTest, JsonIsValidWhateverBytesAFileNameHas) {
   write_cube();
-  const std::string name = "K\xe4" "fer\xff.off";
+  const std::string name =
+      "K\xe4"
+      "fer\xff.off";
   std::filesystem::rename(path("cube.off"), path(name));
   for (const Arguments& arguments :
        {Arguments{"fracture", name, "out", "--resolution", "8", "--cutters", "mesh:" + name, "--no-picture"},
         {"fracture", name, "two", "--resolution", "8", "--cutters", "voronoi:2", "--no-picture", "--judge"},
-        {"remesh", name, "out.ply", "--resolution", "8"}, {"voxelize", name, "out.vdb", "--resolution", "8"},
-        {"combine", "union", name, name, "out.ply", "--resolution", "8"}, {"info", name},
-        {"validate", name, "--reference", name}, {"validate", "K\xe4"}}) {
+        {"remesh", name, "out.ply", "--resolution", "8"},
+        {"voxelize", name, "out.vdb", "--resolution", "8"},
+        {"combine", "union", name, name, "out.ply", "--resolution", "8"},
+        {"info", name},
+        {"validate", name, "--reference", name},
+        {"validate", "K\xe4"}}) {
     Arguments with_json = arguments;
     with_json.push_back("--json");
     const Outcome outcome = run(with_json);
     EXPECT_TRUE(outcome.exit_code == 0 || arguments[1] == "K\xe4") << arguments[0] << outcome.err;
     EXPECT_TRUE(Json::accept(outcome.out)) << arguments[0] << outcome.out << outcome.err;
   }
-  for (const char* folder : {"out", "two"}) EXPECT_TRUE(Json::accept(read(std::string(folder) + "/pieces.json")));
+  for (const char* folder : {"out", "two"})
+    EXPECT_TRUE(Json::accept(read(std::string(folder) + "/pieces.json")));
 }
 
 /// Box of 2 × 3 × 4 millimetres, `shift` from the origin.
 std::string small_box(double shift) {
   std::string text = "OFF\n8 6 0\n";
   for (int corner = 0; corner < 8; ++corner)
-    text += std::to_string(shift + (corner & 1 ? 2 : 0)) + " " + std::to_string(shift + (corner & 2 ? 3 : 0)) + " " +
+    text += std::to_string(shift + (corner & 1 ? 2 : 0)) + " " +
+            std::to_string(shift + (corner & 2 ? 3 : 0)) + " " +
             std::to_string(shift + (corner & 4 ? 4 : 0)) + "\n";
   return text + "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n";
 }
@@ -139,7 +148,8 @@ TEST_F(SurroundingsTest, AnObjectSmallerThanAVoxelIsRefusedWhereverItLies) {
 
 TEST_F(SurroundingsTest, UnitsAreStatedWhereTheFormatHasThem) {
   write("box.off", small_box(0.0));
-  for (const Arguments& command : {Arguments{"remesh", "box.off"}, {"combine", "union", "box.off", "box.off"}}) {
+  for (const Arguments& command :
+       {Arguments{"remesh", "box.off"}, {"combine", "union", "box.off", "box.off"}}) {
     Arguments arguments = command;
     arguments.insert(arguments.end(), {"out.3mf", "--resolution", "20", "--units", "mm"});
     ASSERT_EQ(run(arguments).exit_code, 0);
@@ -195,7 +205,8 @@ TEST(TerminalProgressTest, IsNeverSilent) {
   fcntl(terminal, F_SETFL, O_NONBLOCK);
   std::string sent;
   char buffer[4096];
-  for (ssize_t size; (size = ::read(terminal, buffer, sizeof buffer)) > 0;) sent.append(buffer, std::size_t(size));
+  for (ssize_t size; (size = ::read(terminal, buffer, sizeof buffer)) > 0;)
+    sent.append(buffer, std::size_t(size));
   close(terminal);
   int lines = 0;
   for (std::size_t at = 0; (at = sent.find("work  25 %", at)) != std::string::npos; ++at) ++lines;

@@ -28,7 +28,8 @@ bool contains(const std::vector<std::string>& all, const std::string& name) {
 TEST_F(CliTest, EveryCommandHasHelp) {
   const Outcome overview = run({"--help"});
   EXPECT_EQ(overview.exit_code, 0);
-  for (const char* command : {"list", "voxelize", "import", "extract", "remesh", "combine", "validate", "info", "run", "report", "compare", "accept"}) {
+  for (const char* command : {"list", "voxelize", "import", "extract", "remesh", "combine", "validate",
+                              "info", "run", "report", "compare", "accept"}) {
     SCOPED_TRACE(command);
     EXPECT_NE(overview.out.find(command), std::string::npos);
     const Outcome help = run({command, "--help"});
@@ -110,9 +111,10 @@ TEST_F(CliTest, VoxelizeAndExtractGiveWhatRemeshGives) {
   ASSERT_EQ(run({"remesh", "sphere.off", "one.ply", "--resolution", "20", "--extractor", "marching-cubes"})
                 .exit_code,
             0);
-  ASSERT_EQ(run({"remesh", "sphere.off", "remeshed.ply", "--resolution", "20", "--extractor", "dual-contouring"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      run({"remesh", "sphere.off", "remeshed.ply", "--resolution", "20", "--extractor", "dual-contouring"})
+          .exit_code,
+      0);
   EXPECT_EQ(read("one.ply"), read("two.ply"));
   EXPECT_EQ(read("exact.ply"), read("remeshed.ply"));
 
@@ -209,7 +211,8 @@ std::string boxes_obj(const std::vector<std::pair<double, double>>& heights) {
     for (const double z : {from, to})
       for (const int y : {0, 10})
         for (const int x : {0, 10}) file << "v " << x << ' ' << y << ' ' << z << '\n';
-    for (const auto& face : {std::array{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
+    for (const auto& face :
+         {std::array{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
       file << 'f';
       for (const int corner : face) file << ' ' << base + corner;
       file << '\n';
@@ -247,9 +250,11 @@ TEST_F(CliTest, AWatertightMeshOfAnotherSolidDoesNotMeetTheRequirement) {
     EXPECT_EQ(bad.exit_code, 3) << word;
     EXPECT_NE(bad.out.find("does not bound the reference's solid"), std::string::npos) << bad.out;
     EXPECT_NE(bad.out.find("Required but not met: solid."), std::string::npos) << bad.out;
-    EXPECT_EQ(run({"validate", "one.obj", "--reference", "reference.obj", "--require", word}).exit_code, 0) << word;
+    EXPECT_EQ(run({"validate", "one.obj", "--reference", "reference.obj", "--require", word}).exit_code, 0)
+        << word;
   }
-  const Json report = Json::parse(run({"validate", "three.obj", "--reference", "reference.obj", "--json"}).out);
+  const Json report =
+      Json::parse(run({"validate", "three.obj", "--reference", "reference.obj", "--json"}).out);
   EXPECT_EQ(report.at("solid").at("verdict"), "differs");
   EXPECT_EQ(report.at("solid").at("mesh_components"), 3);
   EXPECT_EQ(report.at("solid").at("reference_components"), 1);
@@ -269,13 +274,15 @@ TEST_F(CliTest, WatertightIncludesOriented) {
   EXPECT_EQ(Json::parse(outcome.out).at("watertight"), false);
 }
 
-/// Twenty beads on a string that is thinner than a voxel and lies between samples: one component, of which twenty are left.
+/// Twenty beads on a string that is thinner than a voxel and lies between samples: one component, of which
+/// twenty are left.
 TEST_F(CliTest, ManyNewComponentsAreANote) {
   std::string points, faces;
   int rings = 0;
   const auto ring = [&](double x, double half) {
     for (const auto& [y, z] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
-      points += std::to_string(x) + " " + std::to_string(0.1 + half * y) + " " + std::to_string(0.1 + half * z) + "\n";
+      points += std::to_string(x) + " " + std::to_string(0.1 + half * y) + " " +
+                std::to_string(0.1 + half * z) + "\n";
     const int a = 4 * rings++;
     for (int i = 0; i < 4 && a > 0; ++i)
       faces += "4 " + std::to_string(a + i) + " " + std::to_string(a - 4 + i) + " " +
@@ -290,8 +297,10 @@ TEST_F(CliTest, ManyNewComponentsAreANote) {
   const Outcome outcome =
       run({"remesh", "beads.off", "out.ply", "--voxel-size", "0.23", "--thin", "drop", "--max-loss", "100%"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("note: the mesh has 20 components and the polygons have 1:"), std::string::npos) << outcome.err;
-  EXPECT_EQ(run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.2"}).err.find("components"), std::string::npos);
+  EXPECT_NE(outcome.err.find("note: the mesh has 20 components and the polygons have 1:"), std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.2"}).err.find("components"),
+            std::string::npos);
 }
 
 TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
@@ -332,11 +341,15 @@ TEST_F(CliTest, MuchThatIsLostIsNotMet) {
         "0 0 1.53\n1 0 1.53\n1 1 1.53\n0 1 1.53\n0 0 1.56\n1 0 1.56\n1 1 1.56\n0 1 1.56\n"
         "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
         "4 11 10 9 8\n4 12 13 14 15\n4 8 9 13 12\n4 9 10 14 13\n4 10 11 15 14\n4 11 8 12 15\n");
-  const Outcome dropped = run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--json"});
+  const Outcome dropped =
+      run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--json"});
   EXPECT_EQ(dropped.exit_code, 3) << dropped.err;
   // The fin has two of eight squares, and its four sides.
   EXPECT_NEAR(Json::parse(dropped.out).at("result").at("visible_loss").get<double>(), 2.12 / 8.12, 0.02);
-  EXPECT_EQ(run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--max-loss", "30%"}).exit_code, 0);
+  EXPECT_EQ(
+      run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--max-loss", "30%"})
+          .exit_code,
+      0);
   EXPECT_EQ(run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--max-loss", "1%"}).exit_code, 0);
 }
 

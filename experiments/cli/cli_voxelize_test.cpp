@@ -60,7 +60,8 @@ TEST_F(VoxelizeTest, AllGridsInOneFileAndHermiteBesideIt) {
   EXPECT_EQ(run({"extract", "out.vdb", "out.ply"}).exit_code, 0);
 }
 
-/// All outputs that §5.1 of the thesis names come from its own voxelizer, too, with the triangles of its own band.
+/// All outputs that §5.1 of the thesis names come from its own voxelizer, too, with the triangles of its own
+/// band.
 TEST_F(VoxelizeTest, TheThesisMakesAllGrids) {
   write_tetrahedron();
   const Outcome outcome = voxelize("t.obj", {"--grids", kAllGrids, "--voxelizer", "thesis"});
@@ -75,7 +76,8 @@ TEST_F(VoxelizeTest, TheThesisMakesAllGrids) {
                   .exit_code,
               0)
         << option;
-  expect_refusal(1, {"--grids", "fog", "--voxelizer", "thesis", "--signs", "unsigned"}, {"fog", "sign"}, "t.obj");
+  expect_refusal(1, {"--grids", "fog", "--voxelizer", "thesis", "--signs", "unsigned"}, {"fog", "sign"},
+                 "t.obj");
   expect_refusal(2, {"--voxelizer", "thesis", "--signs", "unsigned", "--voxelizer-option", "clean_up=false"},
                  {"clean_up", "signs"}, "t.obj");
 }
@@ -102,8 +104,7 @@ TEST_F(VoxelizeTest, SameBytesForEveryNumberOfThreads) {
   for (const char* threads : {"1", "2"}) {
     ASSERT_EQ(voxelize("t.obj", {"--grids", kAllGrids, "--threads", threads}).exit_code, 0);
     written.emplace_back();
-    for (const char* file : {"out.vdb", "out.hermite.vdb"})
-      written.back() += read(file);
+    for (const char* file : {"out.vdb", "out.hermite.vdb"}) written.back() += read(file);
   }
   EXPECT_TRUE(written[0] == written[1]);
 }
@@ -208,7 +209,8 @@ TEST_F(VoxelizeTest, ListShowsTheOptionsOfVoxelizers) {
   EXPECT_EQ(hermesh->at("ours"), true);
   EXPECT_EQ(hermesh->at("options").at(0).at("name"), "signs");
   EXPECT_EQ(hermesh->at("options").at(0).at("default"), "auto");
-  EXPECT_NE(run({"list"}).out.find("--voxelizer-option signs=auto (auto|auto-sheets|flood-fill|winding-number|unsigned)"),
+  EXPECT_NE(run({"list"}).out.find(
+                "--voxelizer-option signs=auto (auto|auto-sheets|flood-fill|winding-number|unsigned)"),
             std::string::npos);
 }
 

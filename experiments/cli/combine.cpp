@@ -3,10 +3,10 @@
 #include <iostream>
 #include <memory>
 
-#include "algorithms/io/mesh_file.h"
-#include "algorithms/io/written_precision.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/written_precision.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/extracting.h"
 #include "experiments/cli/format.h"
@@ -59,7 +59,8 @@ SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const Sha
   return solid;
 }
 
-/// Refuses a result without a sample. @throws Error that tells a result that is empty from one that is too thin.
+/// Refuses a result without a sample. @throws Error that tells a result that is empty from one that is too
+/// thin.
 void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const CombineArguments& arguments,
                      double voxel_size) {
   if (!result.hermite.leaves.empty()) return;
@@ -70,8 +71,8 @@ void check_not_empty(const CombinedSolid& result, const LostSlivers& lost, const
               " is empty, nothing was written: no sample and no edge of the lattice lies in it");
 }
 
-PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen, const CombineArguments& arguments,
-                    Session& session) {
+PolygonMesh contour(const CombinedSolid& solid, const ChosenExtractor& chosen,
+                    const CombineArguments& arguments, Session& session) {
   const Stopwatch watch;
   PolygonMesh mesh = extract(solid.level_set, nullptr,
                              {.chosen = chosen,
@@ -145,7 +146,8 @@ void add_combine(CLI::App& app, Session& session) {
   command->add_option("A", arguments->first, kMeshIn)->required();
   command->add_option("B", arguments->second, kMeshIn)->required();
   command->add_option("OUT", arguments->out, kMeshOut)->required();
-  add_files(*command, session, {.inputs = {&arguments->first, &arguments->second}, .output = &arguments->out});
+  add_files(*command, session,
+            {.inputs = {&arguments->first, &arguments->second}, .output = &arguments->out});
   add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option("--resolution")->description("Voxels along the longest side of the larger solid");

@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "algorithms/extraction/explain.h"
+#include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
-#include "algorithms/extraction/volume_attributes.h"
 #include "experiments/cli/adaptivity.h"
 #include "experiments/cli/bounded.h"
 #include "experiments/cli/cli11.h"
@@ -45,7 +45,8 @@ std::vector<std::string> attribute_names(const std::string& list) {
   std::vector<std::string> names;
   std::istringstream stream(list);
   for (std::string name; std::getline(stream, name, ',');) {
-    if (std::ranges::find(names, name) != names.end()) throw UsageError("--attributes names " + name + " twice");
+    if (std::ranges::find(names, name) != names.end())
+      throw UsageError("--attributes names " + name + " twice");
     names.push_back(name);
   }
   return names;
@@ -53,9 +54,10 @@ std::vector<std::string> attribute_names(const std::string& list) {
 
 /// The volume's mesh by the chosen extractor; messages name `paths.in`.
 PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
-                    const FloatHermite* hermite, const ChosenExtractor& chosen, const ExtractArguments& arguments,
-                    Session& session) {
-  const std::optional<AdaptivityField> field = read_adaptivity(arguments.adaptivity, chosen.extractor, session);
+                    const FloatHermite* hermite, const ChosenExtractor& chosen,
+                    const ExtractArguments& arguments, Session& session) {
+  const std::optional<AdaptivityField> field =
+      read_adaptivity(arguments.adaptivity, chosen.extractor, session);
   const std::string& input = paths.in;
   check_written_precision(paths.out, level_set);
   const Stopwatch watch;
@@ -78,8 +80,8 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
     throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
   if (mesh.empty())
-    throw Error("'" + input + "': " +
-                no_surface(level_set, arguments.isovalue, source || hermite, chosen.extractor.name));
+    throw Error("'" + input +
+                "': " + no_surface(level_set, arguments.isovalue, source || hermite, chosen.extractor.name));
   if (const std::string note = ends_note(ended.ends, treatment); !note.empty()) session.context.note(note);
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
   return mesh;
@@ -96,7 +98,8 @@ int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& 
     source = read_polygons(arguments.source, session);
   }
   const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  PolygonMesh mesh = extract(paths, level_set, source ? &*source : nullptr, nullptr, chosen, arguments, session);
+  PolygonMesh mesh =
+      extract(paths, level_set, source ? &*source : nullptr, nullptr, chosen, arguments, session);
   if (!attributes.empty()) {
     std::string line = "attributes";
     for (const std::string& name : sample_attributes(mesh, paths.in, attributes, session.context))
@@ -121,8 +124,9 @@ PolygonMesh remesh_all(const Paths& paths, const PolygonMesh& mesh, const Voxeli
                        const ChosenExtractor& chosen, Session& session) {
   const PolygonSolid made = sample_polygons(mesh, paths.in, voxelizing, voxelizer, session);
   if (made.thin && chosen.options.is("crossings", "exact"))
-    throw UsageError("-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
-                     "--thin drop");
+    throw UsageError(
+        "-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
+        "--thin drop");
   const Options& options = chosen.options;
   if (!made.thin &&
       (options.is("hermite", "auto") || options.is("hermite", "exact") || options.is("crossings", "exact")))
@@ -138,7 +142,8 @@ double most_loss(const std::string& text, ThinRule rule) {
   if (text.empty()) return rule == ThinRule::drop ? 0.01 : 1.0;
   double percent = 0.0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), percent);
-  if (failure != std::errc() || std::string(end, text.data() + text.size()) != "%" || !(percent >= 0.0 && percent <= 100.0))
+  if (failure != std::errc() || std::string(end, text.data() + text.size()) != "%" ||
+      !(percent >= 0.0 && percent <= 100.0))
     throw UsageError("--max-loss must be a percentage such as 1%, not '" + text + "'");
   return percent / 100.0;
 }
@@ -158,10 +163,12 @@ int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const Ex
   note_components(mesh, made, session);
   // Other isovalues, and parts that a mask leaves out, are not meant to show the polygons.
   const bool is_of_polygons = extracting.isovalue == 0.0 && extracting.adaptivity.mask.empty() &&
-                              extracting.adaptivity.frustum.empty() && !voxelizer.options.is("signs", "unsigned");
+                              extracting.adaptivity.frustum.empty() &&
+                              !voxelizer.options.is("signs", "unsigned");
   const bool shows =
       !is_of_polygons ||
-      check_visible_loss(mesh, made, *recipe_of(mesh, paths.in, voxelizing, voxelizer).voxel_size, max_loss, session);
+      check_visible_loss(mesh, made, *recipe_of(mesh, paths.in, voxelizing, voxelizer).voxel_size, max_loss,
+                         session);
   save(paths.out, made, session);
   return shows ? kDone : kNotMet;
 }
@@ -178,8 +185,8 @@ void add_conversions(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<Arguments>();
 
   CLI::App* command = add_command(app, session, "extract", "A volume to a mesh");
-  add_paths(*command, session, arguments->paths, "Volume: .vdb, or - for the standard input", FileKind::volume, kMeshOut,
-            FileKind::mesh, true);
+  add_paths(*command, session, arguments->paths, "Volume: .vdb, or - for the standard input",
+            FileKind::volume, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
   add_extract_options(*command, arguments->extracting, "dual-contouring");
   command->add_option("--grid,--grid-name", arguments->extracting.grid,
@@ -188,11 +195,13 @@ void add_conversions(CLI::App& app, Session& session) {
                       "Mesh that the volume was made from, for extractors that want exact Hermite data");
   command
       ->add_option("--ends", arguments->extracting.ends,
-                   "Where the surface runs into the end of the data: closed (the default), a flat cap half a voxel beyond "
+                   "Where the surface runs into the end of the data: closed (the default), a flat cap half a "
+                   "voxel beyond "
                    "the last samples, or open, cut off at these")
       ->check(CLI::IsMember({"closed", "open"}));
-  command->add_option("--attributes", arguments->extracting.attributes,
-                      "Grids of the volume, separated by commas, or all: sampled at the mesh's points, for .ply");
+  command->add_option(
+      "--attributes", arguments->extracting.attributes,
+      "Grids of the volume, separated by commas, or all: sampled at the mesh's points, for .ply");
   command->callback([arguments, &session] {
     session.command = [arguments, &session] {
       return run_extract(arguments->paths, arguments->extracting, session);
@@ -205,9 +214,10 @@ void add_conversions(CLI::App& app, Session& session) {
   add_json_option(*command, session);
   CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
   add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
-  command->add_option("--max-loss", arguments->extracting.max_loss,
-                      "Exit with 3 if more of the visible surface than this is lost, such as 1% (default: no limit, or 1% "
-                      "with --thin drop)");
+  command->add_option(
+      "--max-loss", arguments->extracting.max_loss,
+      "Exit with 3 if more of the visible surface than this is lost, such as 1% (default: no limit, or 1% "
+      "with --thin drop)");
   add_bound_options(*command, *size, arguments->bound);
   command->callback([arguments, command, &session] {
     session.command = [arguments, command, &session] {

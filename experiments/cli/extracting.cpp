@@ -77,8 +77,8 @@ void write_output(const std::string& path, const PolygonMesh& mesh, Session& ses
   (session.units.empty() ? write_mesh : write_mesh_in_metres)(path, mesh, session.context);
 }
 
-bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size, double max_loss,
-                        Session& session) {
+bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size,
+                        double max_loss, Session& session) {
   constexpr std::int64_t kSamples = 4'000;
   const MeshFile model = to_mesh_file(polygons), file = to_mesh_file(mesh);
   const validation::VisibleLoss loss = validation::measure_visible_loss(
@@ -95,8 +95,9 @@ bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, do
   // Single samples at edges may be wrong.
   constexpr double kNoticeable = 1e-3;
   if (loss.lost.value >= kNoticeable)
-    session.context.note(interval(loss.lost) + " of the visible surface is not shown within half a voxel" +
-                         (loss.filled.value > 0.0 ? ", of it " + percent(loss.filled.value) + " where gaps are filled" : ""));
+    session.context.note(
+        interval(loss.lost) + " of the visible surface is not shown within half a voxel" +
+        (loss.filled.value > 0.0 ? ", of it " + percent(loss.filled.value) + " where gaps are filled" : ""));
   if (loss.invented.value >= kNoticeable)
     session.context.note(interval(loss.invented) + " of the mesh, an area of " + text(loss.invented_area) +
                          ", is farther than a voxel from all polygons, as where holes are closed");

@@ -57,7 +57,8 @@ void draw_picture(const std::filesystem::path& made, Session& session) {
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
 
 /// Reads the object to break; its polygons, if it has any, are kept in `source`.
-FractureObject read_object(const FractureArguments& arguments, std::optional<PolygonMesh>& source, Session& session) {
+FractureObject read_object(const FractureArguments& arguments, std::optional<PolygonMesh>& source,
+                           Session& session) {
   FractureObject object;
   const bool sized = arguments.voxelizing.voxel_size || arguments.voxelizing.resolution;
   if (is_volume(arguments.paths.in)) {
@@ -86,7 +87,8 @@ nlohmann::ordered_json head_of(const FractureArguments& arguments, const Fractur
   return {{"object", std::filesystem::path(arguments.paths.in).filename().string()},
           {"method", arguments.method.name},
           {"tolerance", arguments.method.tolerance},
-          {"rule", arguments.method.name == "thesis" ? nlohmann::ordered_json(arguments.rule) : nlohmann::ordered_json()},
+          {"rule", arguments.method.name == "thesis" ? nlohmann::ordered_json(arguments.rule)
+                                                     : nlohmann::ordered_json()},
           {"cutters_given", without_folders(arguments.cutters)},
           {"seed", arguments.choices.seed},
           {"voxel_size", object.level_set.voxel_size()},
@@ -137,8 +139,9 @@ bool report_ledger(const validation::FractureLedger& ledger, const FractureSumma
                    Session& session) {
   std::vector<std::string> lines = ledger.sentences();
   for (const std::string& place : ledger.places) lines.push_back("  " + place);
-  lines.push_back("original surface: " + std::to_string(ledger.rest_triangles) + " triangles, volume " + text(ledger.rest_volume) +
-                  "; the pieces' volumes differ from it by " + text(ledger.volume_difference()) + " of it" +
+  lines.push_back("original surface: " + std::to_string(ledger.rest_triangles) + " triangles, volume " +
+                  text(ledger.rest_volume) + "; the pieces' volumes differ from it by " +
+                  text(ledger.volume_difference()) + " of it" +
                   (ledger.expected_difference
                        ? ", and from the uncut mesh's by " + text(*ledger.expected_difference) + " of that"
                        : ""));
@@ -156,10 +159,13 @@ bool report_ledger(const validation::FractureLedger& ledger, const FractureSumma
 }
 
 /// Refuses options that were given and that nothing would look at. @throws UsageError
-void refuse_idle_options(const FractureArguments& arguments, const CutterSpec& spec, const CLI::App& command) {
+void refuse_idle_options(const FractureArguments& arguments, const CutterSpec& spec,
+                         const CLI::App& command) {
   using Kind = CutterSpec::Kind;
   if (is_volume(arguments.paths.in))
-    refuse_idle(command, {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band", "--scale", "--units"},
+    refuse_idle(command,
+                {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band",
+                 "--scale", "--units"},
                 "'" + arguments.paths.in + "' has voxels already");
   else
     refuse_idle(command, {"--grid"}, "'" + arguments.paths.in + "' has polygons, no grids");
@@ -187,7 +193,8 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
     arguments.choices.impact = Eigen::Vector3d(arguments.impact[0], arguments.impact[1], arguments.impact[2]);
   if (arguments.rule == "repaired") arguments.method.rule = ThesisFractureOptions::Rule::repaired;
   arguments.method.options.split = !arguments.no_split;
-  arguments.method.options.placement.linear_crossings = arguments.hermite == "level-set" || is_volume(arguments.paths.in);
+  arguments.method.options.placement.linear_crossings =
+      arguments.hermite == "level-set" || is_volume(arguments.paths.in);
   arguments.method.options.least_samples = static_cast<std::uint64_t>(arguments.least_volume);
   { const AtomicFolder reserved(arguments.paths.out); }
   if (!arguments.density.empty())
@@ -250,10 +257,13 @@ void add_fracture(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<FractureArguments>();
   CLI::App* command =
       add_command(app, session, "fracture", "Break a solid into pieces that fit without a gap");
-  add_paths(*command, session, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb", FileKind::mesh_or_volume,
-            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty", FileKind::folder);
+  add_paths(*command, session, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb",
+            FileKind::mesh_or_volume,
+            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty",
+            FileKind::folder);
   add_json_option(*command, session);
-  command->add_option("--grid,--grid-name", arguments->grid, "Name of the grid of a .vdb (default: sdf, or the only scalar grid there is)");
+  command->add_option("--grid,--grid-name", arguments->grid,
+                      "Name of the grid of a .vdb (default: sdf, or the only scalar grid there is)");
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option_group(kSizeGroup)->require_option(0, 1);
   add_cutter_options(*command, *arguments);
@@ -262,14 +272,17 @@ void add_fracture(CLI::App& app, Session& session) {
   command
       ->add_option(
           "--tolerance", arguments->method.tolerance,
-          "labelled: how far the pieces may be from their finest meshes, in voxels, or less where more than 1 % "
-          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge while "
+          "labelled: how far the pieces may be from their finest meshes, in voxels, or less where more than "
+          "1 % "
+          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge "
+          "while "
           "the sum of their squared distances to all planes is below its square; openvdb: its adaptivity "
           "(default: 0, nothing is merged)")
       ->check(finite_number());
   command
       ->add_option("--rule", arguments->rule,
-                   "thesis: printed combines 10-byte voxels by eq. 7.1; repaired combines exact data by signs (default: "
+                   "thesis: printed combines 10-byte voxels by eq. 7.1; repaired combines exact data by "
+                   "signs (default: "
                    "printed)")
       ->check(CLI::IsMember({"printed", "repaired"}));
   command

@@ -32,9 +32,11 @@ std::array<T, 3> three_numbers(const std::string& option, const std::string& giv
   const char* const end = at + given.size();
   for (std::size_t i = 0; i < 3; ++i) {
     const auto [stop, status] = std::from_chars(at, end, numbers[i]);
-    const bool good = status == std::errc() && numbers[i] > 0 && (i < 2 ? stop != end && *stop == ',' : stop == end);
+    const bool good =
+        status == std::errc() && numbers[i] > 0 && (i < 2 ? stop != end && *stop == ',' : stop == end);
     if (!good || !std::isfinite(double(numbers[i])))
-      throw UsageError(option + " must be three numbers above 0 with commas between them, such as 256,256,108, not '" +
+      throw UsageError(option +
+                       " must be three numbers above 0 with commas between them, such as 256,256,108, not '" +
                        given + "'");
     at = stop + 1;
   }
@@ -42,7 +44,8 @@ std::array<T, 3> three_numbers(const std::string& option, const std::string& giv
 }
 
 RawLayout raw_layout(const ImportArguments& arguments, Session& session) {
-  if (!arguments.type) throw UsageError("--dims makes the input raw samples: say of which --type, such as int16le");
+  if (!arguments.type)
+    throw UsageError("--dims makes the input raw samples: say of which --type, such as int16le");
   RawLayout layout;
   layout.dims = three_numbers<std::int64_t>("--dims", *arguments.dims);
   layout.format = as_usage([&] { return parse_sample_format(*arguments.type); });
@@ -59,9 +62,10 @@ void check_nifti(const ImportArguments& arguments) {
   if (arguments.type || arguments.spacing || arguments.offset != 0)
     throw UsageError("--type, --spacing and --offset are about raw samples: give their --dims, too");
   if (!is_nifti_path(arguments.paths.in))
-    throw UsageError("cannot tell what '" + arguments.paths.in +
-                     "' is: its name ends neither in .nii, .hdr nor .img (.gz may follow); for raw samples give --dims, "
-                     "--type and --spacing");
+    throw UsageError(
+        "cannot tell what '" + arguments.paths.in +
+        "' is: its name ends neither in .nii, .hdr nor .img (.gz may follow); for raw samples give --dims, "
+        "--type and --spacing");
 }
 
 int run_import(const ImportArguments& arguments, Session& session) {
@@ -99,17 +103,24 @@ int run_import(const ImportArguments& arguments, Session& session) {
 
 void add_import(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<ImportArguments>();
-  CLI::App* command = add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
-  add_paths(*command, session, arguments->paths,
-            "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input", FileKind::imported,
-            "Volume: .vdb, the grid `volume` in millimetres, or - for the standard output", FileKind::volume);
+  CLI::App* command =
+      add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
+  add_paths(
+      *command, session, arguments->paths,
+      "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input",
+      FileKind::imported, "Volume: .vdb, the grid `volume` in millimetres, or - for the standard output",
+      FileKind::volume);
   add_json_option(*command, session);
-  command->add_option("--frame", arguments->frame, "Which of a NIfTI file's volumes, from 0 (default: the first)");
-  command->add_option("--dims", arguments->dims, "Raw: X,Y,Z, the numbers of samples; x is fastest in the file");
-  command->add_option("--type", arguments->type,
-                      "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le "
-                      "(the default) or be behind");
-  command->add_option("--spacing", arguments->spacing, "Raw: A,B,C, the distances of samples in mm (default: 1,1,1)");
+  command->add_option("--frame", arguments->frame,
+                      "Which of a NIfTI file's volumes, from 0 (default: the first)");
+  command->add_option("--dims", arguments->dims,
+                      "Raw: X,Y,Z, the numbers of samples; x is fastest in the file");
+  command->add_option(
+      "--type", arguments->type,
+      "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le "
+      "(the default) or be behind");
+  command->add_option("--spacing", arguments->spacing,
+                      "Raw: A,B,C, the distances of samples in mm (default: 1,1,1)");
   command->add_option("--offset", arguments->offset, "Raw: bytes before the first sample (default: 0)")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000'000'000}));
   command

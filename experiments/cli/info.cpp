@@ -3,10 +3,10 @@
 #include <iostream>
 #include <memory>
 
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/core/shown.h"
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/hermite/hermite_file.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/io/vdb_file.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/format.h"
 #include "experiments/cli/pipeline/json_report.h"
@@ -47,7 +47,10 @@ void print_mesh(const std::filesystem::path& path, Session& session) {
 }
 
 Json to_json(const GridSummary& grid) {
-  Json json = {{"name", grid.name}, {"type", grid.value_type}, {"class", grid.grid_class}, {"voxel_size", grid.voxel_size}};
+  Json json = {{"name", grid.name},
+               {"type", grid.value_type},
+               {"class", grid.grid_class},
+               {"voxel_size", grid.voxel_size}};
   if (!grid.is_read) return json;
   json["voxels"] = grid.active_voxels;
   json["memory_bytes"] = grid.memory_bytes;
@@ -80,14 +83,18 @@ void print_grid(const GridSummary& grid) {
 void print_hermite(const std::filesystem::path& path, Session& session) {
   const HermiteSummary hermite = summary_of(read_hermite(path, session.context));
   made(session, "hermite",
-       {{"representation", hermite.representation}, {"normal_code", hermite.normal_code}, {"crossings", hermite.crossings},
-        {"leaves", hermite.leaves}, {"memory_bytes", hermite.memory_bytes}});
+       {{"representation", hermite.representation},
+        {"normal_code", hermite.normal_code},
+        {"crossings", hermite.crossings},
+        {"leaves", hermite.leaves},
+        {"memory_bytes", hermite.memory_bytes}});
   if (session.json) return;
-  std::cout << "Hermite data\n  voxels       " << hermite.representation << "\n  normals      " << hermite.normal_code
-            << "\n  crossings    " << hermite.crossings << ", in " << hermite.leaves << " leaves\n  memory       "
-            << hermite.memory_bytes << " bytes";
+  std::cout << "Hermite data\n  voxels       " << hermite.representation << "\n  normals      "
+            << hermite.normal_code << "\n  crossings    " << hermite.crossings << ", in " << hermite.leaves
+            << " leaves\n  memory       " << hermite.memory_bytes << " bytes";
   if (hermite.crossings > 0)
-    std::cout << ", " << text(static_cast<double>(hermite.memory_bytes) / static_cast<double>(hermite.crossings))
+    std::cout << ", "
+              << text(static_cast<double>(hermite.memory_bytes) / static_cast<double>(hermite.crossings))
               << " a crossing";
   std::cout << '\n';
 }
@@ -99,8 +106,8 @@ void print_volume(const std::filesystem::path& path, Session& session) {
   made(session, "kind", "OpenVDB");
   made(session, "grids", list);
   if (!session.json)
-    std::cout << "file           " << session.named(path.string()) << "\nkind           OpenVDB, " << grids.size()
-              << (grids.size() == 1 ? " grid\n" : " grids\n");
+    std::cout << "file           " << session.named(path.string()) << "\nkind           OpenVDB, "
+              << grids.size() << (grids.size() == 1 ? " grid\n" : " grids\n");
   bool has_hermite = false;
   for (const GridSummary& grid : grids) {
     if (!session.json) print_grid(grid);
@@ -114,7 +121,11 @@ void print_volume(const std::filesystem::path& path, Session& session) {
 void add_info(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "info", "What a mesh or a .vdb file holds");
   auto file = std::make_shared<std::string>();
-  command->add_option("FILE", *file, "Mesh (.ply .obj .off .stl .glb .gltf .3mf, also with .gz) or .vdb, or - for the standard input")->required();
+  command
+      ->add_option(
+          "FILE", *file,
+          "Mesh (.ply .obj .off .stl .glb .gltf .3mf, also with .gz) or .vdb, or - for the standard input")
+      ->required();
   add_files(*command, session, {.inputs = {file.get()}, .in = FileKind::mesh_or_volume});
   add_json_option(*command, session);
   command->callback([file, &session] {

@@ -47,8 +47,8 @@ std::string allowed(const OptionSpec& option) {
 
 void print_options(const std::string& flag, const std::vector<OptionSpec>& options) {
   for (const OptionSpec& option : options)
-    print_line("",
-               flag + " " + option.name + "=" + option.fallback + " (" + allowed(option) + "): " + option.help);
+    print_line(
+        "", flag + " " + option.name + "=" + option.fallback + " (" + allowed(option) + "): " + option.help);
 }
 
 template <class Variant>

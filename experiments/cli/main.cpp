@@ -1,5 +1,6 @@
 // The program `hermesh`. What it does on the command line, its exit codes and its output are a contract for
-// scripts: results on stdout, everything else on stderr, a failure is one line there, the last, after the notes.
+// scripts: results on stdout, everything else on stderr, a failure is one line there, the last, after the
+// notes.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -28,7 +29,8 @@ namespace {
 constexpr std::size_t kLongest = 1500;
 
 int fail(int exit_code, const std::string& sentence) {
-  // Messages of libraries may hold line breaks, and names of files what controls a terminal; scripts rely on one line.
+  // Messages of libraries may hold line breaks, and names of files what controls a terminal; scripts rely on
+  // one line.
   std::cerr << "hermesh: " << shown(sentence, kLongest, true) << std::endl;
   return exit_code;
 }
@@ -49,7 +51,8 @@ int run_on_files(Session& session, CommandFiles* files) {
   return exit_code;
 }
 
-/// The command by the name that plan_of() knows it by. How many tries a budget takes is unknown, so it has no plan.
+/// The command by the name that plan_of() knows it by. How many tries a budget takes is unknown, so it has no
+/// plan.
 std::string planned_command(const Session& session) {
   for (const std::string option : {" --error", " --triangles"})
     if (session.command_line.find(option) != std::string::npos) return session.command_name + option;
@@ -60,8 +63,9 @@ std::string planned_command(const Session& session) {
 int run_command(Session& session, CommandFiles* files) {
   // A batch counts its files, which is all of its progress.
   const bool batch = session.writes_json_itself;
-  const TerminalProgress progress(session.context, !session.quiet,
-                                  batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(planned_command(session)));
+  const TerminalProgress progress(
+      session.context, !session.quiet,
+      batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(planned_command(session)));
   std::optional<LogFile> log;
   if (!session.log_file.empty()) log.emplace(session, session.log_file, session.command_line);
   int exit_code = kFailed;
@@ -96,7 +100,8 @@ int run_to_exit_code(Session& session, CommandFiles* files) {
     // Whatever a library throws while the user is waiting for the end, it ends because the user said so.
     if (const int exit_code = signal_exit_code()) end_process(exit_code);
     const auto [exit_code, sentence] = failure(error, session);
-    // Who reads JSON gets the failure in it, too. What cannot be written then has been complained of by the failure.
+    // Who reads JSON gets the failure in it, too. What cannot be written then has been complained of by the
+    // failure.
     try {
       if (!session.writes_json_itself) write_json_report(session, exit_code, sentence);
       std::cout.flush();
@@ -107,8 +112,8 @@ int run_to_exit_code(Session& session, CommandFiles* files) {
   }
 }
 
-/// Name of an option whose value is an empty string, as a variable of a script that was not set leaves it; it would be
-/// taken for one that was not given. Empty if there is no such option.
+/// Name of an option whose value is an empty string, as a variable of a script that was not set leaves it; it
+/// would be taken for one that was not given. Empty if there is no such option.
 std::string option_without_value(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& given : option->results())
@@ -119,15 +124,16 @@ std::string option_without_value(const CLI::App& app) {
   return {};
 }
 
-/// A sentence about a word behind --json that is meant as its file but would be taken for an input, for want of an ending by
-/// which it is told; empty if there is none.
+/// A sentence about a word behind --json that is meant as its file but would be taken for an input, for want
+/// of an ending by which it is told; empty if there is none.
 std::string misnamed_json_file(const std::vector<std::string>& words) {
   const auto at = std::ranges::find(words, "--json");
   if (at == words.end() || at + 1 == words.end()) return {};
   const std::filesystem::path word = *(at + 1);
   const std::string ending = word.extension().string();
   if (word.string().starts_with('-') || ending.empty() || is_mesh_path(word)) return {};
-  // No command reads or makes what ends like this; and what is not there can be no input of any kind, but an output of ours.
+  // No command reads or makes what ends like this; and what is not there can be no input of any kind, but an
+  // output of ours.
   const bool is_report = ending == ".txt" || ending == ".log" || ending == ".csv";
   const auto endings = {".json", ".jsonl", ".vdb", ".nii", ".raw", ".gz", ".toml"};
   const bool is_ours = std::ranges::find(endings, ending) != endings.end();
@@ -137,8 +143,9 @@ std::string misnamed_json_file(const std::vector<std::string>& words) {
          "' would be an input: write --json='" + word.string() + "' if it is the file";
 }
 
-/// The arguments in the order in which CLI11 takes them, the last one first. The file of --json is tied to it, for a flag
-/// takes no value of its own accord; no file that a command reads or makes ends as that one does.
+/// The arguments in the order in which CLI11 takes them, the last one first. The file of --json is tied to
+/// it, for a flag takes no value of its own accord; no file that a command reads or makes ends as that one
+/// does.
 std::vector<std::string> with_json_files(int argc, char** argv) {
   std::vector<std::string> words(argv + 1, argv + argc);
   for (std::size_t i = 0; i + 1 < words.size(); ++i)
@@ -177,7 +184,8 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     std::string sentence = unknown_word(app, {argv + 1, argv + argc});
-    if (sentence.empty() && dynamic_cast<const CLI::RequiredError*>(&error)) sentence = missing_output(app, session);
+    if (sentence.empty() && dynamic_cast<const CLI::RequiredError*>(&error))
+      sentence = missing_output(app, session);
     return fail(kUsage, (sentence.empty() ? error.what() : sentence) + "; see hermesh --help");
   } catch (const UsageError& error) {  // what a command sees while it reads its options
     return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
@@ -213,9 +221,10 @@ int run_program(int argc, char** argv) {
 int main(int argc, char** argv) {
   // What runs before this is compiled for x86-64-v2, too, but is not likely to need it.
   if (!__builtin_cpu_supports("sse4.2") || !__builtin_cpu_supports("popcnt"))
-    return hermesh::cli::fail(hermesh::cli::kFailed,
-                              "this processor lacks SSE4.2 or POPCNT (x86-64-v2), which the program needs; if this is a "
-                              "virtual machine, let it show the host's processor");
+    return hermesh::cli::fail(
+        hermesh::cli::kFailed,
+        "this processor lacks SSE4.2 or POPCNT (x86-64-v2), which the program needs; if this is a "
+        "virtual machine, let it show the host's processor");
   hermesh::cli::occupy_closed_streams();
   try {
     return hermesh::cli::run_program(argc, argv);

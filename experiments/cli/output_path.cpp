@@ -4,8 +4,8 @@
 #include <cctype>
 #include <string>
 
-#include "algorithms/io/atomic_file.h"
 #include "algorithms/core/error.h"
+#include "algorithms/io/atomic_file.h"
 #include "algorithms/io/mesh_file.h"
 #include "experiments/cli/session.h"
 
@@ -23,8 +23,7 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 
 void check_mesh_output(const std::filesystem::path& path) {
   if (!is_mesh_path(path))
-    throw Error("cannot write a mesh to '" + path.string() +
-                "': its name must end in " + kMeshEndings);
+    throw Error("cannot write a mesh to '" + path.string() + "': its name must end in " + kMeshEndings);
   check_writable(path);
 }
 

@@ -10,8 +10,8 @@ namespace hermesh::cli {
 /// throws.
 void check_mesh_output(const std::filesystem::path& path);
 
-/// Checks that a file of that kind keeps attributes. @throws UsageError if meshes lose the attributes of their points
-/// in files of that kind: all but .ply and .ply.gz.
+/// Checks that a file of that kind keeps attributes. @throws UsageError if meshes lose the attributes of
+/// their points in files of that kind: all but .ply and .ply.gz.
 void check_keeps_attributes(const std::filesystem::path& path);
 
 /// Checks that a volume can be written there. @throws Error if the path does not end in

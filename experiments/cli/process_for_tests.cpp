@@ -77,7 +77,8 @@ void ProgramTest::become(std::vector<std::string> words, int err) const {
     const struct rlimit limit = {value, value};
     if (setrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0) _exit(126);
   }
-  for (const int number : {SIGHUP, SIGPIPE, SIGXCPU}) ::signal(number, SIG_DFL);  // whoever runs the test may ignore them
+  for (const int number : {SIGHUP, SIGPIPE, SIGXCPU})
+    ::signal(number, SIG_DFL);  // whoever runs the test may ignore them
   execv(argv[0], argv.data());
   _exit(127);
 }

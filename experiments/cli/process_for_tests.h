@@ -59,8 +59,8 @@ class ProgramTest : public testing::Test {
   void write_sphere();
 
  private:
-  /// Becomes the program of the first word, in the child process: streams, folder and limits are set first; `err` is
-  /// a file descriptor for stderr.
+  /// Becomes the program of the first word, in the child process: streams, folder and limits are set first;
+  /// `err` is a file descriptor for stderr.
   [[noreturn]] void become(std::vector<std::string> words, int err) const;
   /// Becomes `hermesh` with these arguments, as become() does.
   [[noreturn]] void execute(std::vector<std::string> words, int err) const;

@@ -87,8 +87,8 @@ void add_solid(Lines& lines, const validation::SolidComparison& solid) {
   lines.line("", "unknown volume " + estimate_text(solid.unknown_volume));
   lines.line("", "outer boundary of area " + text(solid.reference_area) +
                      (solid.possible_area > 0.0 ? " and perhaps " + text(solid.possible_area) : "") + " in " +
-                     std::to_string(solid.reference_components) + " components; the mesh: " + text(solid.mesh_area) +
-                     " in " + std::to_string(solid.mesh_components));
+                     std::to_string(solid.reference_components) + " components; the mesh: " +
+                     text(solid.mesh_area) + " in " + std::to_string(solid.mesh_components));
   lines.line("wrong area of the mesh", estimate_text(solid.false_area));
   lines.line("lost area", estimate_text(solid.lost_area));
 }
@@ -139,7 +139,7 @@ std::string report_text(const MeshReport& report, const std::string& file,
 }
 
 nlohmann::json report_json(const MeshReport& report, const std::string& file,
-                        const std::vector<std::string>& unmet) {
+                           const std::vector<std::string>& unmet) {
   nlohmann::json json = validation::to_json(report);
   json["mesh"] = file;
   json["unmet_requirements"] = unmet;

@@ -14,7 +14,8 @@ namespace hermesh::cli {
 std::string report_text(const validation::MeshReport& report, const std::string& file,
                         const std::vector<std::string>& unmet);
 
-/// The report as JSON: the object of validation::to_json(), with `mesh`, the file, and `unmet_requirements`, a list.
+/// The report as JSON: the object of validation::to_json(), with `mesh`, the file, and `unmet_requirements`,
+/// a list.
 nlohmann::json report_json(const validation::MeshReport& report, const std::string& file,
                            const std::vector<std::string>& unmet);
 

@@ -16,11 +16,13 @@ void add_common_options(CLI::App& app, Session& session) {
         int count = 0;
         return CLI::detail::lexical_cast(given, count) && count >= 1 && count <= kMostThreads
                    ? std::string()
-                   : "must be a whole number from 1 to " + std::to_string(kMostThreads) + ", not '" + given + "'";
+                   : "must be a whole number from 1 to " + std::to_string(kMostThreads) + ", not '" + given +
+                         "'";
       });
   app.add_flag("--quiet", session.quiet, "Print results and errors only: no progress, notes or summaries");
-  app.add_option("--log", session.log_file,
-                 "Keep a log in a file, behind what is there: stages, notes and summaries, each with its time");
+  app.add_option(
+      "--log", session.log_file,
+      "Keep a log in a file, behind what is there: stages, notes and summaries, each with its time");
 }
 
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary) {
@@ -29,15 +31,17 @@ CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, 
   return command;
 }
 
-void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
+void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options,
+                 const std::string& why) {
   for (const char* option : options)
     if (command.count(option) > 0) throw UsageError(std::string(option) + " has no effect: " + why);
 }
 
 void add_json_option(CLI::App& command, Session& session) {
-  command.add_flag("--json", session.json_file,
-                   "Print one JSON object instead of summaries, or write it to a file that ends in .json or .jsonl: "
-                   "--json FILE");
+  command.add_flag(
+      "--json", session.json_file,
+      "Print one JSON object instead of summaries, or write it to a file that ends in .json or .jsonl: "
+      "--json FILE");
 }
 
 std::string Session::named(std::string sentence) const {

@@ -43,17 +43,17 @@ struct JsonReport;  // pipeline/json_report.h
 struct Session {
   RunContext context;
   bool quiet = false;
-  bool json = false;             ///< prints what was done as one JSON object instead of summaries
-  std::string json_file;         ///< file that such an object is written to; empty: none
-  std::optional<int> threads;    ///< number of threads; none: as many as the machine has
-  std::string log_file;          ///< empty: no log is kept
+  bool json = false;           ///< prints what was done as one JSON object instead of summaries
+  std::string json_file;       ///< file that such an object is written to; empty: none
+  std::optional<int> threads;  ///< number of threads; none: as many as the machine has
+  std::string log_file;        ///< empty: no log is kept
   std::function<void(const std::string&)> log;  ///< adds a line to the log; empty where none is kept
-  std::function<int()> command;  ///< runs the command that was asked for; returns an ExitCode
+  std::function<int()> command;                 ///< runs the command that was asked for; returns an ExitCode
 
   std::map<const CLI::App*, CommandFiles> files;  ///< of the commands that work on files
   std::string command_name, command_line, version;
-  double scale = 1.0;               ///< world units in one unit of the numbers of a mesh file that is read
-  std::string units;                ///< of the numbers of a mesh file, where the world is in metres; empty: not given
+  double scale = 1.0;  ///< world units in one unit of the numbers of a mesh file that is read
+  std::string units;   ///< of the numbers of a mesh file, where the world is in metres; empty: not given
   std::vector<std::string> inputs;  ///< as the user named them; empty: the command has none
   std::string output;               ///< as the user named it; empty: there is none
   bool writes_json_itself = false;  ///< whether the command prints its JSON, as a batch does line by line
@@ -75,17 +75,18 @@ void add_combine(CLI::App& app, Session& session);
 void add_fracture(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
-void add_help(CLI::App& app, Session& session);         ///< adds doctor, completion and man
+void add_help(CLI::App& app, Session& session);  ///< adds doctor, completion and man
 
-/// Registers the files of a command, for standard streams, batches and JSON. The variables must live as long as it does.
-/// Also adds the options that name the formats of standard streams, and, if the command takes many inputs, those of a
-/// batch.
+/// Registers the files of a command, for standard streams, batches and JSON. The variables must live as long
+/// as it does. Also adds the options that name the formats of standard streams, and, if the command takes
+/// many inputs, those of a batch.
 void add_files(CLI::App& command, Session& session, CommandFiles files);
 
 /// Lets a command print what it did as JSON (pipeline/json_report.h), or write that to a file.
 void add_json_option(CLI::App& command, Session& session);
 
-/// Refuses the options that were given though nothing would look at them. @throws UsageError that ends with `why`.
+/// Refuses the options that were given though nothing would look at them. @throws UsageError that ends with
+/// `why`.
 void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 /// Adds the options that the program and all of its commands take.

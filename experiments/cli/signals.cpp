@@ -42,9 +42,10 @@ extern "C" void on_signal(int number) {
   errno = saved_errno;
 }
 
-/// Starts a process that shares this one's memory and files and outlives it. To take back gigabytes, and a large file
-/// that is removed while it is open, costs the system some tenths of a second; now they are taken back from the other
-/// process, and whoever waits for this one need not wait for that. (Pipes stay open until then.)
+/// Starts a process that shares this one's memory and files and outlives it. To take back gigabytes, and a
+/// large file that is removed while it is open, costs the system some tenths of a second; now they are taken
+/// back from the other process, and whoever waits for this one need not wait for that. (Pipes stay open until
+/// then.)
 void leave_memory_to_another_process() {
   constexpr std::size_t kStack = 16384;
   alignas(16) static char stack[kStack];

@@ -38,7 +38,8 @@ void write_to_terminal(std::string_view text) {
 
 }  // namespace
 
-TerminalProgress::TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan) : context_(context) {
+TerminalProgress::TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan)
+    : context_(context) {
   if (!plan.empty()) overall_.emplace(std::move(plan));
   if (!wanted || !isatty(STDERR_FILENO)) return;
   context_.on_progress = [this](std::string_view stage, double fraction) { show(stage, fraction); };

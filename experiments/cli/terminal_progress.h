@@ -14,9 +14,9 @@
 namespace hermesh::cli {
 
 /// Shows the context's progress while it lives, if stderr is a terminal and `wanted`; at most ten updates a
-/// second. With a plan the figure is that of all stages, with the time that is left; without, that of the stage. The line
-/// is erased at the end, so that nothing of it stays on the screen. Where a stage reports nothing for a second, a thread
-/// writes the line again with the time that the stage has taken.
+/// second. With a plan the figure is that of all stages, with the time that is left; without, that of the
+/// stage. The line is erased at the end, so that nothing of it stays on the screen. Where a stage reports
+/// nothing for a second, a thread writes the line again with the time that the stage has taken.
 class TerminalProgress {
  public:
   TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan = {});

@@ -105,8 +105,8 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
   std::vector<std::string> unmet;
   for (const Requirement& requirement : requirements)
     if (!requirement.second(report)) unmet.push_back(requirement.first);
-  // A watertight surface about something else is not what was meant by naming a reference. Where nobody can tell what
-  // the reference encloses, only who asks for the solid asks too much.
+  // A watertight surface about something else is not what was meant by naming a reference. Where nobody can
+  // tell what the reference encloses, only who asks for the solid asks too much.
   if (watertight && !solid && other_solid(report)) unmet.push_back("solid");
   const std::string name = session.inputs[0];
   session.report->beside = report_json(report, name, unmet);
@@ -127,8 +127,10 @@ void add_validate(CLI::App& app, Session& session) {
   command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");
   command
       ->add_option("--reference-quads", arguments->reference_quads,
-                   "How quads of the reference are cut for the distances: better (along the diagonal that bends less, for "
-                   "a file of another program) or as-given (from the first corner to the third, which is what quads of "
+                   "How quads of the reference are cut for the distances: better (along the diagonal that "
+                   "bends less, for "
+                   "a file of another program) or as-given (from the first corner to the third, which is "
+                   "what quads of "
                    "hermesh mean) (default: better)")
       ->check(CLI::IsMember({"better", "as-given"}));
   command->add_flag("--certify", arguments->certify,
@@ -153,12 +155,14 @@ void add_validate(CLI::App& app, Session& session) {
       "--require", arguments->require,
       "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "
       "watertight (all of these, no-self-intersection, and no component inside out), no-self-intersection, "
-      "solid (bounds the solid of the --reference: no inner wall taken for an outer one, no part lost or added); "
+      "solid (bounds the solid of the --reference: no inner wall taken for an outer one, no part lost or "
+      "added); "
       "with --reference, watertight asks that the solid is no other, too");
   command
-      ->add_option("--voxel-size", arguments->voxel_size,
-                   "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "
-                   "(default: three times the distance from the mesh to the reference)")
+      ->add_option(
+          "--voxel-size", arguments->voxel_size,
+          "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "
+          "(default: three times the distance from the mesh to the reference)")
       ->check(CLI::PositiveNumber);
   add_json_option(*command, session);
   command->callback([arguments, command, &session] {

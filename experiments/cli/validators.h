@@ -20,8 +20,9 @@ inline CLI::Validator finite_number() {
       "");
 }
 
-/// Accepts a whole number from `least` to `most` in any notation, such as 1000, 1e3 or 1000.0, and replaces it by its
-/// digits. For CLI::Option::transform(), since an option of a whole number reads nothing but digits.
+/// Accepts a whole number from `least` to `most` in any notation, such as 1000, 1e3 or 1000.0, and replaces
+/// it by its digits. For CLI::Option::transform(), since an option of a whole number reads nothing but
+/// digits.
 inline CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
   return CLI::Validator(
       [least, most](std::string& given) {
@@ -29,8 +30,8 @@ inline CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
         const bool good = CLI::detail::lexical_cast(given, value) && value == std::floor(value) &&
                           value >= double(least) && value <= double(most);
         if (!good)
-          return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", not '" +
-                 given + "'";
+          return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
+                 ", not '" + given + "'";
         given = std::to_string(std::int64_t(value));
         return std::string();
       },

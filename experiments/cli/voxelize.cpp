@@ -2,13 +2,13 @@
 #include <memory>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/core/quad_diagonals.h"
+#include "algorithms/io/grid_frame.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
-#include "algorithms/io/grid_frame.h"
-#include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/core/quad_diagonals.h"
-#include "algorithms/voxelization/outputs/volume_outputs.h"
 #include "algorithms/thesis/thesis_volumes.h"
+#include "algorithms/voxelization/hermesh_voxelizer.h"
+#include "algorithms/voxelization/outputs/volume_outputs.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/output_path.h"
 #include "experiments/cli/pipeline/json_report.h"
@@ -86,7 +86,8 @@ PolygonMesh read_for(VolumeRequest& request, const std::string& path, Session& s
 }
 
 /// The volumes of the request, by a voxelizer that knows_triangles().
-VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& input, const VolumeRequest& request) {
+VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& input,
+                         const VolumeRequest& request) {
   VoxelizeOptions options = voxelize_options(input);
   if (voxelizer == "hermesh") return make_volume_outputs(input.mesh, options, request, input.context);
   // Of the options only the signs are read before the voxelizer is asked: fog and Hermite data need some.
@@ -94,12 +95,13 @@ VolumeOutputs outputs_by(const std::string& voxelizer, const VoxelizationInput& 
   options.signs = of_thesis.signs ? SignRule::flood_fill : SignRule::none;
   return make_volume_outputs(
       input.mesh, options, request,
-      [&](const VoxelizeOptions& asked) { return thesis_voxelization(input, of_thesis, asked.nearest); }, input.context);
+      [&](const VoxelizeOptions& asked) { return thesis_voxelization(input, of_thesis, asked.nearest); },
+      input.context);
 }
 
 /// Replaces the level set, and the Hermite data if there are any, by those in which thin parts are thickened.
-void keep_thin_parts(VolumeOutputs& outputs, const VolumeRequest& request, const PolygonMesh& mesh, ThinRule rule,
-                     Session& session) {
+void keep_thin_parts(VolumeOutputs& outputs, const VolumeRequest& request, const PolygonMesh& mesh,
+                     ThinRule rule, Session& session) {
   if (rule == ThinRule::drop || !request.sdf) return;
   // Without signs the distances are a grid "udf".
   const auto named = [&](const std::string& name) {
@@ -115,7 +117,8 @@ void keep_thin_parts(VolumeOutputs& outputs, const VolumeRequest& request, const
   *grid = made.solid.level_set.grid().grid->deepCopy();
   if (outputs.hermite) outputs.hermite = std::move(made.solid.hermite);
   if (outputs.grids.size() > 1)
-    session.context.note("only the level set and the Hermite data have the thickened parts, the other grids have not");
+    session.context.note(
+        "only the level set and the Hermite data have the thickened parts, the other grids have not");
 }
 
 /// Makes the grids of the request by a voxelizer that knows which triangle is nearest, and writes them.
@@ -148,7 +151,8 @@ void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, cons
   print_voxelized(session, paths.in, input, outputs.active_voxels, chosen.voxelizer.name, watch.seconds());
   for (const openvdb::GridBase::Ptr& grid : outputs.grids)
     if (rule == ThinRule::drop && grid->getName() == "sdf")
-      note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), chosen, session);
+      note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), chosen,
+                        session);
   write_volume_outputs(paths.out, outputs, session.context);
   print_summary(session, "wrote " + paths.out + ": " + names_of_grids(outputs.grids));
   if (outputs.hermite)
@@ -161,7 +165,8 @@ int run_voxelize(const VoxelizeCommand& arguments, Session& session) {
   const VolumeRequest request = requested(arguments);
   check_volume_output(arguments.paths.out);
   if (request.hermite && session.writes_stream)
-    throw UsageError("the grid hermite is a second file, which the standard output cannot hold: name an output");
+    throw UsageError(
+        "the grid hermite is a second file, which the standard output cannot hold: name an output");
   if (request.hermite) check_writable(hermite_path(arguments.paths.out));
   if (knows_triangles(chosen.voxelizer.name)) {
     write_outputs(arguments, request, chosen, session);
@@ -180,8 +185,8 @@ void add_voxelize(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<VoxelizeCommand>();
   CLI::App* command =
       add_command(app, session, "voxelize", "Polygons to volumes: a level set, fog, closest points, ...");
-  add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, "Volumes: .vdb, or - for the standard output",
-            FileKind::volume, true);
+  add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh,
+            "Volumes: .vdb, or - for the standard output", FileKind::volume, true);
   add_json_option(*command, session);
   add_voxelize_options(*command, arguments->voxelizing, true);
   command->add_option(

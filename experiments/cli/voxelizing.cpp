@@ -44,13 +44,14 @@ double voxel_size_for(const PolygonMesh& mesh, const VoxelizeArguments& argument
 
 }  // namespace
 
-void add_paths(CLI::App& command, Session& session, Paths& paths, const std::string& in, FileKind in_kind, const std::string& out,
-               FileKind out_kind, bool many) {
+void add_paths(CLI::App& command, Session& session, Paths& paths, const std::string& in, FileKind in_kind,
+               const std::string& out, FileKind out_kind, bool many) {
   command.add_option("IN", paths.in, in)->required();
   // Many inputs have outputs in a folder, and then none is named here.
   command.add_option("OUT", paths.out, out)->required(!many);
-  add_files(command, session,
-            {.inputs = {&paths.in}, .output = &paths.out, .in = in_kind, .out = out_kind, .takes_many = many});
+  add_files(
+      command, session,
+      {.inputs = {&paths.in}, .output = &paths.out, .in = in_kind, .out = out_kind, .takes_many = many});
 }
 
 CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
@@ -73,9 +74,10 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
       "How the voxelizer hermesh finds the inside: auto (the default), flood-fill, winding-number, or "
       "unsigned for none; short for --voxelizer-option signs=...");
   command
-      .add_option("--thin", arguments.thin,
-                  "What becomes of walls, wires and open sheets that are too thin for the voxels: keep (the default) "
-                  "thickens them until they show, drop loses them, refuse is an error")
+      .add_option(
+          "--thin", arguments.thin,
+          "What becomes of walls, wires and open sheets that are too thin for the voxels: keep (the default) "
+          "thickens them until they show, drop loses them, refuse is an error")
       ->check(CLI::IsMember({"keep", "drop", "refuse"}));
   command
       .add_option("--voxelizer-option", arguments.options,
@@ -85,7 +87,8 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
   const auto band = at_least(1.0, "a finite number of voxels of at least 1");
   command
       .add_option("--exterior-band", arguments.exterior_band,
-                  "Width of the band outside, in voxels (default: 3); where marching cubes follows, 1 is enough and faster")
+                  "Width of the band outside, in voxels (default: 3); where marching cubes follows, 1 is "
+                  "enough and faster")
       ->check(band);
   command
       .add_option("--interior-band", arguments.interior_band,
@@ -117,7 +120,8 @@ ChosenVoxelizer choose_voxelizer(const VoxelizeArguments& arguments) {
     std::vector<std::string> options = arguments.options;
     if (arguments.signs) options.push_back("signs=" + *arguments.signs);
     // Where thin parts are kept, so are open sheets.
-    const bool has_signs = std::ranges::any_of(options, [](const auto& o) { return o.starts_with("signs="); });
+    const bool has_signs =
+        std::ranges::any_of(options, [](const auto& o) { return o.starts_with("signs="); });
     if (voxelizer.name == "hermesh" && !has_signs && arguments.thin.value_or("keep") == "keep")
       options.push_back("signs=auto-sheets");
     return ChosenVoxelizer{voxelizer, parse_options(voxelizer.name, voxelizer.options, options)};
@@ -163,8 +167,8 @@ LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const Voxeli
 
 ThinRule thin_rule(const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen, double isovalue) {
   if (arguments.thin == "drop") return ThinRule::drop;
-  const char* reason = chosen.voxelizer.name != "hermesh"               ? "the voxelizer is not hermesh"
-                       : chosen.options.is("signs", "unsigned")         ? "distances without sign have no inside"
+  const char* reason = chosen.voxelizer.name != "hermesh"       ? "the voxelizer is not hermesh"
+                       : chosen.options.is("signs", "unsigned") ? "distances without sign have no inside"
                        : isovalue != 0.0 ? "the surface of the isovalue is not that of the polygons"
                                          : nullptr;
   if (reason && arguments.thin) throw UsageError("--thin " + *arguments.thin + " has no effect: " + reason);
@@ -180,11 +184,12 @@ void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Se
   if (thin) session.context.note(thin_note(*thin, voxel_size));
 }
 
-PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
-                             const ChosenVoxelizer& chosen, Session& session) {
+PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file,
+                             const VoxelizeArguments& arguments, const ChosenVoxelizer& chosen,
+                             Session& session) {
   const LevelSet level_set = voxelize(mesh, file, arguments, chosen, session);
-  PolygonSolid made =
-      about_file(file, [&] { return solid_of(mesh, level_set, thin_rule(arguments, chosen), session.context); });
+  PolygonSolid made = about_file(
+      file, [&] { return solid_of(mesh, level_set, thin_rule(arguments, chosen), session.context); });
   note_thin_parts(made.thin, level_set.voxel_size(), session);
   return made;
 }

@@ -14,14 +14,16 @@
 
 namespace hermesh {
 
-/// The folder in the making: it is made aside and renamed by commit(), so that it is there with all of its files or not
-/// at all. No time and no path of the machine goes into it: the same fracture gives the same bytes.
+/// The folder in the making: it is made aside and renamed by commit(), so that it is there with all of its
+/// files or not at all. No time and no path of the machine goes into it: the same fracture gives the same
+/// bytes.
 class FractureFolder {
  public:
   /// @throws Error if the folder cannot be made, or is there already and not empty.
   explicit FractureFolder(const std::filesystem::path& target);
 
-  /// Writes one piece as piece_0001.ply and so on, and notes it for pieces.json. @throws Error if it cannot be written.
+  /// Writes one piece as piece_0001.ply and so on, and notes it for pieces.json. @throws Error if it cannot
+  /// be written.
   void add(PieceOutput&& piece, RunContext& context);
 
   /// Draws exploded.png into the directory that it is given.

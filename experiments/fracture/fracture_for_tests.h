@@ -38,15 +38,16 @@ inline FloatHermite turned_box() {
           .matrix()
           .transpose();
   const Eigen::Vector3d half(12.0, 9.0, 14.0);
-  return sampled({.value = [=](const Eigen::Vector3d& p) { return ((back * p).cwiseAbs() - half).maxCoeff(); },
-                  .gradient =
-                      [=](const Eigen::Vector3d& p) {
-                        const Eigen::Vector3d q = back * p;
-                        int axis;
-                        (q.cwiseAbs() - half).maxCoeff(&axis);
-                        return Eigen::Vector3d(back.row(axis).transpose() * (q[axis] < 0 ? -1.0 : 1.0));
-                      }},
-                 {24, 24, 24});
+  return sampled(
+      {.value = [=](const Eigen::Vector3d& p) { return ((back * p).cwiseAbs() - half).maxCoeff(); },
+       .gradient =
+           [=](const Eigen::Vector3d& p) {
+             const Eigen::Vector3d q = back * p;
+             int axis;
+             (q.cwiseAbs() - half).maxCoeff(&axis);
+             return Eigen::Vector3d(back.row(axis).transpose() * (q[axis] < 0 ? -1.0 : 1.0));
+           }},
+      {24, 24, 24});
 }
 
 /// A ball with a rough surface: overhangs, thin ridges, cells of several sheets.
@@ -67,7 +68,8 @@ inline std::vector<Eigen::Vector3d> seeds(const FloatHermite& object, std::size_
   return scatter(whole_solid(object, context), count, {.seed = 5, .density = {}}, context);
 }
 
-inline std::unique_ptr<Cutters> cutters_of(const std::string& kind, const FloatHermite& object, std::size_t count) {
+inline std::unique_ptr<Cutters> cutters_of(const std::string& kind, const FloatHermite& object,
+                                           std::size_t count) {
   const std::vector<Eigen::Vector3d> places = seeds(object, count);
   if (kind == "voronoi") return voronoi_cutters(places, {}, object.placement);
   if (kind == "chunks") return voronoi_cutters(places, {1.5, 5.0, 3}, object.placement);

@@ -141,8 +141,7 @@ double reach_of_pieces(const FractureObject& object, const FractureMethod& metho
 }
 
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
-                             const FractureMethod& method,
-                             const HandOver& hand_over, RunContext& context) {
+                             const FractureMethod& method, const HandOver& hand_over, RunContext& context) {
   check_method(method);
   return Run(object, cutters, method, hand_over, context).run();
 }

@@ -5,9 +5,9 @@
 #include <string>
 
 #include "algorithms/core/level_set.h"
+#include "algorithms/fracture/cutter_words.h"
 #include "algorithms/fracture/piece_output.h"
 #include "algorithms/thesis/thesis_fracture.h"
-#include "algorithms/fracture/cutter_words.h"
 
 namespace hermesh {
 
@@ -25,8 +25,9 @@ double uncut_volume(const FractureObject& object, RunContext& context);
 
 struct FractureMethod {
   std::string name = "labelled";  ///< or thesis, openvdb
-  /// labelled: two-sided distance to the finest mesh, in voxels; thesis: the root of adaptive_dual_contouring's
-  /// threshold, in voxels, so that 0.3 is a threshold of 0.09 square voxels; openvdb: adaptivity, 0 to 1.
+  /// labelled: two-sided distance to the finest mesh, in voxels; thesis: the root of
+  /// adaptive_dual_contouring's threshold, in voxels, so that 0.3 is a threshold of 0.09 square voxels;
+  /// openvdb: adaptivity, 0 to 1.
   double tolerance = 0.0;
   FractureOptions options;
   ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;  ///< of the method thesis alone
@@ -37,8 +38,8 @@ struct FractureSummary {
   std::vector<CutterRecord> cutters;         ///< what each cutter took, by the method `labelled`
   std::optional<LabelledFracture> labelled;  ///< without its mesh
   std::vector<std::string> empty;            ///< names of cutters that took nothing, by the other methods
-  double seconds =
-      0.0;  ///< time of the method itself: neither handing pieces over nor making polygons of OpenVDB's cutters
+  double seconds = 0.0;  ///< time of the method itself: neither handing pieces over nor making polygons of
+                         ///< OpenVDB's cutters
 };
 
 /// How far the pieces' original surface may be from uncut_mesh(), in world units: where pieces part, points

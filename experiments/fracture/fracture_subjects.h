@@ -29,8 +29,8 @@ struct SampledSubject {
   FractureObject object;
   double hermite_seconds = 0.0;  ///< time that the Hermite data took
 };
-/// The mesh as an object to break, sampled with so many voxels along its longest side, its signs from a voxelizer of
-/// `hermesh list`.
+/// The mesh as an object to break, sampled with so many voxels along its longest side, its signs from a
+/// voxelizer of `hermesh list`.
 SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input,
                               const std::string& voxelizer = "hermesh");
 

@@ -1,5 +1,6 @@
-// Are the polygons of the pieces of a fracture tagged as what they are, cut or original? Judged by the input's
-// triangles and the walls of Voronoi cells, which are known in closed form; nothing here asks the method.
+// Are the polygons of the pieces of a fracture tagged as what they are, cut or original? Judged by the
+// input's triangles and the walls of Voronoi cells, which are known in closed form; nothing here asks the
+// method.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,8 +30,8 @@ double distance_to_walls(const std::vector<Eigen::Vector3d>& seeds, const Eigen:
 /// between cells than to the input.
 class TagJudge {
  public:
-  /// `input` knows the input's triangles, in voxels of `voxel_size` world units relative to `origin` (world units), and
-  /// has to outlive this object; `seeds` are those of the cells, world units.
+  /// `input` knows the input's triangles, in voxels of `voxel_size` world units relative to `origin` (world
+  /// units), and has to outlive this object; `seeds` are those of the cells, world units.
   TagJudge(const DistanceOracle& input, const Eigen::Vector3d& origin, double voxel_size,
            std::vector<Eigen::Vector3d> seeds);
   /// Counts the polygons of a piece. @throws Error for a piece without the polygon attribute `surface`.

@@ -75,8 +75,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"rock", "voronoi", 8}, Case{"rock", "voronoi", 20}, Case{"rock", "planes", 4},
                     Case{"rock", "chunks", 8}, Case{"rock", "chunks", 20}));
 
-/// Cutters with random codes for cubes of two samples, and crossings anywhere on their edges: joints of all patterns
-/// and shapes.
+/// Cutters with random codes for cubes of two samples, and crossings anywhere on their edges: joints of all
+/// patterns and shapes.
 class RandomCodes : public Cutters {
  public:
   explicit RandomCodes(CutCode kinds) : kinds_(kinds) {}

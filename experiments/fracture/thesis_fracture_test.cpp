@@ -49,15 +49,16 @@ TEST(FractureMethods, TheThesisLeavesGapsAndTheVolumeNearlyAddsUp) {
       EXPECT_FALSE(ledger.balances()) << text(ledger);
       EXPECT_GE(pieces.figure("escaped"), 0.0);
       if (rule == Rule::printed) {
-        // Polygons that bound nothing lie along the rims, and where all samples are taken they are a piece of their own.
+        // Polygons that bound nothing lie along the rims, and where all samples are taken they are a piece of
+        // their own.
         EXPECT_EQ(pieces.meshes.size(), 7u);
         EXPECT_GT(pieces.figure("needless_crossings"), 0.0);
         ASSERT_EQ(pieces.context.notes.size(), 1u);
         EXPECT_NE(pieces.context.notes[0].find("bound nothing"), std::string::npos);
         continue;
       }
-      // Signs leave no data without a change of sign, and exact data lose none: each piece is closed, so that it has a
-      // volume.
+      // Signs leave no data without a change of sign, and exact data lose none: each piece is closed, so that
+      // it has a volume.
       EXPECT_EQ(pieces.meshes.size(), 6u);
       EXPECT_NEAR(pieces.volume, 24.0 * 18.0 * 28.0, 0.01 * 24.0 * 18.0 * 28.0) << threshold;
       EXPECT_EQ(pieces.figure("lost_crossings") + pieces.figure("needless_crossings"), 0.0);
@@ -96,9 +97,10 @@ FloatHermite straight_box() {
                  {20, 20, 20});
 }
 
-// Eq. 7.1 by hand (trap T11). The face x = 8.3 of a box and the plane x = 8.1 cross the same edges, from 8 to 9. Beyond
-// the plane lie 0.2 voxel of the box and no sample. At a sample x = 8 the box has the component −0.3, and what is beyond
-// the plane 0.1: the intersection takes the greater one, with its data, although both ends of the edge are outside of it.
+// Eq. 7.1 by hand (trap T11). The face x = 8.3 of a box and the plane x = 8.1 cross the same edges, from 8
+// to 9. Beyond the plane lie 0.2 voxel of the box and no sample. At a sample x = 8 the box has the component
+// −0.3, and what is beyond the plane 0.1: the intersection takes the greater one, with its data, although
+// both ends of the edge are outside of it.
 TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
   const FloatHermite object = straight_box();
   const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 8.1}}, object.placement);
@@ -115,8 +117,9 @@ TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
   EXPECT_NEAR(mass_properties(printed.meshes[0]).volume, repaired.volume, 0.005 * repaired.volume);
 }
 
-// A plane x = 0.3 has two sides, each a cutter. Once both are taken nothing is left but their wall: behind it rest's
-// samples are outside with the component 0.7 or 0.3, and the complement of the last cutter has the same there.
+// A plane x = 0.3 has two sides, each a cutter. Once both are taken nothing is left but their wall: behind it
+// rest's samples are outside with the component 0.7 or 0.3, and the complement of the last cutter has the
+// same there.
 TEST(FractureMethods, TheEquationLeavesTheWallThatTwoCuttersShare) {
   const FloatHermite object = straight_box();
   const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 0.3}}, object.placement);
@@ -130,7 +133,8 @@ TEST(FractureMethods, TheEquationLeavesTheWallThatTwoCuttersShare) {
   for (std::size_t i = 0; i < printed.meshes[2].points.size(); ++i)
     EXPECT_NEAR(printed.meshes[2].world(i).x(), 0.3, 0.01);
   for (int piece : {0, 1})
-    EXPECT_NEAR(mass_properties(printed.meshes[piece]).volume, mass_properties(repaired.meshes[piece]).volume, 5.0);
+    EXPECT_NEAR(mass_properties(printed.meshes[piece]).volume, mass_properties(repaired.meshes[piece]).volume,
+                5.0);
 }
 
 TEST(FractureMethods, TheThesisMakesTheSameBytesAtAnyNumberOfThreads) {

@@ -16,13 +16,14 @@ namespace hermesh {
 /// since a terminal has no business inside a timed repetition.
 RunContext child_context(const RunContext& context, bool with_progress);
 
-/// The sentence of what went wrong, if anything did. Being cancelled and data that are not there are no failures of a
-/// variant. @throws Cancelled; DataMissing.
+/// The sentence of what went wrong, if anything did. Being cancelled and data that are not there are no
+/// failures of a variant. @throws Cancelled; DataMissing.
 std::optional<std::string> attempt(const std::function<void()>& work);
 
 /// Says in the row that its cell failed, and why.
 void mark_failed(Json& row, const std::string& sentence);
-/// Says that its program is not installed: there are no figures, as where a cell failed, and it is no failure of the run.
+/// Says that its program is not installed: there are no figures, as where a cell failed, and it is no failure
+/// of the run.
 void mark_absent(Json& row, const std::string& reason);
 
 /// Times of one piece of work that is repeated. The first run, which is also judged, warms caches and pools
@@ -45,7 +46,8 @@ struct Racer {
   Json& row;
   std::function<double()> repeat;  ///< does the work once more and returns its seconds
 };
-/// Races the cells (race()), and writes the seconds, those of the stages and the machine's load before it in their rows.
+/// Races the cells (race()), and writes the seconds, those of the stages and the machine's load before it in
+/// their rows.
 void race_cells(std::vector<Racer> racers);
 
 Json seconds_json(const std::vector<double>& seconds, bool warm);

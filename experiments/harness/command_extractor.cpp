@@ -39,7 +39,8 @@ class Scratch {
  public:
   Scratch() {
     static std::atomic<int> count{0};
-    path_ = fs::temp_directory_path() / ("hermesh-command-" + std::to_string(getpid()) + "-" + std::to_string(++count));
+    path_ = fs::temp_directory_path() /
+            ("hermesh-command-" + std::to_string(getpid()) + "-" + std::to_string(++count));
     fs::create_directories(path_);
   }
   ~Scratch() {
@@ -55,17 +56,20 @@ class Scratch {
 };
 
 const std::regex kPlaceholder("\\{([a-z.]*|[0-9.]+ voxel)\\}"), kVoxels("([0-9]+(\\.[0-9]+)?) voxel");
-const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?"), kUniform("uniform(\\.(ply|obj|stl|off))?");
+const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?"),
+    kUniform("uniform(\\.(ply|obj|stl|off))?");
 
 /// Exit codes: Automake's for a test that is skipped, and the shell's for a program that it does not find.
 constexpr int kSkipped = 77, kNotFound = 127;
 
 /// Calls `replace` for each word in braces, and puts what it returns in its place.
-std::string replaced(const std::string& command, const std::function<std::string(const std::string&)>& replace) {
+std::string replaced(const std::string& command,
+                     const std::function<std::string(const std::string&)>& replace) {
   std::string text;
   std::size_t done = 0;
   for (std::sregex_iterator word(command.begin(), command.end(), kPlaceholder), end; word != end; ++word) {
-    text += command.substr(done, static_cast<std::size_t>(word->position()) - done) + replace((*word)[1].str());
+    text +=
+        command.substr(done, static_cast<std::size_t>(word->position()) - done) + replace((*word)[1].str());
     done = static_cast<std::size_t>(word->position() + word->length());
   }
   return text + command.substr(done);
@@ -79,7 +83,8 @@ std::string last_line(const fs::path& file) {
   return shown(last, 200);
 }
 
-/// The number of the last line "word NUMBER"; none where there is no such line, or no finite number that is not negative.
+/// The number of the last line "word NUMBER"; none where there is no such line, or no finite number that is
+/// not negative.
 std::optional<double> number_said(const fs::path& file, const std::string& word) {
   std::ifstream stream(file);
   std::optional<double> number;
@@ -111,7 +116,8 @@ void run_shell(const std::string& command, const fs::path& log, RunContext& cont
     if (pid == 0) {
       prctl(PR_SET_PDEATHSIG, SIGKILL);
       if (getppid() != parent) _exit(127);
-      const int out = open(name.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), in = open("/dev/null", O_RDONLY);
+      const int out = open(name.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644),
+                in = open("/dev/null", O_RDONLY);
       dup2(in, STDIN_FILENO);
       dup2(out, STDOUT_FILENO);
       dup2(out, STDERR_FILENO);
@@ -130,9 +136,11 @@ void run_shell(const std::string& command, const fs::path& log, RunContext& cont
     }
   });
   const std::string said = last_line(log), more = said.empty() ? "" : ": " + said;
-  if (WIFSIGNALED(status)) throw Error(std::string("the command crashed (") + strsignal(WTERMSIG(status)) + ")" + more);
+  if (WIFSIGNALED(status))
+    throw Error(std::string("the command crashed (") + strsignal(WTERMSIG(status)) + ")" + more);
   if (WEXITSTATUS(status) == kNotFound) throw ProgramAbsent("the shell does not find its program");
-  if (WEXITSTATUS(status) == kSkipped) throw ProgramAbsent(said.empty() ? "it ended with 77 and without a reason" : said);
+  if (WEXITSTATUS(status) == kSkipped)
+    throw ProgramAbsent(said.empty() ? "it ended with 77 and without a reason" : said);
   if (WEXITSTATUS(status) > 128)  // the shell's word for it
     throw Error(std::string("the command crashed (") + strsignal(WEXITSTATUS(status) - 128) + ")" + more);
   if (WEXITSTATUS(status) != 0)
@@ -160,7 +168,8 @@ PolygonMesh run_command(const ExtractionInput& input) {
   quiet.cancel = input.context.cancel;
   const std::string command = replaced(input.options.text("run"), [&](const std::string& word) {
     if (std::regex_match(word, kIn)) {
-      if (!input.source) throw Error("the command wants polygons ({in}), and the volume was not made from any");
+      if (!input.source)
+        throw Error("the command wants polygons ({in}), and the volume was not made from any");
       const fs::path file = scratch / (word == "in" ? "in.ply" : word);
       if (!fs::exists(file)) write_mesh(file, *input.source, quiet);
       return shell_quoted(file.string());
@@ -203,7 +212,10 @@ Extractor command_extractor(const std::string& name, const std::string& command)
     static const std::set<std::string> plain = {"volume", "voxel", "threads", "source", "build"};
     if (!std::regex_match(word, kIn) && !std::regex_match(word, kOut) && !std::regex_match(word, kUniform) &&
         !std::regex_match(word, kVoxels) && !plain.contains(word))
-      throw Error("a command knows {in}, {uniform}, {volume}, {out}, {voxel} or {0.25 voxel}, {threads}, {source} and {build}, and not {" + word + "}");
+      throw Error(
+          "a command knows {in}, {uniform}, {volume}, {out}, {voxel} or {0.25 voxel}, {threads}, {source} "
+          "and {build}, and not {" +
+          word + "}");
     return std::string();
   });
   if (!writes) throw Error("a command needs {out}, the file that it has to write");

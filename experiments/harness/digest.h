@@ -1,5 +1,6 @@
-// Digests of what a program made: equal digits mean equal bytes, so that two commits, two numbers of threads or two levels
-// of vector code can be compared without keeping what they made. 16 hexadecimal digits of a SHA-256.
+// Digests of what a program made: equal digits mean equal bytes, so that two commits, two numbers of threads
+// or two levels of vector code can be compared without keeping what they made. 16 hexadecimal digits of a
+// SHA-256.
 #pragma once
 
 #include <openvdb/Grid.h>
@@ -22,8 +23,8 @@ std::string digest(const PolygonMesh& mesh);
 /// Several meshes in their order, such as the pieces of a fracture.
 std::string digest(const std::vector<PolygonMesh>& meshes);
 
-/// The placement, the background, the tiles, and of every leaf the origin, the mask of active voxels and the bits of all
-/// values (fingerprint() of level_set_facts.h).
+/// The placement, the background, the tiles, and of every leaf the origin, the mask of active voxels and the
+/// bits of all values (fingerprint() of level_set_facts.h).
 std::string digest(const LevelSet& level_set);
 
 /// A grid of any type: its placement, its topology and its values.

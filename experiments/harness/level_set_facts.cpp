@@ -5,8 +5,8 @@
 #include <cstring>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/extraction/marching_cubes/marching_cubes.h"
+#include "algorithms/io/mesh_file.h"
 #include "validation/solid_comparison.h"
 #include "validation/topology.h"
 
@@ -81,12 +81,12 @@ std::int64_t count_surface_components(const LevelSet& level_set, RunContext& con
   return report.components;
 }
 
-std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set, const PolygonMesh& source,
-                                                           RunContext& context) {
+std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set,
+                                                           const PolygonMesh& source, RunContext& context) {
   const PolygonMesh mesh = marching_cubes(level_set, 0.0, nullptr, context);
   if (mesh.empty()) return std::nullopt;
-  return validation::compare_solids(to_mesh_file(mesh), to_mesh_file(source), {.voxel_size = level_set.voxel_size()},
-                                    context);
+  return validation::compare_solids(to_mesh_file(mesh), to_mesh_file(source),
+                                    {.voxel_size = level_set.voxel_size()}, context);
 }
 
 }  // namespace hermesh

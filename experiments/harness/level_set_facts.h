@@ -22,9 +22,9 @@ std::string dimensions_of(const LevelSet& level_set);
 /// Connected components of the zero set, polygonised by marching cubes; 0 where it is empty.
 std::int64_t count_surface_components(const LevelSet& level_set, RunContext& context);
 
-/// The solid within the zero set, polygonised by marching cubes, beside that of the polygons it was made from; nothing
-/// where it is empty.
-std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set, const PolygonMesh& source,
-                                                           RunContext& context);
+/// The solid within the zero set, polygonised by marching cubes, beside that of the polygons it was made
+/// from; nothing where it is empty.
+std::optional<validation::SolidComparison> compare_surface(const LevelSet& level_set,
+                                                           const PolygonMesh& source, RunContext& context);
 
 }  // namespace hermesh

@@ -21,7 +21,7 @@ struct Cell {
   Json row;
   std::string uniform;              ///< as in VariantEntry
   std::filesystem::path mesh_file;  ///< empty when there is no mesh to look at
-  std::optional<Timing> timing;  ///< absent when the variant failed
+  std::optional<Timing> timing;     ///< absent when the variant failed
 };
 
 std::optional<double> figure(const RunContext& child, std::string_view name) {
@@ -30,7 +30,9 @@ std::optional<double> figure(const RunContext& child, std::string_view name) {
   return std::nullopt;
 }
 /// An outside program's own time; writing its input and reading its mesh is ours.
-double own_seconds(double seconds, const RunContext& child) { return figure(child, kCommandSeconds).value_or(seconds); }
+double own_seconds(double seconds, const RunContext& child) {
+  return figure(child, kCommandSeconds).value_or(seconds);
+}
 std::optional<std::int64_t> peak_of_command(const RunContext& child) {
   const auto bytes = figure(child, kCommandPeakBytes);
   return bytes ? std::optional(static_cast<std::int64_t>(*bytes)) : std::nullopt;
@@ -226,8 +228,8 @@ class Group {
       if (cell.timing) racers.push_back({*cell.timing, cell.row, [this, &cell] { return repeat(cell); }});
     race_cells(racers);
     for (const Racer& racer : racers)
-      racer.row["nanoseconds_per_active_voxel"] =
-          1e9 * racer.row["seconds"]["median"].get<double>() / static_cast<double>(level_set_.active_voxels());
+      racer.row["nanoseconds_per_active_voxel"] = 1e9 * racer.row["seconds"]["median"].get<double>() /
+                                                  static_cast<double>(level_set_.active_voxels());
   }
 
   void picture(const std::vector<Json>& rows) {

@@ -5,10 +5,13 @@
 namespace hermesh {
 
 std::vector<MeasuredColumn> solid_columns() {
-  return {{"solid", "solid", "whether the mesh bounds the solid of the input, within √3 voxels: same, differs, or unknown of the input"},
-          {"solid_difference", "△ [%]",
-           "volume of the symmetric difference of the two solids, of the input's volume, where both are known"},
-          {"false_area", "false [%]", "area that follows what bounds no solid in the input, of the mesh's"}};
+  return {
+      {"solid", "solid",
+       "whether the mesh bounds the solid of the input, within √3 voxels: same, differs, or unknown of the "
+       "input"},
+      {"solid_difference", "△ [%]",
+       "volume of the symmetric difference of the two solids, of the input's volume, where both are known"},
+      {"false_area", "false [%]", "area that follows what bounds no solid in the input, of the mesh's"}};
 }
 
 void set_solid(Json& values, const validation::SolidComparison& solid) {
@@ -24,8 +27,10 @@ validation::SolidComparison compare_pieces(const std::vector<MeshFile>& pieces, 
   for (const MeshFile& piece : pieces) {
     const auto base = static_cast<std::uint32_t>(all.points.size());
     all.points.insert(all.points.end(), piece.points.begin(), piece.points.end());
-    for (const Triangle& t : piece.triangles) all.triangles.push_back({base + t[0], base + t[1], base + t[2]});
-    for (const Quad& q : piece.quads) all.quads.push_back({base + q[0], base + q[1], base + q[2], base + q[3]});
+    for (const Triangle& t : piece.triangles)
+      all.triangles.push_back({base + t[0], base + t[1], base + t[2]});
+    for (const Quad& q : piece.quads)
+      all.quads.push_back({base + q[0], base + q[1], base + q[2], base + q[3]});
   }
   return validation::compare_solids(all, whole, {.voxel_size = voxel_size, .pieces = true}, context);
 }

@@ -10,7 +10,8 @@ namespace hermesh {
 std::vector<MeasuredColumn> guarantee_mesh_columns() {
   std::vector<MeasuredColumn> columns = {
       {"resolution", "res.", "voxels along the longest side"},
-      {"extractor", "extractor", "adaptive-dual-contouring with threshold 0.1 on float data, openvdb with adaptivity 0.1"},
+      {"extractor", "extractor",
+       "adaptive-dual-contouring with threshold 0.1 on float data, openvdb with adaptivity 0.1"},
       {"tolerance", "tol. [vx]", "0 gives the uniform mesh"},
       {"triangles", "triangles", "a quad counting as two"},
       {"seconds", "time [s]", "one run, Hermite data included"},
@@ -56,7 +57,8 @@ std::vector<MeasuredColumn> guarantee_overview_columns() {
       {"digest", "digest",
        "of the digests of these meshes: where two commits have the same, so are the bytes of the meshes, and "
        "what was judged of one holds for the other, as long as files are written alike"},
-      {"adaptive-dual-contouring", "adaptive d. c.", "adaptive-dual-contouring with threshold 0.1 on float data" + defects},
+      {"adaptive-dual-contouring", "adaptive d. c.",
+       "adaptive-dual-contouring with threshold 0.1 on float data" + defects},
       {"dual-contouring", "dual contouring", "the same of dual-contouring"},
       {"marching-cubes", "marching cubes", "the same of marching-cubes"},
       {"openvdb", "openvdb 0.1", "the same of openvdb with adaptivity 0.1"}};

@@ -6,12 +6,12 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "algorithms/remesh/thin_parts.h"
+#include "algorithms/fracture/cutter_words.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
-#include "algorithms/fracture/cutter_words.h"
 #include "experiments/fracture/fracture_run.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/digest.h"
@@ -234,7 +234,8 @@ class Digests {
         const SharedLattice lattice = shared_lattice(mesh(), other, voxel_size());
         const auto sampled = [&](const PolygonMesh& solid) {
           const auto sample = [&](const PolygonMesh& framed) {
-            return solid_of(framed, voxelized(framed, "hermesh", {}, 3.0, child), ThinRule::drop, child).solid;
+            return solid_of(framed, voxelized(framed, "hermesh", {}, 3.0, child), ThinRule::drop, child)
+                .solid;
           };
           return sample_solid(solid, lattice, sample);
         };
@@ -249,12 +250,10 @@ class Digests {
       double tolerance;
       ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;
     };
-    std::vector<Break> all = {{"voronoi:8", "labelled", 0.0},
-                              {"chunks:8", "labelled", 0.0},
-                              {"planes:2", "labelled", 0.0},
-                              {"voronoi:8", "labelled", 0.2},
-                              {"voronoi:4", "thesis", 0.1},
-                              {"voronoi:4", "thesis", 0.1, ThesisFractureOptions::Rule::repaired}};
+    std::vector<Break> all = {
+        {"voronoi:8", "labelled", 0.0}, {"chunks:8", "labelled", 0.0},
+        {"planes:2", "labelled", 0.0},  {"voronoi:8", "labelled", 0.2},
+        {"voronoi:4", "thesis", 0.1},   {"voronoi:4", "thesis", 0.1, ThesisFractureOptions::Rule::repaired}};
     if (references()) all.push_back({"voronoi:4", "openvdb", 0.0});
     for (const Break& each : all)
       row("pieces: " + std::string(each.method) + " " + each.cutters +
@@ -269,7 +268,8 @@ class Digests {
                 make_cutters(parse_cutters(each.cutters), object.hermite, choices, child);
             std::vector<PolygonMesh> meshes;
             run_fracture(
-                object, made, {.name = each.method, .tolerance = each.tolerance, .options = {}, .rule = each.rule},
+                object, made,
+                {.name = each.method, .tolerance = each.tolerance, .options = {}, .rule = each.rule},
                 [&](PieceOutput&& piece) { meshes.push_back(std::move(piece.mesh)); }, child);
             return digest(meshes);
           });

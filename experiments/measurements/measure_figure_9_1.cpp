@@ -243,7 +243,9 @@ class Figure91Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_figure_9_1(const MeasurementInput& input) { return Figure91Measurer(input).run(); }
+std::vector<MeasuredRow> measure_figure_9_1(const MeasurementInput& input) {
+  return Figure91Measurer(input).run();
+}
 
 }  // namespace
 

@@ -114,7 +114,9 @@ class Figure94Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_figure_9_4(const MeasurementInput& input) { return Figure94Measurer(input).run(); }
+std::vector<MeasuredRow> measure_figure_9_4(const MeasurementInput& input) {
+  return Figure94Measurer(input).run();
+}
 
 }  // namespace
 

@@ -103,7 +103,8 @@ std::vector<MeasuredRow> race_at(double resolution, const LoadedCase& model, con
 std::vector<MeasuredRow> measure_figure_9_6(const MeasurementInput& input) {
   std::vector<Method> all = methods(input.parameters);
   std::vector<std::size_t> counts = {1};
-  if (const std::size_t most = tbb::global_control::active_value(kShownThreads); most > 1) counts.push_back(most);
+  if (const std::size_t most = tbb::global_control::active_value(kShownThreads); most > 1)
+    counts.push_back(most);
   std::erase_if(all, [&](const Method& method) {
     return !input.wants("points", method.label) && std::ranges::none_of(counts, [&](std::size_t count) {
       return input.wants("extraction", label_of_method(method, count));

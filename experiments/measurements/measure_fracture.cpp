@@ -67,8 +67,8 @@ class FractureBooks {
   }
 
  private:
-  /// What each method calls its tolerance (FractureMethod); OpenVDB's adaptivity is something else, so it runs at its
-  /// finest.
+  /// What each method calls its tolerance (FractureMethod); OpenVDB's adaptivity is something else, so it
+  /// runs at its finest.
   std::vector<double> tolerances_of(const std::string& method) const {
     if (method == "openvdb") return {0.0};
     return numbers_in(input_.parameters.text(method == "thesis" ? "thesis_tolerances" : "tolerances"));
@@ -116,7 +116,8 @@ class FractureBooks {
     rows_.push_back(std::move(row));
   }
 
-  void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object, const Cell& cell) {
+  void fill(MeasuredRow& row, const FractureSubject& subject, const FractureObject& object,
+            const Cell& cell) {
     const auto& [label, count, named, tolerance] = cell;
     const std::string method = named.method;
     RunContext child = child_context(input_.context, false);
@@ -166,7 +167,8 @@ class FractureBooks {
               {"csg", csg.in_milliseconds()},
               {"extraction", extraction.in_milliseconds()}};
     for (const auto& [figure, value] : child.figures)
-      if (figure == "lost_crossings" || figure == "needless_crossings" || figure == "escaped") values[figure] = value;
+      if (figure == "lost_crossings" || figure == "needless_crossings" || figure == "escaped")
+        values[figure] = value;
     // Without tags what is no seam counts as original, and the difference says nothing.
     if (ledger.gaps_can_be_judged) {
       values["unmatched"] = ledger.unmatched_cut;
@@ -209,8 +211,11 @@ class FractureBooks {
   void measure_order() {
     const FractureSubject& subject = fracture_subjects()[1];
     constexpr std::array kResolutions = {50, 100, 200};
-    const auto label = [&](int resolution) { return subject.label + ", 20, at " + std::to_string(resolution); };
-    if (std::ranges::none_of(kResolutions, [&](int each) { return input_.wants("order", label(each)); })) return;
+    const auto label = [&](int resolution) {
+      return subject.label + ", 20, at " + std::to_string(resolution);
+    };
+    if (std::ranges::none_of(kResolutions, [&](int each) { return input_.wants("order", label(each)); }))
+      return;
     const PolygonMesh mesh = load_subject(subject, input_);
     std::optional<double> before;
     for (const int resolution : kResolutions) {
@@ -257,7 +262,8 @@ std::vector<MeasuredColumn> ledger_columns() {
       {"volume", "Δ volume",
        "between the sum of the pieces' volumes and that within the original surface, relative"},
       {"uncut", "Δ uncut", "sum of the pieces' volumes less that of the uncut mesh, relative"},
-      {"lost_crossings", "lost", "crossings that the thesis's 10 bytes lose in all pieces, which leave holes"},
+      {"lost_crossings", "lost",
+       "crossings that the thesis's 10 bytes lose in all pieces, which leave holes"},
       {"needless_crossings", "needless",
        "data that eq. 7.1 leaves between samples of one sign, which are polygons that bound nothing"},
       {"escaped", "escaped", "points outside their cell or region"},
@@ -272,34 +278,42 @@ std::vector<MeasuredColumn> ledger_columns() {
 }
 
 std::vector<MeasuredColumn> tag_columns() {
-  return {{"polygons", "polygons", "of all pieces"},
-          {"left_out", "at rims [%]", "left out: their middle is within a voxel of the input and of a wall"},
-          {"precision", "precision [%]", "of the polygons tagged cut, those nearer to a wall than to the input"},
-          {"recall", "recall [%]", "of the polygons nearer to a wall, those tagged cut"}};
+  return {
+      {"polygons", "polygons", "of all pieces"},
+      {"left_out", "at rims [%]", "left out: their middle is within a voxel of the input and of a wall"},
+      {"precision", "precision [%]", "of the polygons tagged cut, those nearer to a wall than to the input"},
+      {"recall", "recall [%]", "of the polygons nearer to a wall, those tagged cut"}};
 }
 
 }  // namespace
 
 Measurement fracture_measurement() {
-  return {.name = "fracture",
-          .summary = "the books of fractures by all methods, and their times",
-          .parameters =
-              {{"cases", "all", "all, or one", {"all", "dragon", "fandisk", "noise-sphere-1m", "armadillo"}},
-               {"pieces", "20", "numbers of cells", {"2", "20", "50", "200", "2 20", "2 20 200"}},
-               {"tolerances", "0", "of the method labelled, voxels", {"0", "0.2", "1", "0 0.2", "0 0.2 1"}},
-               {"thesis_tolerances", "0 0.3", "of the method thesis: roots of its threshold, voxels", {"0", "0.3", "0 0.3"}},
-               {"voxelizer", "hermesh", "that the object's signs are from; thesis is chapter 5", {"hermesh", "thesis"}},
-               {"cutters", "voronoi", "cells with plane or rough walls", {"voronoi", "chunks"}},
-               {"scale", "1", "of the resolutions", {}, 0.05, 4.0},
-               {"order", "yes", "whether the order of the volume's difference is measured", {"yes", "no"}}},
-          .tables = {{"ledger", "do the books balance?", "object, cells, method", ledger_columns()},
-                     {"order",
-                      "what the cuts take from the volume of the uncut mesh",
-                      "object, cells, voxels",
-                      {{"difference", "difference", "relative"},
-                       {"order", "order", "exponent of the voxel size, from the row above"}}},
-                     {"tags", "are polygons tagged as what they are?", "object, cells, method", tag_columns()}},
-          .measure = [](const MeasurementInput& input) { return FractureBooks(input).run(); }};
+  return {
+      .name = "fracture",
+      .summary = "the books of fractures by all methods, and their times",
+      .parameters =
+          {{"cases", "all", "all, or one", {"all", "dragon", "fandisk", "noise-sphere-1m", "armadillo"}},
+           {"pieces", "20", "numbers of cells", {"2", "20", "50", "200", "2 20", "2 20 200"}},
+           {"tolerances", "0", "of the method labelled, voxels", {"0", "0.2", "1", "0 0.2", "0 0.2 1"}},
+           {"thesis_tolerances",
+            "0 0.3",
+            "of the method thesis: roots of its threshold, voxels",
+            {"0", "0.3", "0 0.3"}},
+           {"voxelizer",
+            "hermesh",
+            "that the object's signs are from; thesis is chapter 5",
+            {"hermesh", "thesis"}},
+           {"cutters", "voronoi", "cells with plane or rough walls", {"voronoi", "chunks"}},
+           {"scale", "1", "of the resolutions", {}, 0.05, 4.0},
+           {"order", "yes", "whether the order of the volume's difference is measured", {"yes", "no"}}},
+      .tables = {{"ledger", "do the books balance?", "object, cells, method", ledger_columns()},
+                 {"order",
+                  "what the cuts take from the volume of the uncut mesh",
+                  "object, cells, voxels",
+                  {{"difference", "difference", "relative"},
+                   {"order", "order", "exponent of the voxel size, from the row above"}}},
+                 {"tags", "are polygons tagged as what they are?", "object, cells, method", tag_columns()}},
+      .measure = [](const MeasurementInput& input) { return FractureBooks(input).run(); }};
 }
 
 }  // namespace hermesh

@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <sstream>
 
-#include "experiments/harness/cell.h"
 #include "experiments/fracture/fracture_folder.h"
 #include "experiments/fracture/fracture_subjects.h"
 #include "experiments/fracture/fracture_trials.h"
-#include "experiments/measurements/measurements.h"
+#include "experiments/harness/cell.h"
 #include "experiments/harness/run_cells.h"
+#include "experiments/measurements/measurements.h"
 
 namespace hermesh {
 namespace {
@@ -57,15 +57,16 @@ struct VolumeSum {
   void add(const VolumeSum& other) {
     fractures += other.fractures, pieces += other.pieces, triangles += other.triangles, seams += other.seams;
     broken_pieces += other.broken_pieces, crossing += other.crossing, unmatched += other.unmatched;
-    unbalanced += other.unbalanced, thinned += other.thinned, changed += other.changed, forced += other.forced;
+    unbalanced += other.unbalanced, thinned += other.thinned, changed += other.changed,
+        forced += other.forced;
     volume = std::max(volume, other.volume), uncut = std::max(uncut, other.uncut), seconds += other.seconds;
   }
   Json values() const {
     return {{"fractures", fractures}, {"pieces", pieces},         {"triangles", triangles},
             {"seams", seams},         {"broken", broken_pieces},  {"crossing", crossing},
-            {"unmatched", unmatched}, {"unbalanced", unbalanced}, {"thinned", thinned}, {"volume", volume},
-            {"uncut", 100.0 * uncut}, {"changed", changed},       {"forced", forced},
-            {"seconds", seconds}};
+            {"unmatched", unmatched}, {"unbalanced", unbalanced}, {"thinned", thinned},
+            {"volume", volume},       {"uncut", 100.0 * uncut},   {"changed", changed},
+            {"forced", forced},       {"seconds", seconds}};
   }
 };
 

@@ -157,8 +157,8 @@ struct Overview {
     for (const std::string& violation : violations)
       broken.push_back("tolerance " + readable(tolerance) + ": " + violation);
   }
-  /// Adds what counts of another extractor: edges and vertices that are not manifold, or open, and pairs of triangles that
-  /// intersect.
+  /// Adds what counts of another extractor: edges and vertices that are not manifold, or open, and pairs of
+  /// triangles that intersect.
   void add_other(const std::string& name, const Json& mesh) {
     const auto count = [&](const char* defect) { return mesh.value(defect, std::int64_t(0)); };
     const std::int64_t topology = count("boundary") + count("non_manifold_edges") +
@@ -205,13 +205,15 @@ class SubjectMeasurement {
   void measure_model(const std::string& name, double resolution) {
     RunContext child = child_context(input_.context, false);
     const LoadedCase loaded = input_.tables.load(name, child);
-    const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution};
+    const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, "hermesh"),
+                                .resolution = resolution};
     const std::string label = name + (loaded.origin.starts_with("stand-in") ? ", stand-in" : "");
     std::optional<LevelSet> level_set;
     if (const auto failure = attempt([&] { level_set = voxelize(loaded.mesh, recipe, child); }))
       rows.push_back({"models", label, {{"resolution", int(resolution)}}, {*failure}});
     else
-      measure_all({"models", label, *level_set, int(resolution), &loaded.mesh, voxel_size_of(recipe, loaded.mesh),
+      measure_all({"models", label, *level_set, int(resolution), &loaded.mesh,
+                   voxel_size_of(recipe, loaded.mesh),
                    input_.parameters.is("certify", "yes") && resolution <= kFinestCertified});
   }
 
@@ -259,8 +261,7 @@ class SubjectMeasurement {
                                {{"tolerance", readable_exactly(tolerance)},
                                 {"placement", input_.parameters.text("placement")},
                                 {"representation", input_.parameters.text("representation")}}};
-      if (is_octree(input_))
-        ours.options["largest_cube"] = input_.parameters.text("largest_cube");
+      if (is_octree(input_)) ours.options["largest_cube"] = input_.parameters.text("largest_cube");
       const MeasuredRow& row = add_row(subject, ours, tolerance);
       overview.add(row.values, tolerance, row.broken);
     }
@@ -272,7 +273,6 @@ class SubjectMeasurement {
     reference_ = {};  // of hundreds of subjects it would be gigabytes
     reference_report_.reset();
   }
-
 
   static std::string readable_exactly(double number) {
     std::ostringstream text;
@@ -357,7 +357,8 @@ class SubjectMeasurement {
   void compare_with_source(Json& values, const MeshFile& written, const Subject& subject, double tolerance,
                            RunContext& context) const {
     const double explained = (1.0 + tolerance) * subject.voxel_size;
-    set_solid(values, source_->compare(written, {.samples = kSolidSamples, .voxel_size = explained}, context));
+    set_solid(values,
+              source_->compare(written, {.samples = kSolidSamples, .voxel_size = explained}, context));
   }
 
   void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
@@ -381,11 +382,12 @@ class SubjectMeasurement {
   const std::vector<double> tolerances_;
   const bool judged_;
   std::optional<validation::SolidReference> source_;  ///< the polygons of a model
-  MeshFile reference_;  ///< the subject's uniform mesh
+  MeshFile reference_;                                ///< the subject's uniform mesh
   std::optional<validation::MeshReport> reference_report_;
 };
 
-/// Subjects side by side, for most of what is done to one is not parallel. Their rows are emitted in the order of subjects.
+/// Subjects side by side, for most of what is done to one is not parallel. Their rows are emitted in the
+/// order of subjects.
 class Guarantee {
  public:
   explicit Guarantee(const MeasurementInput& input) : input_(input) {}
@@ -413,7 +415,8 @@ class Guarantee {
     tbb::task_group group;
     for (int worker = 0; worker < tbb::this_task_arena::max_concurrency(); ++worker)
       group.run([&] {
-        // An exception that the group saw would end the loops of other subjects halfway, without a word to them.
+        // An exception that the group saw would end the loops of other subjects halfway, without a word to
+        // them.
         try {
           work();
         } catch (...) {

@@ -8,9 +8,9 @@
 #include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
+#include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pipeline.h"
-#include "experiments/harness/run_cells.h"
 
 namespace hermesh {
 namespace {
@@ -19,9 +19,9 @@ using Eigen::Vector3d;
 
 // ---- Laws.
 
-/// A few spheres, and boxes turned by 0.3° about an axis square to z, so that the upper faces lean into the positive
-/// octant, where the thesis's layout takes normals for none, and the lower ones into the negative, whence its complement
-/// turns them there.
+/// A few spheres, and boxes turned by 0.3° about an axis square to z, so that the upper faces lean into the
+/// positive octant, where the thesis's layout takes normals for none, and the lower ones into the negative,
+/// whence its complement turns them there.
 AnalyticSurface random_solid(std::mt19937_64& random) {
   struct Part {
     Vector3d centre, half;
@@ -96,7 +96,8 @@ struct Pairs {
   const std::vector<std::array<FloatHermite, 2>>& all() {
     std::mt19937_64 random(input.seed);
     while (made.size() < std::size_t(input.parameters.number("pairs")))
-      made.push_back({sampled(random_solid(random), input.context), sampled(random_solid(random), input.context)});
+      made.push_back(
+          {sampled(random_solid(random), input.context), sampled(random_solid(random), input.context)});
     return made;
   }
 };
@@ -111,7 +112,9 @@ void count_violations(const std::string& label, bool must_hold, Pairs& pairs, St
   for (const auto& [first, second] : pairs.all()) {
     context.check();
     const Data a = store(first), b = store(second);
-    const auto both = [&](Boolean boolean, const Data& x, const Data& y) { return combine(boolean, x, y, context); };
+    const auto both = [&](Boolean boolean, const Data& x, const Data& y) {
+      return combine(boolean, x, y, context);
+    };
     const Data united = both(Boolean::unite, a, b);
     const FloatHermite plain_a = read(a), plain_union = read(united);
     crossings += plain_union.crossings.size();
@@ -124,8 +127,12 @@ void count_violations(const std::string& label, bool must_hold, Pairs& pairs, St
     self_difference += read(both(Boolean::subtract, a, a)).crossings.size();
   }
   MeasuredRow row{"laws", label};
-  row.values = {{"pairs", pairs.made.size()},         {"crossings", crossings},   {"involution", involution},
-                {"de_morgan", de_morgan},        {"commutes", commutes},     {"idempotent", idempotent},
+  row.values = {{"pairs", pairs.made.size()},
+                {"crossings", crossings},
+                {"involution", involution},
+                {"de_morgan", de_morgan},
+                {"commutes", commutes},
+                {"idempotent", idempotent},
                 {"self_difference", self_difference}};
   if (must_hold && involution + de_morgan + commutes + idempotent + self_difference > 0)
     row.broken.push_back(label + ": a law does not hold");
@@ -133,7 +140,8 @@ void count_violations(const std::string& label, bool must_hold, Pairs& pairs, St
 }
 
 template <class Voxel>
-void count_dense_violations(const std::string& label, bool must_hold, Pairs& pairs, std::vector<MeasuredRow>& rows) {
+void count_dense_violations(const std::string& label, bool must_hold, Pairs& pairs,
+                            std::vector<MeasuredRow>& rows) {
   RunContext& context = pairs.input.context;
   count_violations<DenseHermite<Voxel>>(
       label, must_hold, pairs, [&](const FloatHermite& data) { return to_dense<Voxel>(data, context); },
@@ -159,8 +167,8 @@ std::vector<MeasuredRow> measure_laws(const MeasurementInput& input) {
 
 // ---- Two scans.
 
-/// `mesh` scaled and moved so that its box has the length of `to`'s and lies beside it by a third of that, on the same
-/// origin and so on the same lattice.
+/// `mesh` scaled and moved so that its box has the length of `to`'s and lies beside it by a third of that, on
+/// the same origin and so on the same lattice.
 PolygonMesh beside(const PolygonMesh& mesh, const PolygonMesh& to) {
   const Bounds own = bounds(mesh), other = bounds(to);
   const double scale = other.size().maxCoeff() / own.size().maxCoeff();
@@ -212,7 +220,8 @@ std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
   const auto row = [&](const std::string& label, const PackedHermite& data) {
     return judged(label, data, voxel_size, input);
   };
-  std::vector<MeasuredRow> rows = {row(kLabels[0], a), row(kLabels[1], b),
+  std::vector<MeasuredRow> rows = {row(kLabels[0], a),
+                                   row(kLabels[1], b),
                                    row(kLabels[2], combine(Boolean::unite, a, b, context)),
                                    row(kLabels[3], combine(Boolean::intersect, a, b, context)),
                                    row(kLabels[4], combine(Boolean::subtract, a, b, context)),
@@ -234,39 +243,41 @@ std::vector<MeasuredRow> measure_hermite_csg(const MeasurementInput& input) {
 }  // namespace
 
 Measurement hermite_csg_measurement() {
-  return {.name = "hermite-csg",
-          .summary = "Boolean operations on Hermite data: which laws hold, and what two scans give",
-          .parameters = {{"pairs", "100", "random pairs of solids that the laws are tried on", {}, 1, 100000},
-                         {"first", "bunny-closed", "case A", case_choices()},
-                         {"second", "armadillo", "case B, scaled to A's length and set beside it by a third of that",
-                          case_choices()},
-                         {"resolution", "200", "voxels along A's longest side", {}, 8, 20000}},
-          .tables = {{"laws",
-                      "crossings in which the two sides of a law differ",
-                      "representation",
-                      {{"pairs", "pairs", "of random solids"},
-                       {"crossings", "crossings", "of all unions together"},
-                       {"involution", "¬¬A = A", "crossings that two complements change"},
-                       {"de_morgan", "De Morgan", "crossings in which A ∪ B and ¬(¬A ∩ ¬B) differ"},
-                       {"commutes", "commutes", "crossings in which A ∪ B and B ∪ A differ"},
-                       {"idempotent", "A ∪ A = A", "crossings in which they differ"},
-                       {"self_difference", "A \\ A = ∅", "crossings that are left"}}},
-                     {"scans",
-                      "two scans combined as packed data, then dual contouring",
-                      "result",
-                      {{"crossings", "crossings", "edges that the surface crosses"},
-                       {"triangles", "triangles", "of the mesh"},
-                       {"boundary", "open", "boundary edges"},
-                       {"non_manifold_edges", "nm e", "non-manifold edges"},
-                       {"non_manifold_vertices", "nm v", "non-manifold vertices"},
-                       {"inconsistent", "flipped", "inconsistently oriented edges"},
-                       {"self_intersections", "crossing", "self-intersecting pairs of triangles"},
-                       {"components", "comp.", "connected components"},
-                       {"volume", "volume [vx³]", "enclosed volume"},
-                       {"ledger", "ledger [vx³]",
-                        "by how much the volumes of both parts differ from that of the whole: A ∪ B with A ∩ B from A "
-                        "with B, A \\ B with A ∩ B from A, B \\ A with A ∩ B from B"}}}},
-          .measure = measure_hermite_csg};
+  return {
+      .name = "hermite-csg",
+      .summary = "Boolean operations on Hermite data: which laws hold, and what two scans give",
+      .parameters = {{"pairs", "100", "random pairs of solids that the laws are tried on", {}, 1, 100000},
+                     {"first", "bunny-closed", "case A", case_choices()},
+                     {"second", "armadillo",
+                      "case B, scaled to A's length and set beside it by a third of that", case_choices()},
+                     {"resolution", "200", "voxels along A's longest side", {}, 8, 20000}},
+      .tables =
+          {{"laws",
+            "crossings in which the two sides of a law differ",
+            "representation",
+            {{"pairs", "pairs", "of random solids"},
+             {"crossings", "crossings", "of all unions together"},
+             {"involution", "¬¬A = A", "crossings that two complements change"},
+             {"de_morgan", "De Morgan", "crossings in which A ∪ B and ¬(¬A ∩ ¬B) differ"},
+             {"commutes", "commutes", "crossings in which A ∪ B and B ∪ A differ"},
+             {"idempotent", "A ∪ A = A", "crossings in which they differ"},
+             {"self_difference", "A \\ A = ∅", "crossings that are left"}}},
+           {"scans",
+            "two scans combined as packed data, then dual contouring",
+            "result",
+            {{"crossings", "crossings", "edges that the surface crosses"},
+             {"triangles", "triangles", "of the mesh"},
+             {"boundary", "open", "boundary edges"},
+             {"non_manifold_edges", "nm e", "non-manifold edges"},
+             {"non_manifold_vertices", "nm v", "non-manifold vertices"},
+             {"inconsistent", "flipped", "inconsistently oriented edges"},
+             {"self_intersections", "crossing", "self-intersecting pairs of triangles"},
+             {"components", "comp.", "connected components"},
+             {"volume", "volume [vx³]", "enclosed volume"},
+             {"ledger", "ledger [vx³]",
+              "by how much the volumes of both parts differ from that of the whole: A ∪ B with A ∩ B from A "
+              "with B, A \\ B with A ∩ B from A, B \\ A with A ∩ B from B"}}}},
+      .measure = measure_hermite_csg};
 }
 
 }  // namespace hermesh

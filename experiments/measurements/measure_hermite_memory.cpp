@@ -36,7 +36,8 @@ class Model {
   LevelSet level_set(double resolution) {
     if (!loaded_) loaded_ = input_.tables.load(input_.parameters.text("case"), input_.context);
     return voxelize(loaded_->mesh,
-                    {.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution}, input_.context);
+                    {.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution},
+                    input_.context);
   }
 
  private:
@@ -58,8 +59,10 @@ std::vector<MeasuredRow> uniform_rows(Model& model, const MeasurementInput& inpu
     row.values["printed"] = printed.mebibytes;
     const double bytes = 12.0 * printed.width * printed.width * printed.width;
     const std::optional<std::uint64_t> available = available_memory();
-    if (printed.width <= input.parameters.number("largest_uniform") && (!available || bytes < 0.8 * double(*available)))
-      resident([&] { return std::vector<float>(std::size_t(bytes) / sizeof(float), 1.0f); }, row.values["uniform"]);
+    if (printed.width <= input.parameters.number("largest_uniform") &&
+        (!available || bytes < 0.8 * double(*available)))
+      resident([&] { return std::vector<float>(std::size_t(bytes) / sizeof(float), 1.0f); },
+               row.values["uniform"]);
     const LevelSet level_set = model.level_set(printed.width);
     row.values["level_set"] = double(level_set.memory_bytes()) / kMiB;
     const PackedHermite sparse =
@@ -73,10 +76,10 @@ std::vector<MeasuredRow> uniform_rows(Model& model, const MeasurementInput& inpu
 /// What one representation takes.
 struct Size {
   std::string label;
-  Json printed;           ///< bytes a voxel in the thesis, where it says
-  double bytes_a_voxel;   ///< of the type; 0 where there is no voxel
-  std::size_t bytes;      ///< allocated, as the data structure counts them
-  Json resident;          ///< MiB, as the kernel does
+  Json printed;          ///< bytes a voxel in the thesis, where it says
+  double bytes_a_voxel;  ///< of the type; 0 where there is no voxel
+  std::size_t bytes;     ///< allocated, as the data structure counts them
+  Json resident;         ///< MiB, as the kernel does
   std::size_t leaves;
 };
 
@@ -107,7 +110,8 @@ void add_dense_size(const std::string& label, const Json& printed, const FloatHe
                     const MeasurementInput& input, std::vector<Size>& sizes) {
   if (!input.wants("representations", label)) return;
   Size size{label, printed, double(sizeof(Voxel)), 0, {}, 0};
-  const DenseHermite<Voxel> dense = resident([&] { return to_dense<Voxel>(hermite, input.context); }, size.resident);
+  const DenseHermite<Voxel> dense =
+      resident([&] { return to_dense<Voxel>(hermite, input.context); }, size.resident);
   size.bytes = dense.memory_bytes();
   size.leaves = dense.leaves();
   sizes.push_back(size);
@@ -123,8 +127,10 @@ std::vector<MeasuredRow> representation_rows(Model& model, const MeasurementInpu
   level_set_size.bytes = level_set.memory_bytes();
   level_set_size.leaves = level_set.grid().grid->tree().leafCount();
 
-  Size sparse_float{kRepresentations[5], nullptr, 0, 0, {}, 0}, sparse{kRepresentations[6], nullptr, 0, 0, {}, 0};
-  const FloatHermite hermite = resident([&] { return sample_level_set(level_set, 0.0, context); }, sparse_float.resident);
+  Size sparse_float{kRepresentations[5], nullptr, 0, 0, {}, 0},
+      sparse{kRepresentations[6], nullptr, 0, 0, {}, 0};
+  const FloatHermite hermite =
+      resident([&] { return sample_level_set(level_set, 0.0, context); }, sparse_float.resident);
   sparse_float.bytes = hermite.memory_bytes();
   const PackedHermite packed =
       resident([&] { return pack(hermite, NormalCodeId::octahedral, context); }, sparse.resident);
@@ -138,7 +144,8 @@ std::vector<MeasuredRow> representation_rows(Model& model, const MeasurementInpu
   add_dense_size<FixedVoxel>(kRepresentations[4], 10, hermite, input, sizes);
   sizes.insert(sizes.end(), {sparse_float, sparse});
   std::vector<MeasuredRow> rows;
-  for (const Size& size : sizes) rows.push_back(row_of_size(size, level_set.active_voxels(), hermite.crossings.size()));
+  for (const Size& size : sizes)
+    rows.push_back(row_of_size(size, level_set.active_voxels(), hermite.crossings.size()));
   return rows;
 }
 
@@ -152,31 +159,34 @@ std::vector<MeasuredRow> measure_hermite_memory(const MeasurementInput& input) {
 }  // namespace
 
 Measurement hermite_memory_measurement() {
-  return {.name = "hermite-memory",
-          .summary = "allocated bytes of uniform grids, level sets and Hermite data (tables 2.1 and 2.2)",
-          .parameters = {{"case", "bunny-closed", "model whose level set and Hermite data are set beside them",
-                          case_choices()},
-                         {"resolution", "800", "voxels along its longest side", {}, 8, 20000},
-                         {"largest_uniform", "1024", "width of the largest uniform grid that is allocated", {}, 0, 4096}},
-          .tables = {{"uniform",
-                      "table 2.1: a uniform grid of three floats a voxel, and sparse volumes of the model at the same width",
-                      "voxels",
-                      {{"printed", "printed [MiB]", "what the thesis says"},
-                       {"uniform", "uniform [MiB]", "resident memory that the grid took"},
-                       {"level_set", "level set [MiB]", "allocated by the model's narrow band"},
-                       {"sparse", "sparse [MiB]", "allocated by its packed Hermite data"}}},
-                     {"representations",
-                      "table 2.2: representations of one surface",
-                      "representation",
-                      {{"printed", "printed [B]", "bytes a voxel that the thesis says"},
-                       {"type", "type [B]", "bytes of the voxel's type"},
-                       {"mebibytes", "allocated [MiB]", "by the data structure's own count"},
-                       {"resident", "resident [MiB]", "that making it added, with what it needed on the way"},
-                       {"leaves", "leaves", "blocks of 8³ samples that hold data"},
-                       {"leaf", "B/leaf", "allocated bytes a leaf"},
-                       {"band", "B/band voxel", "allocated bytes an active voxel of the level set"},
-                       {"crossing", "B/crossing", "allocated bytes an edge crossing"}}}},
-          .measure = measure_hermite_memory};
+  return {
+      .name = "hermite-memory",
+      .summary = "allocated bytes of uniform grids, level sets and Hermite data (tables 2.1 and 2.2)",
+      .parameters =
+          {{"case", "bunny-closed", "model whose level set and Hermite data are set beside them",
+            case_choices()},
+           {"resolution", "800", "voxels along its longest side", {}, 8, 20000},
+           {"largest_uniform", "1024", "width of the largest uniform grid that is allocated", {}, 0, 4096}},
+      .tables = {{"uniform",
+                  "table 2.1: a uniform grid of three floats a voxel, and sparse volumes of the model at the "
+                  "same width",
+                  "voxels",
+                  {{"printed", "printed [MiB]", "what the thesis says"},
+                   {"uniform", "uniform [MiB]", "resident memory that the grid took"},
+                   {"level_set", "level set [MiB]", "allocated by the model's narrow band"},
+                   {"sparse", "sparse [MiB]", "allocated by its packed Hermite data"}}},
+                 {"representations",
+                  "table 2.2: representations of one surface",
+                  "representation",
+                  {{"printed", "printed [B]", "bytes a voxel that the thesis says"},
+                   {"type", "type [B]", "bytes of the voxel's type"},
+                   {"mebibytes", "allocated [MiB]", "by the data structure's own count"},
+                   {"resident", "resident [MiB]", "that making it added, with what it needed on the way"},
+                   {"leaves", "leaves", "blocks of 8³ samples that hold data"},
+                   {"leaf", "B/leaf", "allocated bytes a leaf"},
+                   {"band", "B/band voxel", "allocated bytes an active voxel of the level set"},
+                   {"crossing", "B/crossing", "allocated bytes an edge crossing"}}}},
+      .measure = measure_hermite_memory};
 }
 
 }  // namespace hermesh

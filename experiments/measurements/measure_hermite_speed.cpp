@@ -1,4 +1,5 @@
-// How fast Hermite data are made and combined, beside OpenVDB's mesher on the same level set and the memory's own speed.
+// How fast Hermite data are made and combined, beside OpenVDB's mesher on the same level set and the memory's
+// own speed.
 #include <openvdb/tools/VolumeToMesh.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -20,9 +21,9 @@
 namespace hermesh {
 namespace {
 
-/// Bytes a second of a[i] = b[i] + s c[i] over arrays that no cache holds, all threads: three streams. A sweep before
-/// the one that is timed finds the pages again that a system has taken its tables of away since the last: it is the
-/// memory's speed that is asked for, not what a contender before left behind.
+/// Bytes a second of a[i] = b[i] + s c[i] over arrays that no cache holds, all threads: three streams. A
+/// sweep before the one that is timed finds the pages again that a system has taken its tables of away since
+/// the last: it is the memory's speed that is asked for, not what a contender before left behind.
 class Triad {
  public:
   Triad() : a_(kSize), b_(kSize, 1.0f), c_(kSize, 2.0f) {}
@@ -60,20 +61,24 @@ double openvdb_mesh(const LevelSet& level_set) {
   std::vector<openvdb::Vec3s> points;
   std::vector<openvdb::Vec3I> triangles;
   std::vector<openvdb::Vec4I> quads;
-  return timed([&] { openvdb::tools::volumeToMesh(*level_set.grid().grid, points, triangles, quads, 0.0, 0.0); });
+  return timed(
+      [&] { openvdb::tools::volumeToMesh(*level_set.grid().grid, points, triangles, quads, 0.0, 0.0); });
 }
 
 /// The surface moved a tenth of its length further along x, by whole leaves and so on the same lattice.
 PackedHermite shifted(PackedHermite hermite) {
   std::int32_t low = 0, high = 0;
-  for (const SignLeaf& leaf : hermite.leaves) low = std::min(low, leaf.lower[0]), high = std::max(high, leaf.lower[0]);
+  for (const SignLeaf& leaf : hermite.leaves)
+    low = std::min(low, leaf.lower[0]), high = std::max(high, leaf.lower[0]);
   const std::int32_t shift = ((high - low) / 10) & ~7;
   for (SignLeaf& leaf : hermite.leaves) leaf.lower[0] += shift;
   return hermite;
 }
 
-/// Notes how long a contender took, and, if it moves bytes, how many times as long as the triad's bandwidth would take.
-void note_times(MeasuredRow& row, const std::vector<double>& seconds, double bytes, const std::vector<double>& triad) {
+/// Notes how long a contender took, and, if it moves bytes, how many times as long as the triad's bandwidth
+/// would take.
+void note_times(MeasuredRow& row, const std::vector<double>& seconds, double bytes,
+                const std::vector<double>& triad) {
   const double middle = median(seconds), shortest = std::ranges::min(seconds);
   row.values["seconds"] = middle;
   row.values["minimum"] = shortest;
@@ -84,18 +89,22 @@ void note_times(MeasuredRow& row, const std::vector<double>& seconds, double byt
 
 std::string triad_label(const std::string& table) { return "triad, beside " + table; }
 
-/// Contenders of one race, with what their rows say besides. The memory's own speed runs along, for it changes with what
-/// else the machine does.
+/// Contenders of one race, with what their rows say besides. The memory's own speed runs along, for it
+/// changes with what else the machine does.
 class Race {
  public:
-  Race(std::string table, int repetitions, Triad& triad) : table_(std::move(table)), repetitions_(repetitions) {
-    add("triad", [&triad] { return triad.run(); }, 0, Triad::kBytes, -1);
+  Race(std::string table, int repetitions, Triad& triad)
+      : table_(std::move(table)), repetitions_(repetitions) {
+    add(
+        "triad", [&triad] { return triad.run(); }, 0, Triad::kBytes, -1);
   }
 
   /// `compared_with`: number of the contender that its ratio names, or −1.
-  int add(const std::string& label, std::function<double()> run, double items, double bytes, int compared_with) {
+  int add(const std::string& label, std::function<double()> run, double items, double bytes,
+          int compared_with) {
     labels_.push_back({label, items, bytes, compared_with});
-    contenders_.push_back({.run = std::move(run), .budget_seconds = 1e9, .repetitions = repetitions_, .seconds = {}});
+    contenders_.push_back(
+        {.run = std::move(run), .budget_seconds = 1e9, .repetitions = repetitions_, .seconds = {}});
     return int(labels_.size()) - 1;
   }
   std::vector<MeasuredRow> run() {
@@ -133,23 +142,25 @@ void append_rows(std::vector<MeasuredRow>& rows, std::vector<MeasuredRow> more) 
   std::ranges::move(more, std::back_inserter(rows));
 }
 
-/// A conversion that moves so many bytes, and the memory, with 1, 2, 4, … threads: cores share the memory, so that what
-/// arithmetic bounds with few of them comes close to the memory's speed with many.
-std::vector<MeasuredRow> by_threads(const std::string& label, const std::function<double()>& conversion, double bytes,
-                                    int repetitions, Triad& triad) {
+/// A conversion that moves so many bytes, and the memory, with 1, 2, 4, … threads: cores share the memory, so
+/// that what arithmetic bounds with few of them comes close to the memory's speed with many.
+std::vector<MeasuredRow> by_threads(const std::string& label, const std::function<double()>& conversion,
+                                    double bytes, int repetitions, Triad& triad) {
   constexpr auto kThreads = tbb::global_control::max_allowed_parallelism;
   std::vector<std::size_t> counts;
   const std::size_t most = tbb::global_control::active_value(kThreads);
   for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
   counts.push_back(most);
   std::vector<Contender> contenders;  // the memory by count, then the conversion
-  for (const std::function<double()>& run : {std::function<double()>([&triad] { return triad.run(); }), conversion})
+  for (const std::function<double()>& run :
+       {std::function<double()>([&triad] { return triad.run(); }), conversion})
     for (const std::size_t count : counts) {
       const auto limited = [count, run] {
         const tbb::global_control limit(kThreads, count);
         return run();
       };
-      contenders.push_back({.run = limited, .budget_seconds = 1e9, .repetitions = repetitions, .seconds = {}});
+      contenders.push_back(
+          {.run = limited, .budget_seconds = 1e9, .repetitions = repetitions, .seconds = {}});
     }
   for (Contender& contender : contenders) contender.run();  // warms caches and pools
   race(contenders);
@@ -180,7 +191,8 @@ constexpr const char* kUnion[] = {"triad", "sparse: unpack, unite, pack", "spars
 
 std::vector<MeasuredRow> measure_hermite_speed(const MeasurementInput& input) {
   const bool memory = input.wants_any("memory", kMemory), threads = input.wants_any("threads", kThreads);
-  const bool races_sampling = input.wants_any("sampling", kSampling) || input.wants("memory", triad_label("sampling"));
+  const bool races_sampling =
+      input.wants_any("sampling", kSampling) || input.wants("memory", triad_label("sampling"));
   const bool races_unions = input.wants_any("union", kUnion) || input.wants("memory", triad_label("union"));
   if (!memory && !threads && !races_sampling && !races_unions) return {};
   RunContext& context = input.context;
@@ -208,17 +220,18 @@ std::vector<MeasuredRow> measure_hermite_speed(const MeasurementInput& input) {
   const std::function<double()> sample_packed = [&] {
     return timed([&] { sample_level_set_packed(level_set, 0.0, kCode, context); });
   };
-  const int peer = sampling.add(kSampling[1], [&] { return openvdb_mesh(level_set); }, crossings, 0, -1);
+  const int peer = sampling.add(
+      kSampling[1], [&] { return openvdb_mesh(level_set); }, crossings, 0, -1);
   sampling.add(kSampling[2], sample_packed, crossings, read + written, peer);
   sampling.add(
       kSampling[3], [&] { return timed([&] { sample_level_set(level_set, 0.0, context); }); }, crossings,
       read + written + more_as_floats, peer);
   const int floor = sampling.add(
-      kSampling[4],
-      [&] { return write_floor(dense_a.leaves(), FixedDense::bytes_per_leaf()); }, crossings, dense_bytes, peer);
+      kSampling[4], [&] { return write_floor(dense_a.leaves(), FixedDense::bytes_per_leaf()); }, crossings,
+      dense_bytes, peer);
   sampling.add(
-      kSampling[5], [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings,
-      dense_bytes, floor);
+      kSampling[5], [&] { return timed([&] { to_dense<FixedVoxel>(a, context); }); }, crossings, dense_bytes,
+      floor);
   if (races_sampling) append_rows(rows, sampling.run());
   if (threads) append_rows(rows, by_threads(kThreads[1], sample_packed, read + written, repetitions, triad));
 
@@ -231,23 +244,24 @@ std::vector<MeasuredRow> measure_hermite_speed(const MeasurementInput& input) {
         });
       },
       2 * crossings, 0, -1);
-  unions.add(kUnion[2], [&] { return timed([&] { combine(Boolean::unite, a, b, context); }); },
-             2 * crossings, 3 * written, unpacked);
+  unions.add(
+      kUnion[2], [&] { return timed([&] { combine(Boolean::unite, a, b, context); }); }, 2 * crossings,
+      3 * written, unpacked);
   const int dense_unpacked = unions.add(
       kUnion[3],
       [&] {
         return timed([&] {
           FloatDense x = to_dense<FloatVoxel>(to_sparse(dense_a, context), context);
           FloatDense y = to_dense<FloatVoxel>(to_sparse(dense_b, context), context);
-          to_dense<FixedVoxel>(to_sparse(combine(Boolean::unite, std::move(x), std::move(y), context), context), context,
-                               kCode);
+          to_dense<FixedVoxel>(
+              to_sparse(combine(Boolean::unite, std::move(x), std::move(y), context), context), context,
+              kCode);
         });
       },
       2 * crossings, 0, -1);
   unions.add(
-      kUnion[4],
-      [&] { return timed([&] { combine(Boolean::unite, dense_a, dense_b, context); }); }, 2 * crossings, 3 * dense_bytes,
-      dense_unpacked);
+      kUnion[4], [&] { return timed([&] { combine(Boolean::unite, dense_a, dense_b, context); }); },
+      2 * crossings, 3 * dense_bytes, dense_unpacked);
   if (races_unions) append_rows(rows, unions.run());
   return rows;
 }
@@ -256,9 +270,9 @@ std::vector<MeasuredRow> measure_hermite_speed(const MeasurementInput& input) {
 
 Measurement hermite_speed_measurement() {
   const MeasuredColumn seconds{"seconds", "time [s]", "median"}, minimum{"minimum", "min [s]", "shortest"};
-  const MeasuredColumn floor{
-      "floor", "÷ bandwidth",
-      "median time divided by that in which the triad's bandwidth would read the input and write the result once"};
+  const MeasuredColumn floor{"floor", "÷ bandwidth",
+                             "median time divided by that in which the triad's bandwidth would read the "
+                             "input and write the result once"};
   const MeasuredColumn floor_of_shortest{
       "floor_of_shortest", "of shortest",
       "the same with the shortest time of either, which other work on the machine disturbs less"};
@@ -268,7 +282,8 @@ Measurement hermite_speed_measurement() {
       {"ns", "ns/crossing", "median time an edge crossing of the input"},
       floor,
       floor_of_shortest,
-      {"ratio", "times as fast", "as the peer: volumeToMesh at adaptivity 0, the write floor, or the way over floats"}};
+      {"ratio", "times as fast",
+       "as the peer: volumeToMesh at adaptivity 0, the write floor, or the way over floats"}};
   return {.name = "hermite-speed",
           .summary = "time to make Hermite data from a level set and to unite them",
           .parameters = {{"case", "bunny-closed", "model", case_choices()},
@@ -277,7 +292,9 @@ Measurement hermite_speed_measurement() {
           .tables = {{"memory",
                       "what is moved, and how fast the memory is",
                       "what",
-                      {{"gigabytes", "GB/s", "bandwidth of a triad a = b + s c with all threads, in turns with the table's contenders, median"},
+                      {{"gigabytes", "GB/s",
+                        "bandwidth of a triad a = b + s c with all threads, in turns with the table's "
+                        "contenders, median"},
                        {"mebibytes", "MiB", "bytes"}}},
                      {"sampling", "level set to Hermite data", "contender", columns},
                      {"threads",
@@ -289,7 +306,8 @@ Measurement hermite_speed_measurement() {
                        floor,
                        floor_of_shortest,
                        {"speedup", "speedup", "times as fast as with one thread, by medians"}}},
-                     {"union", "union of the model with itself moved by a tenth of its length", "contender", columns}},
+                     {"union", "union of the model with itself moved by a tenth of its length", "contender",
+                      columns}},
           .measure = measure_hermite_speed};
 }
 

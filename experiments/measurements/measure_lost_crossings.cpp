@@ -12,7 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A box about the origin, turned about y, as signed distance: exact beside its faces, right in sign everywhere.
+/// A box about the origin, turned about y, as signed distance: exact beside its faces, right in sign
+/// everywhere.
 AnalyticSurface turned_box(const Vector3d& half, double degrees) {
   const Eigen::Matrix3d to_box =
       Eigen::AngleAxisd(-degrees * std::numbers::pi / 180.0, Vector3d::UnitY()).toRotationMatrix();
@@ -71,7 +72,8 @@ Measurement lost_crossings_measurement() {
                       "turned by",
                       {{"degrees", "angle [°]", "by which the box is turned"},
                        {"crossings", "crossings", "edges that the box's surface crosses"},
-                       {"thesis", "lost, thesis", "of these, those that the thesis's layout says to have no data"},
+                       {"thesis", "lost, thesis",
+                        "of these, those that the thesis's layout says to have no data"},
                        {"thesis_share", "share", "their share"},
                        {"fixed", "lost, fixed", "those that the fixed layout of the same size loses"}}}},
           .measure = measure_lost_crossings};

@@ -290,7 +290,9 @@ class SamplingMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_sampling(const MeasurementInput& input) { return SamplingMeasurer(input).run(); }
+std::vector<MeasuredRow> measure_sampling(const MeasurementInput& input) {
+  return SamplingMeasurer(input).run();
+}
 
 }  // namespace
 

@@ -235,8 +235,8 @@ class SurfaceNoiseMeasurer {
 
   void run(double noise) {
     std::vector<SmoothingWay> all = smoothing_ways();
-    std::erase_if(all,
-                  [&](const SmoothingWay& way) { return !input_.wants("roughness", label_of(way.label, noise)); });
+    std::erase_if(
+        all, [&](const SmoothingWay& way) { return !input_.wants("roughness", label_of(way.label, noise)); });
     if (all.empty() && !input_.wants("roughness", label_of(kInput, noise))) return;
     surface_ = Surface(width_, noise, input_.parameters.number("swell"), input_.seed);
     const double depth = 12.0 + 2.0 * input_.parameters.number("swell");
@@ -352,7 +352,9 @@ class SurfaceNoiseMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_surface_noise(const MeasurementInput& input) { return SurfaceNoiseMeasurer(input).run(); }
+std::vector<MeasuredRow> measure_surface_noise(const MeasurementInput& input) {
+  return SurfaceNoiseMeasurer(input).run();
+}
 
 }  // namespace
 

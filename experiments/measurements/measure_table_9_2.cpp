@@ -31,7 +31,8 @@ constexpr const char* kOldLabel = "openvdb";
 LoadedCase load_model(const MeasurementInput& input) {
   if (!input.parameters.is("case", "happy-buddha"))
     return input.tables.load(input.parameters.text("case"), input.context);
-  if (is_at_hand("happy-buddha-full", input.context)) return input.tables.load("happy-buddha-full", input.context);
+  if (is_at_hand("happy-buddha-full", input.context))
+    return input.tables.load("happy-buddha-full", input.context);
   LoadedCase decimated = input.tables.load("happy-buddha", input.context);
   return decimated.origin.starts_with("stand-in") ? input.tables.load("dragon", input.context) : decimated;
 }
@@ -129,7 +130,8 @@ class Extraction {
     row.values["peak"] = optional_json(peak);
     if (peak) row.values["peak"] = double(*peak) / (1 << 20);
     for (const auto& [name, value] : context.figures)
-      if (name == "largest_plane_distance" || name == "escaped" || name == "lost_crossings") row.values[name] = value;
+      if (name == "largest_plane_distance" || name == "escaped" || name == "lost_crossings")
+        row.values[name] = value;
     set_counts(row.values, printed.points, printed.polygons, kPrinted[0].points, "printed_");
     row.values["printed_seconds"] = printed.seconds;
     return row;
@@ -287,7 +289,8 @@ std::vector<MeasuredColumn> extraction_columns() {
           {"largest_plane_distance", "plane [vx]",
            "largest distance of a merged region's point to one of its planes"},
           {"escaped", "escaped", "points outside their cell or region"},
-          {"lost_crossings", "lost", "edge crossings that the 10 bytes lose, which leave holes; none are lost as floats"},
+          {"lost_crossings", "lost",
+           "edge crossings that the 10 bytes lose, which leave holes; none are lost as floats"},
           {"seconds", "time [s]", "median, Hermite data included; nothing is copied to a host"},
           {"printed_seconds", "printed [s]", "16 cores of 2011, of which 60 to 70 % copying to the host"},
           {"peak", "peak [MiB]", "resident memory beyond the level set"}};

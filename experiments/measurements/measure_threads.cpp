@@ -39,7 +39,8 @@ std::vector<std::size_t> thread_counts() {
 
 /// One piece of work with every number of threads, in turns; it returns its seconds.
 std::vector<MeasuredRow> times_by_threads(const std::string& table, const std::string& label,
-                                          const std::function<double()>& work, const MeasurementInput& input) {
+                                          const std::function<double()>& work,
+                                          const MeasurementInput& input) {
   const std::vector<std::size_t> counts = thread_counts();
   std::vector<double> cpu(counts.size(), 0.0);
   std::vector<Contender> contenders;
@@ -82,7 +83,8 @@ class ThreadsMeasurer {
   std::vector<MeasuredRow> run() {
     const bool voxelizers = input_.wants_any("voxelizers", kTimedVoxelizers);
     const bool extractors = input_.wants_any("extractors", kTimedExtractors);
-    const bool hermite = input_.wants_any("hermite", kTimedSampling) || input_.wants_any("hermite", kBooleans);
+    const bool hermite =
+        input_.wants_any("hermite", kTimedSampling) || input_.wants_any("hermite", kBooleans);
     const bool fractures = input_.wants_any("fracture", kThreadMethods);
     if (!voxelizers && !extractors && !hermite && !fractures) return {};
     model_ = input_.tables.load(input_.parameters.text("case"), input_.context).mesh;
@@ -183,7 +185,9 @@ class ThreadsMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_threads(const MeasurementInput& input) { return ThreadsMeasurer(input).run(); }
+std::vector<MeasuredRow> measure_threads(const MeasurementInput& input) {
+  return ThreadsMeasurer(input).run();
+}
 
 }  // namespace
 

@@ -1,14 +1,15 @@
-// Scans, fog and level sets of other programs through the extractors, with both treatments of the end of the data.
+// Scans, fog and level sets of other programs through the extractors, with both treatments of the end of the
+// data.
 
 #include <array>
 
 #include "algorithms/core/level_set_grid.h"
-#include "experiments/harness/cell.h"
-#include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
-#include "experiments/pictures/render.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/cases/volume_cases.h"
+#include "experiments/harness/cell.h"
+#include "experiments/harness/run_cells.h"
+#include "experiments/measurements/measurements.h"
+#include "experiments/pictures/render.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -51,7 +52,7 @@ LevelSet thinned(const LevelSet& volume, int every) {
 
 /// Who competes; add a name to have another.
 constexpr std::array<const char*, 4> kExtractors = {"marching-cubes", "dual-contouring",
-                                                         "manifold-dual-contouring", "openvdb"};
+                                                    "manifold-dual-contouring", "openvdb"};
 
 class VolumesMeasurer {
  public:
@@ -74,7 +75,8 @@ class VolumesMeasurer {
     const LoadedVolume loaded = load_volume(entry.volume, input_.context);
     const bool stand_in = loaded.origin.starts_with("stand-in");
     const LevelSet volume = thinned(loaded.volume, int(input_.parameters.number("every")));
-    rows_.push_back({entry.table, kVolumeLabel, {{"origin", loaded.origin}, {"sha256", loaded.sha256.substr(0, 12)}}});
+    rows_.push_back(
+        {entry.table, kVolumeLabel, {{"origin", loaded.origin}, {"sha256", loaded.sha256.substr(0, 12)}}});
     rows_.back().values["samples"] = volume.active_voxels();
     for (const double isovalue : stand_in ? entry.of_stand_in : entry.isovalues) {
       Sheet sheet;
@@ -82,7 +84,8 @@ class VolumesMeasurer {
         for (const Ends ends : {Ends::closed, Ends::open})
           if (input_.wants(entry.table, name))
             add_row(entry, volume,
-                    {.chosen = choose(input_.tables.extractors, name), .isovalue = isovalue, .ends = ends}, sheet);
+                    {.chosen = choose(input_.tables.extractors, name), .isovalue = isovalue, .ends = ends},
+                    sheet);
       draw(entry, isovalue, sheet);
     }
   }
@@ -115,9 +118,9 @@ class VolumesMeasurer {
 
   void describe(MeasuredRow& row, const ExtractRecipe& recipe, const EndedMesh& ended) const {
     RunContext child = child_context(input_.context, false);
-    const auto& [report, check] =
-        judge(to_mesh_file(ended.mesh), recipe.chosen.extractor.promises, crossings_ ? kPromisesAlone : kCounts, child,
-              {.cut_open = recipe.ends == Ends::open && ended.ends.any()});
+    const auto& [report, check] = judge(to_mesh_file(ended.mesh), recipe.chosen.extractor.promises,
+                                        crossings_ ? kPromisesAlone : kCounts, child,
+                                        {.cut_open = recipe.ends == Ends::open && ended.ends.any()});
     row.values["triangles"] = ended.mesh.triangle_count();
     row.values["open"] = report.boundary_edges;
     row.values["nm_edges"] = report.non_manifold_edges;
@@ -141,8 +144,8 @@ class VolumesMeasurer {
     sheet.subtitle = "ends closed";
     sheet.viewpoint = entry.viewpoint;
     sheet.cell_pixels = pixels_;
-    render_sheet(input_.out / (file_name(std::string(entry.volume) + "-" + readable(isovalue)) + ".png"), sheet,
-                 input_.context);
+    render_sheet(input_.out / (file_name(std::string(entry.volume) + "-" + readable(isovalue)) + ".png"),
+                 sheet, input_.context);
   }
 
   const MeasurementInput& input_;
@@ -152,7 +155,9 @@ class VolumesMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_volumes(const MeasurementInput& input) { return VolumesMeasurer(input).run(); }
+std::vector<MeasuredRow> measure_volumes(const MeasurementInput& input) {
+  return VolumesMeasurer(input).run();
+}
 
 }  // namespace
 
@@ -172,17 +177,18 @@ Measurement volumes_measurement() {
       {"flipped", "flipped", "inconsistently oriented edges"},
       {"components", "components", "connected components"},
       {"crossing", "crossing", "self-intersecting pairs of triangles"}};
-  return {.name = "volumes",
-          .summary = "scans, fog and level sets of other programs through the extractors",
-          .parameters = {{"every", "1", "takes every n-th sample of dense volumes along each axis", {}, 1, 64},
-                         {"repetitions", "3", "timed runs", {}, 1, 100},
-                         {"self_intersections", "yes", "whether they are counted", {"yes", "no"}},
-                         {"pixels", "300", "width of a picture; 0 draws none", {}, 0, 4000}},
-          .tables = {{"ct", "CT of a head", "extractor", columns},
-                     {"mri", "MRI of a brain", "extractor", columns},
-                     {"fog", "fog", "extractor", columns},
-                     {"level-set", "level set of a cube", "extractor", columns}},
-          .measure = measure_volumes};
+  return {
+      .name = "volumes",
+      .summary = "scans, fog and level sets of other programs through the extractors",
+      .parameters = {{"every", "1", "takes every n-th sample of dense volumes along each axis", {}, 1, 64},
+                     {"repetitions", "3", "timed runs", {}, 1, 100},
+                     {"self_intersections", "yes", "whether they are counted", {"yes", "no"}},
+                     {"pixels", "300", "width of a picture; 0 draws none", {}, 0, 4000}},
+      .tables = {{"ct", "CT of a head", "extractor", columns},
+                 {"mri", "MRI of a brain", "extractor", columns},
+                 {"fog", "fog", "extractor", columns},
+                 {"level-set", "level set of a cube", "extractor", columns}},
+      .measure = measure_volumes};
 }
 
 }  // namespace hermesh

@@ -2,11 +2,13 @@
 // makes (errors of a code, bytes of a data structure, the rate of an operation).
 //
 // To add one:
-//   1. In experiments/measurements/measure_NAME.cpp write a function from MeasurementInput to rows, and below it
+//   1. In experiments/measurements/measure_NAME.cpp write a function from MeasurementInput to rows, and below
+//   it
 //      `Measurement NAME_measurement()`: the name, the parameters with their defaults and ranges, the tables
 //      with what their columns mean, and that function. Add the file to experiments/CMakeLists.txt.
 //   2. Declare it at the end of this header, and enter it in the table in measurements.cpp.
-//   3. Write experiments/questions/thesis/NAME.toml, or in the folder of another subject; normal_codes.toml explains the keys.
+//   3. Write experiments/questions/thesis/NAME.toml, or in the folder of another subject; normal_codes.toml
+//   explains the keys.
 // For that it gets rows with commit, machine, seed and parameters, `hermesh run`, `hermesh report` in all its
 // formats, and the plots that its file asks for.
 #pragma once

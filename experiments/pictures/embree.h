@@ -1,5 +1,5 @@
-// Embree 3 or 4, whichever CMake found: their headers and the two questions asked of them. Version 4 gives its intersection
-// functions what version 3 took from a context as arguments, which may be left out.
+// Embree 3 or 4, whichever CMake found: their headers and the two questions asked of them. Version 4 gives
+// its intersection functions what version 3 took from a context as arguments, which may be left out.
 #pragma once
 
 #if HERMESH_EMBREE_MAJOR == 4

@@ -198,7 +198,8 @@ struct Painter {
     const float lit =
         key > 0.0f && !blocked(position, key_light, 3.0f * occlusion_radius) ? key : 0.25f * key;
     const float fill = 0.5f + 0.5f * normal.dot(up);
-    // A light at the viewer, without which what faces the viewer in the shadow of another part is nearly black.
+    // A light at the viewer, without which what faces the viewer in the shadow of another part is nearly
+    // black.
     const float head = normal.dot(towards);
     Vector3f colour =
         to_linear(from_behind ? kBack : kFront) * (0.78f * lit + sky * (0.18f + 0.27f * fill) + 0.32f * head);

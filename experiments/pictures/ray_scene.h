@@ -17,8 +17,8 @@ struct Camera {
   Eigen::Vector3d right, up, towards;
 };
 
-/// The camera that looks at the scene from a direction in degrees, the y axis pointing up: azimuth 0 looks at the +z
-/// side, 90 at the +x side; elevation within ±89.
+/// The camera that looks at the scene from a direction in degrees, the y axis pointing up: azimuth 0 looks at
+/// the +z side, 90 at the +x side; elevation within ±89.
 Camera make_camera(double azimuth, double elevation);
 
 struct View {
@@ -50,11 +50,13 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// The picture of the mesh: each face in one tone (so that facets show) under a key light and one at the viewer, with
-  /// ambient occlusion, 2×2 samples a pixel. Deterministic at any thread count. @throws Cancelled.
+  /// The picture of the mesh: each face in one tone (so that facets show) under a key light and one at the
+  /// viewer, with ambient occlusion, 2×2 samples a pixel. Deterministic at any thread count. @throws
+  /// Cancelled.
   Image render(const Camera& camera, const View& view, RunContext& context) const;
 
-  /// What the pixels of the view see, rows from the top. Deterministic at any thread count. @throws Cancelled.
+  /// What the pixels of the view see, rows from the top. Deterministic at any thread count. @throws
+  /// Cancelled.
   std::vector<Glimpse> glimpses(const Camera& camera, const View& view, RunContext& context) const;
 
  private:

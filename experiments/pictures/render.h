@@ -42,9 +42,10 @@ struct Sheet {
   int columns = 5;        ///< pictures side by side before the next row begins
 };
 
-/// Draws all meshes from one camera on one sheet, a PNG file: for each, the whole object shaded and a close-up with the
-/// polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red, an empty mesh says
-/// "empty". The same sheet gives the same pixels at any thread count. Written aside and renamed.
+/// Draws all meshes from one camera on one sheet, a PNG file: for each, the whole object shaded and a
+/// close-up with the polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red,
+/// an empty mesh says "empty". The same sheet gives the same pixels at any thread count. Written aside and
+/// renamed.
 /// @throws Error if the path cannot be written; Cancelled.
 void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context);
 

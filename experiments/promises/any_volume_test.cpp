@@ -1,6 +1,5 @@
 // Volumes of every kind through each of our extractors: closed, or empty, or refused in a sentence.
 #include <gtest/gtest.h>
-
 #include <openvdb/tools/LevelSetUtil.h>
 
 #include <algorithm>
@@ -27,7 +26,8 @@ using openvdb::FloatGrid;
 class AnyVolume : public testing::TestWithParam<Extractor> {
  protected:
   PolygonMesh extract(const FloatGrid::Ptr& grid, double isovalue, Ends ends = Ends::closed) {
-    // Which volumes are closed is decided before anything is merged, and noise takes a proving variant its time.
+    // Which volumes are closed is decided before anything is merged, and noise takes a proving variant its
+    // time.
     const auto& declared = GetParam().options;
     const bool proves = std::any_of(declared.begin(), declared.end(),
                                     [](const OptionSpec& option) { return option.name == "tolerance"; });
@@ -36,7 +36,8 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
     if (may_lose_crossings()) given["representation"] = "sparse-float";
     const Options options(GetParam().name, declared, given);
     const LevelSet volume = make_level_set(grid);
-    return hermesh::extract(volume, nullptr, {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context)
+    return hermesh::extract(volume, nullptr,
+                            {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context)
         .mesh;
   }
   /// Expects of the extractor's mesh what it promises, and no boundary; returns how many triangles there are.
@@ -46,7 +47,8 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
     const MeshFile file = to_mesh_file(mesh);
     if (file.triangle_count() == 0) return 0;
     Promises promises = GetParam().promises;
-    // As printed it promises nothing, since its ten bytes lose crossings; of data that lose none its meshes are closed.
+    // As printed it promises nothing, since its ten bytes lose crossings; of data that lose none its meshes
+    // are closed.
     if (may_lose_crossings()) promises.closed = promises.oriented = true;
     EXPECT_TRUE(promises.closed && promises.oriented);
     const Judgement judgement = judge(file, promises, kCounts, context);
@@ -64,7 +66,8 @@ class AnyVolume : public testing::TestWithParam<Extractor> {
 FloatGrid::Ptr scan(const Coord& size, float background, const std::function<float(const Coord&)>& value) {
   initialize_openvdb();
   auto grid = FloatGrid::create(background);
-  for (const Coord& at : openvdb::CoordBBox(Coord(0), size.offsetBy(-1))) grid->tree().setValue(at, value(at));
+  for (const Coord& at : openvdb::CoordBBox(Coord(0), size.offsetBy(-1)))
+    grid->tree().setValue(at, value(at));
   return grid;
 }
 
@@ -94,8 +97,10 @@ FloatGrid::Ptr sphere(float width) {
 
 TEST_P(AnyVolume, IntegersAtIntegerIsovalues) {
   const FloatGrid::Ptr grid = integers(5, 1);
-  for (const double isovalue : {0.0, 1.0, 2.0, 3.0, 0.5}) EXPECT_GT(expect_closed(grid, isovalue), 0u) << isovalue;
-  // Nothing is greater than the greatest; below the least everything is inside, or the background's side turns.
+  for (const double isovalue : {0.0, 1.0, 2.0, 3.0, 0.5})
+    EXPECT_GT(expect_closed(grid, isovalue), 0u) << isovalue;
+  // Nothing is greater than the greatest; below the least everything is inside, or the background's side
+  // turns.
   EXPECT_EQ(expect_closed(grid, 4.0), 0u);
   EXPECT_EQ(expect_closed(grid, 1e30), 0u);
   EXPECT_EQ(expect_closed(grid, -1.0), 0u);
@@ -116,7 +121,8 @@ TEST_P(AnyVolume, BandsOfAVoxelAndLess) {
     SCOPED_TRACE(width);
     EXPECT_GT(expect_closed(grid, 0.0), 0u);
     const double background = grid->background();
-    for (const double share : {0.5, 0.9, -0.5, -0.9}) EXPECT_GT(expect_closed(grid, share * background), 0u) << share;
+    for (const double share : {0.5, 0.9, -0.5, -0.9})
+      EXPECT_GT(expect_closed(grid, share * background), 0u) << share;
   }
 }
 
@@ -156,8 +162,10 @@ TEST_P(AnyVolume, TilesOfTheOtherSign) {
       grid->setGridClass(grid_class);
       grid->tree().addTile(1, Coord(0, 0, 0), -1.0f, active);
       grid->tree().addTile(1, Coord(8, 8, 0), -0.5f, true);
-      for (const Coord& at : openvdb::CoordBBox(Coord(8, 0, 0), Coord(11, 7, 7))) grid->tree().setValue(at, 0.5f);
-      for (const Coord& at : openvdb::CoordBBox(Coord(0, 0, 8), Coord(3, 3, 9))) grid->tree().setValue(at, -0.25f);
+      for (const Coord& at : openvdb::CoordBBox(Coord(8, 0, 0), Coord(11, 7, 7)))
+        grid->tree().setValue(at, 0.5f);
+      for (const Coord& at : openvdb::CoordBBox(Coord(0, 0, 8), Coord(3, 3, 9)))
+        grid->tree().setValue(at, -0.25f);
       EXPECT_GT(expect_closed(grid, 0.0), 0u);
     }
 }
@@ -201,8 +209,8 @@ TEST_P(AnyVolume, NoiseThatFillsTheBoxIsClosedAndOpened) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Ours, AnyVolume,
-                         testing::ValuesIn(our_extractors().begin(), our_extractors().end()), [](const auto& param) {
+INSTANTIATE_TEST_SUITE_P(Ours, AnyVolume, testing::ValuesIn(our_extractors().begin(), our_extractors().end()),
+                         [](const auto& param) {
                            std::string name = param.param.name;
                            for (char& c : name)
                              if (c == '-') c = '_';

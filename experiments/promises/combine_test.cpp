@@ -10,9 +10,9 @@
 #include <optional>
 #include <string>
 
-#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
@@ -33,7 +33,8 @@ using test_solids::solid;
 struct Pair {
   PolygonMesh a, b;
   double voxel_size;
-  /// True if nothing that the two bound is thinner than a voxel but where their surfaces cross, so that volumes add up.
+  /// True if nothing that the two bound is thinner than a voxel but where their surfaces cross, so that
+  /// volumes add up.
   bool adds_up = false;
 };
 
@@ -193,17 +194,18 @@ class Pairs {
 
  private:
   SampledSolid sampled(const PolygonMesh& mesh) {
-    const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = lattice_.voxel_size};
-    return sample_solid(
-        mesh, lattice_, [&](const PolygonMesh& framed) {
-          return solid_of(framed, voxelize(framed, recipe, context_), ThinRule::drop, context_).solid;
-        });
+    const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"),
+                                .voxel_size = lattice_.voxel_size};
+    return sample_solid(mesh, lattice_, [&](const PolygonMesh& framed) {
+      return solid_of(framed, voxelize(framed, recipe, context_), ThinRule::drop, context_).solid;
+    });
   }
   PolygonMesh contour(Boolean boolean, const SampledSolid& a, const SampledSolid& b) {
     const CombinedSolid result = combine(boolean, a, b, context_);
     if (result.hermite.leaves.empty()) return {};
     return extract(result.level_set, nullptr,
-                   {.chosen = choose(our_extractors(), "manifold-dual-contouring", options_), .hermite = &result.hermite},
+                   {.chosen = choose(our_extractors(), "manifold-dual-contouring", options_),
+                    .hermite = &result.hermite},
                    context_)
         .mesh;
   }
@@ -216,7 +218,8 @@ class Pairs {
     if (mesh.empty()) return 0.0;
     const Promises all{true, true, true, true};
     const Judgement judgement = judge(to_mesh_file(mesh), all, kPromisesAlone, context_);
-    EXPECT_EQ(promise_verdict(all, judgement.promises), "promises closed, manifold, oriented, no self-intersection: kept");
+    EXPECT_EQ(promise_verdict(all, judgement.promises),
+              "promises closed, manifold, oriented, no self-intersection: kept");
     return judgement.report.volume;
   }
   double volume(const PolygonMesh& mesh) {

@@ -35,7 +35,8 @@ PolygonMesh extract(const Extractor& extractor, const LevelSet& volume, double i
                     const GivenOptions& given = {}) {
   RunContext context;
   const Options options(extractor.name, extractor.options, given);
-  return hermesh::extract(volume, nullptr, {.chosen = {extractor, options}, .isovalue = isovalue}, context).mesh;
+  return hermesh::extract(volume, nullptr, {.chosen = {extractor, options}, .isovalue = isovalue}, context)
+      .mesh;
 }
 
 validation::MeshReport judge_counts(const MeshFile& mesh) {
@@ -43,7 +44,8 @@ validation::MeshReport judge_counts(const MeshFile& mesh) {
   return validation::judge(mesh, kCounts, context);
 }
 
-void expect_promises(const Extractor& extractor, const MeshFile& mesh, const Circumstances& circumstances = {}) {
+void expect_promises(const Extractor& extractor, const MeshFile& mesh,
+                     const Circumstances& circumstances = {}) {
   if (mesh.triangle_count() == 0) return;
   RunContext context;
   const Promises& promises = extractor.promises;
@@ -72,8 +74,9 @@ class Conformance : public testing::TestWithParam<Extractor> {
     return std::any_of(extractor().options.begin(), extractor().options.end(),
                        [](const OptionSpec& option) { return option.name == "tolerance"; });
   }
-  /// Expects the variant's promises on noise. One that proves its tolerance takes its time over noise, in which nothing
-  /// can be merged: it gets the volume of `size` as its uniform mesh, and that of `smaller` as it comes.
+  /// Expects the variant's promises on noise. One that proves its tolerance takes its time over noise, in
+  /// which nothing can be merged: it gets the volume of `size` as its uniform mesh, and that of `smaller` as
+  /// it comes.
   void expect_on_noise(int size, int smaller, const std::function<LevelSet(int)>& volume,
                        double isovalue = 0.0) const {
     if (!proves()) return expect_on(volume(size), isovalue);
@@ -82,8 +85,8 @@ class Conformance : public testing::TestWithParam<Extractor> {
   }
 };
 
-/// Extracts in a process of its own. Ends with 0, or with 1 after a sentence, so that whoever starts it can tell both
-/// from a signal.
+/// Extracts in a process of its own. Ends with 0, or with 1 after a sentence, so that whoever starts it can
+/// tell both from a signal.
 [[noreturn]] void extract_and_exit(const Extractor& extractor, const LevelSet& volume) {
   try {
     extract(extractor, volume);

@@ -48,8 +48,10 @@ std::string verdict(int i, const std::function<void(int)>& attempt) {
     attempt(i);
   } catch (const Error& error) {
     const std::string said = error.what();
-    if (said.empty() || said.size() > kLongestSentence) wrong = "a sentence of " + std::to_string(said.size()) + " bytes: " + said;
-    if (std::ranges::any_of(said, [](unsigned char c) { return c < 0x20 || c == 0x7f; })) wrong = "control characters: " + said;
+    if (said.empty() || said.size() > kLongestSentence)
+      wrong = "a sentence of " + std::to_string(said.size()) + " bytes: " + said;
+    if (std::ranges::any_of(said, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+      wrong = "control characters: " + said;
   } catch (const std::exception& other) {
     wrong = std::string("an exception of another kind: ") + other.what();
   }
@@ -87,7 +89,8 @@ std::vector<std::string> failures(int count, const std::function<void(int)>& att
     waitpid(child, &status, 0);
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) break;
     const std::string at = "attempt " + std::to_string(shared->current) + ": ";
-    found.push_back(at + (WIFSIGNALED(status) ? "signal " + std::to_string(WTERMSIG(status)) : std::string(shared->wrong)));
+    found.push_back(at + (WIFSIGNALED(status) ? "signal " + std::to_string(WTERMSIG(status))
+                                              : std::string(shared->wrong)));
   }
   munmap(shared, sizeof(Shared));
   return found;
@@ -109,18 +112,33 @@ void Mutator::cut(std::string& bytes) {
 }
 
 void Mutator::put_number(std::string& bytes) {
-  constexpr std::array<std::uint64_t, 14> kNumbers = {0, 1, 2, 4, 6, 16, 255, 4096, 0x7fffffff, 0x80000000, 0xffffffff,
-                                                      0x7ff8000000000000, 0x8000000000000000, 0xffffffffffffffff};
+  constexpr std::array<std::uint64_t, 14> kNumbers = {0,
+                                                      1,
+                                                      2,
+                                                      4,
+                                                      6,
+                                                      16,
+                                                      255,
+                                                      4096,
+                                                      0x7fffffff,
+                                                      0x80000000,
+                                                      0xffffffff,
+                                                      0x7ff8000000000000,
+                                                      0x8000000000000000,
+                                                      0xffffffffffffffff};
   std::uint64_t number = below(4) ? kNumbers[below(kNumbers.size())] : random_() >> below(64);
-  if (below(5) == 0) number = std::bit_cast<std::uint32_t>(below(2) ? std::numeric_limits<float>::quiet_NaN() : 1e38f);
+  if (below(5) == 0)
+    number = std::bit_cast<std::uint32_t>(below(2) ? std::numeric_limits<float>::quiet_NaN() : 1e38f);
   if (below(4) == 0) number = ~number + 1;
   const std::size_t size = std::size_t{1} << below(4), at = below(bytes.size());
-  for (std::size_t i = 0; i < size && at + i < bytes.size(); ++i) bytes[at + i] = static_cast<char>(number >> (8 * i));
+  for (std::size_t i = 0; i < size && at + i < bytes.size(); ++i)
+    bytes[at + i] = static_cast<char>(number >> (8 * i));
 }
 
 void Mutator::put_written_number(std::string& bytes) {
-  constexpr std::array<const char*, 12> kNumbers = {"0", "-1", "1e308", "nan", "inf", "99999999999999999999", "2147483648",
-                                                    "0.5", "1e-320", "[]", "\"\\u001b[31m\"", "{}"};
+  constexpr std::array<const char*, 12> kNumbers = {
+      "0",      "-1", "1e308",           "nan", "inf", "99999999999999999999", "2147483648", "0.5",
+      "1e-320", "[]", "\"\\u001b[31m\"", "{}"};
   std::size_t at = below(bytes.size());
   while (at < bytes.size() && !std::isdigit(static_cast<unsigned char>(bytes[at]))) ++at;
   std::size_t end = at;

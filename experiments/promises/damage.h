@@ -9,7 +9,8 @@
 
 namespace hermesh::damage {
 
-/// Damages files by changes of bytes, cuts, exchanges of numbers, and parts of other files, alike for each seed.
+/// Damages files by changes of bytes, cuts, exchanges of numbers, and parts of other files, alike for each
+/// seed.
 class Mutator {
  public:
   explicit Mutator(std::uint64_t seed) : random_(seed) {}
@@ -29,9 +30,9 @@ class Mutator {
   std::mt19937_64 random_;
 };
 
-/// Calls attempt(0) to attempt(count − 1), which read damaged files, in child processes that may crash. An attempt ends as
-/// it should if it returns, or throws an Error of one short line without control characters; within five seconds, and
-/// without taking a GiB. @returns what went wrong, at most ten
+/// Calls attempt(0) to attempt(count − 1), which read damaged files, in child processes that may crash. An
+/// attempt ends as it should if it returns, or throws an Error of one short line without control characters;
+/// within five seconds, and without taking a GiB. @returns what went wrong, at most ten
 std::vector<std::string> failures(int count, const std::function<void(int)>& attempt);
 
 }  // namespace hermesh::damage

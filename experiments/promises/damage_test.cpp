@@ -1,4 +1,5 @@
-// Volumes and experiment files that something has damaged: an answer or a short sentence, never a crash, a hang or gigabytes.
+// Volumes and experiment files that something has damaged: an answer or a short sentence, never a crash, a
+// hang or gigabytes.
 #include "experiments/promises/damage.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +46,8 @@ class Damage : public testing::Test {
   }
   ~Damage() override { fs::remove_all(folder); }
 
-  /// Expects all attempts to end as they should; `read` gets the number of one, and writes and reads the damaged file.
+  /// Expects all attempts to end as they should; `read` gets the number of one, and writes and reads the
+  /// damaged file.
   static void expect_answers(int count, const std::function<void(int)>& read) {
     for (const std::string& failure : damage::failures(count, read)) ADD_FAILURE() << failure;
   }
@@ -67,7 +69,8 @@ class Damage : public testing::Test {
 class Slow : public Damage {};
 
 openvdb::FloatGrid::Ptr sphere() {
-  const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(3.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 0.5f);
+  const auto grid =
+      openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(3.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 0.5f);
   grid->setName("sdf");
   return grid;
 }
@@ -110,7 +113,8 @@ std::string written(const openvdb::GridCPtrVec& grids, std::uint32_t compression
   return bytes_of(path);
 }
 
-/// Files of other programs: types, compressions, grids that share a tree, and a stream without places of grids.
+/// Files of other programs: types, compressions, grids that share a tree, and a stream without places of
+/// grids.
 Files foreign_files(const fs::path& path) {
   using namespace openvdb;
   const auto half = sphere();
@@ -163,7 +167,8 @@ void read_volume(const fs::path& path) {
     for (const char* name : {"marching-cubes", "dual-contouring"}) {
       const Extractor extractor = find_variant(all_extractors(), name);
       EndedMesh ended = extract_with_ends(
-          extractor, {level_set, isovalue, nullptr, Options(name, extractor.options, {}), context, nullptr}, Ends::closed);
+          extractor, {level_set, isovalue, nullptr, Options(name, extractor.options, {}), context, nullptr},
+          Ends::closed);
       sample_attributes(ended.mesh, path, {"all"}, context);
     }
   });
@@ -228,7 +233,8 @@ Files nifti_files() {
   const NiftiBytes plain = NiftiBytes().dims({12, 11, 10}).type(4, 16).samples(values);
   NiftiBytes placed = NiftiBytes(true).dims({12, 11, 5, 2}).type(4, 16).samples(values);
   placed.put<std::int16_t>(252, 1).put<float>(264, 0.7f).put<float>(112, 0.5f).put<float>(116, 10.0f);
-  return {plain.bytes(), placed.bytes(), NiftiBytes().dims({4, 4, 4}).type(64, 64).samples(std::vector<double>(64, 1.5)).bytes()};
+  return {plain.bytes(), placed.bytes(),
+          NiftiBytes().dims({4, 4, 4}).type(64, 64).samples(std::vector<double>(64, 1.5)).bytes()};
 }
 
 void Damage::nifti(int count) {
@@ -258,11 +264,13 @@ void Damage::raw(int count) {
     const fs::path path = put("a.raw", Mutator(std::uint64_t(i))(whole));
     const auto size = static_cast<std::int64_t>(fs::file_size(path));
     RawLayout layout{.dims = {12, 11, 10}, .format = {SampleType(random() % 10), random() % 2 == 0}};
-    if (random() % 2) layout.dims = {std::max<std::int64_t>(1, size / std::int64_t(size_of(layout.format.type))), 1, 1};
+    if (random() % 2)
+      layout.dims = {std::max<std::int64_t>(1, size / std::int64_t(size_of(layout.format.type))), 1, 1};
     if (random() % 4 == 0) layout.dims[random() % 3] = std::int64_t(random() >> (random() % 64));
     if (random() % 4 == 0) layout.offset = random() >> (random() % 64);
     if (random() % 4 == 0) layout.spacing[random() % 3] = std::bit_cast<double>(random());
-    write_imported(folder / "a.vdb", import_raw(path, layout, {.replacement = 0.0f, .frame = {}}, context), context);
+    write_imported(folder / "a.vdb", import_raw(path, layout, {.replacement = 0.0f, .frame = {}}, context),
+                   context);
   });
 }
 

@@ -15,7 +15,8 @@ namespace {
 using test_solids::placed;
 
 /// What `hermesh remesh` does, judged. @throws Error if the format could not hold the mesh
-Outcome written(const PolygonMesh& mesh, double voxel_size, const std::string& format, const GivenOptions& given) {
+Outcome written(const PolygonMesh& mesh, double voxel_size, const std::string& format,
+                const GivenOptions& given) {
   RunContext context;
   return run({.source = {.polygons = &mesh},
               .voxelize = {.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = voxel_size},
@@ -26,8 +27,7 @@ Outcome written(const PolygonMesh& mesh, double voxel_size, const std::string& f
 }
 
 /// Writes solids at many offsets, each in one of the formats, and judges the files.
-void expect_no_defect(std::uint64_t first, std::uint64_t count, double least_exponent,
-                      double most_exponent) {
+void expect_no_defect(std::uint64_t first, std::uint64_t count, double least_exponent, double most_exponent) {
   const char* const kExtensions[] = {".ply", ".off", ".obj", ".stl"};
   std::size_t in_files = 0;
   for (std::uint64_t i = first; i < first + count; ++i) {
@@ -69,16 +69,15 @@ TEST(FarFromOrigin, WhatAFormatCannotHoldIsRefused) {
     written(mesh, 0.1, ".stl", {});
     FAIL() << "single precision rounds by up to 0.03 there";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("write .ply, .obj, .off, .glb or .3mf"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("write .ply, .obj, .off, .glb or .3mf"), std::string::npos)
+        << error.what();
   }
   // Half of the distance of doubles at 10¹³ is 0.001, a hundredth of a voxel, and at 10¹⁴ ten times as much.
   const PolygonMesh farther = placed(test_solids::solid(0), Eigen::Matrix3d::Identity(), {1e14, 0, 0});
   EXPECT_THROW(written(farther, 0.1, ".ply", {}), Error);
 }
 
-TEST(Slow, MeshesFarFromTheOriginKeepThePromisesInTheirFiles) {
-  expect_no_defect(1000, 500, 6.0, 11.0);
-}
+TEST(Slow, MeshesFarFromTheOriginKeepThePromisesInTheirFiles) { expect_no_defect(1000, 500, 6.0, 11.0); }
 
 }  // namespace
 }  // namespace hermesh

@@ -85,8 +85,8 @@ struct Amounts {
 struct Solid {
   std::string name;
   Soup soup;
-  Amounts flooded, wound;  ///< what each rule for signs must find
-  bool parity = false;     ///< whether rays that count crossings find the wound solid, too
+  Amounts flooded, wound;   ///< what each rule for signs must find
+  bool parity = false;      ///< whether rays that count crossings find the wound solid, too
   bool has_cavity = false;  ///< bounded by a shell that faces inwards, which `auto` keeps
 };
 
@@ -221,8 +221,8 @@ void expect_amounts(const validation::MeshReport& report, const Amounts& right, 
   EXPECT_EQ(report.boundary_edges, 0);
 }
 
-/// Expects all rules to find what the solid amounts to. The oracle takes a hundred times as long as the rest, and is
-/// asked `with_oracle` alone.
+/// Expects all rules to find what the solid amounts to. The oracle takes a hundred times as long as the rest,
+/// and is asked `with_oracle` alone.
 void check(const Solid& solid, const Turn& turn, unsigned octant, double voxel_size, bool with_oracle) {
   constexpr double kUnit = 10.0;  // a multiple of every voxel size
   const PolygonMesh mesh = to_mesh(solid.soup, turn, octant, float(kUnit));
@@ -283,8 +283,8 @@ TEST(LatticeSolids, ThinSlabsStay) {
   check({"fin", fin, right, right, true}, all[0], 0, 10.0, true);
 }
 
-/// Two cubes overlap, and the walls of the overlap lie in planes of samples, too. From within both cubes the nearest
-/// surface is a side of one of them that lies outside of the other.
+/// Two cubes overlap, and the walls of the overlap lie in planes of samples, too. From within both cubes the
+/// nearest surface is a side of one of them that lies outside of the other.
 TEST(LatticeSolids, DistancesPassOverWallsWithin) {
   Soup soup;
   soup.add_box({0, 0, 0}, {2, 2, 2});
@@ -301,9 +301,11 @@ TEST(LatticeSolids, DistancesPassOverWallsWithin) {
                   .exterior_band = 8.0,
                   .interior_band = 8.0},
                  context);
-    const auto at = [&](int x, int y, int z) { return level_set.grid().grid->tree().getValue(openvdb::Coord(x, y, z)); };
+    const auto at = [&](int x, int y, int z) {
+      return level_set.grid().grid->tree().getValue(openvdb::Coord(x, y, z));
+    };
     EXPECT_NEAR(at(12, 15, 15), -std::hypot(0.1, 0.25), 2e-3);  // (0.6, 0.75, 0.75)
-    EXPECT_NEAR(at(10, 15, 15), -0.25, 2e-3);                   // on a wall: straight up out of the lower cube
+    EXPECT_NEAR(at(10, 15, 15), -0.25, 2e-3);  // on a wall: straight up out of the lower cube
     EXPECT_NEAR(at(20, 15, 15), -0.25, 2e-3);
     EXPECT_LT(at(10, 10, 10), 0.0f);
     EXPECT_NEAR(at(5, 5, 0), 0.0, 1e-6);

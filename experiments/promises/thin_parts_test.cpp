@@ -1,5 +1,7 @@
-// Thin parts are kept: plates, shells, tubes, cones, wires and open sheets of known topology, thinner and thicker than a
-// voxel, turned and moved at random. Voxels are 1 wide.
+// Thin parts are kept: plates, shells, tubes, cones, wires and open sheets of known topology, thinner and
+// thicker than a voxel, turned and moved at random. Voxels are 1 wide.
+#include "algorithms/remesh/thin_parts.h"
+
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -8,7 +10,6 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/remesh/shell.h"
-#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
@@ -35,36 +36,42 @@ struct Surface {
 
 std::vector<Surface> surfaces() {
   constexpr double kTurn = 2.0 * M_PI;
-  return {
-      {"plate", [](double u, double v) { return Vector3d(24 * u - 12, 17 * v - 8, 0); }, 1, 1, false, false, false, 1, 0},
-      {"tube", [](double u, double v) { return Vector3d(8 * std::cos(kTurn * u), 8 * std::sin(kTurn * u), 20 * v - 10); },
-       40, 1, true, false, false, 1, 1},
-      {"cup",
-       [](double u, double v) {
-         const double s = 0.3 + 1.3 * v;
-         return Vector3d(12 * std::sin(s) * std::cos(kTurn * u), 12 * std::sin(s) * std::sin(kTurn * u), 12 * std::cos(s));
-       },
-       48, 20, true, false, false, 1, 1},
-      {"cone",
-       [](double u, double v) { return Vector3d(9 * v * std::cos(kTurn * u), 9 * v * std::sin(kTurn * u), 18 * v - 9); },
-       40, 1, true, false, false, 1, 0},
-      {"shell",
-       [](double u, double v) {
-         const double r = 10 + 5 * std::cos(kTurn * v);
-         return Vector3d(r * std::cos(kTurn * u), r * std::sin(kTurn * u), 5 * std::sin(kTurn * v));
-       },
-       60, 30, true, true, false, 2, 2},
-      {"Möbius strip",
-       [](double u, double v) {
-         const double s = 10 * (v - 0.5), r = 13 + s * std::cos(M_PI * u);
-         return Vector3d(r * std::cos(kTurn * u), r * std::sin(kTurn * u), s * std::sin(M_PI * u));
-       },
-       80, 6, true, false, true, 1, 1},
-      {"ribbon",
-       [](double u, double v) {
-         return Vector3d(10 * std::cos(3 * u) , 10 * std::sin(3 * u) + 0.02 * v, 14 * u - 7 + 0.02 * v);
-       },
-       50, 1, false, false, false, 1, 0}};
+  return {{"plate", [](double u, double v) { return Vector3d(24 * u - 12, 17 * v - 8, 0); }, 1, 1, false,
+           false, false, 1, 0},
+          {"tube",
+           [](double u, double v) {
+             return Vector3d(8 * std::cos(kTurn * u), 8 * std::sin(kTurn * u), 20 * v - 10);
+           },
+           40, 1, true, false, false, 1, 1},
+          {"cup",
+           [](double u, double v) {
+             const double s = 0.3 + 1.3 * v;
+             return Vector3d(12 * std::sin(s) * std::cos(kTurn * u), 12 * std::sin(s) * std::sin(kTurn * u),
+                             12 * std::cos(s));
+           },
+           48, 20, true, false, false, 1, 1},
+          {"cone",
+           [](double u, double v) {
+             return Vector3d(9 * v * std::cos(kTurn * u), 9 * v * std::sin(kTurn * u), 18 * v - 9);
+           },
+           40, 1, true, false, false, 1, 0},
+          {"shell",
+           [](double u, double v) {
+             const double r = 10 + 5 * std::cos(kTurn * v);
+             return Vector3d(r * std::cos(kTurn * u), r * std::sin(kTurn * u), 5 * std::sin(kTurn * v));
+           },
+           60, 30, true, true, false, 2, 2},
+          {"Möbius strip",
+           [](double u, double v) {
+             const double s = 10 * (v - 0.5), r = 13 + s * std::cos(M_PI * u);
+             return Vector3d(r * std::cos(kTurn * u), r * std::sin(kTurn * u), s * std::sin(M_PI * u));
+           },
+           80, 6, true, false, true, 1, 1},
+          {"ribbon",
+           [](double u, double v) {
+             return Vector3d(10 * std::cos(3 * u), 10 * std::sin(3 * u) + 0.02 * v, 14 * u - 7 + 0.02 * v);
+           },
+           50, 1, false, false, false, 1, 0}};
 }
 
 /// The surface itself, or its offsets by ± half of a thickness with a border between them.
@@ -82,7 +89,8 @@ PolygonMesh wall(const Surface& s, double thickness) {
       for (int j = 0; j <= nv; ++j) {
         const double u = double(i) / nu, v = double(j) / nv;
         const double offset = layers == 1 ? 0.0 : (layer - 0.5) * thickness;
-        file.points.push_back(s.at(u, v) + (offset != 0.0 ? offset * normal(u, v) : Vector3d(Vector3d::Zero())));
+        file.points.push_back(s.at(u, v) +
+                              (offset != 0.0 ? offset * normal(u, v) : Vector3d(Vector3d::Zero())));
       }
   const auto number = [&](int layer, int i, int j) {
     if (s.closes_u && i == nu) {
@@ -99,8 +107,8 @@ PolygonMesh wall(const Surface& s, double thickness) {
   for (int layer = 0; layer < layers; ++layer)
     for (int i = 0; i < nu; ++i)
       for (int j = 0; j < nv; ++j) {
-        const std::uint32_t a = number(layer, i, j), b = number(layer, i + 1, j), c = number(layer, i + 1, j + 1),
-                            d = number(layer, i, j + 1);
+        const std::uint32_t a = number(layer, i, j), b = number(layer, i + 1, j),
+                            c = number(layer, i + 1, j + 1), d = number(layer, i, j + 1);
         layer == 1 || layers == 1 ? quad(a, b, c, d) : quad(a, d, c, b);
       }
   if (layers == 1) return to_polygon_mesh(file);
@@ -130,7 +138,8 @@ struct Kept {
 Kept keep(const PolygonMesh& polygons, RunContext& context, ThinRule rule = ThinRule::keep) {
   const LevelSet level_set =
       voxelize(polygons,
-               {.chosen = choose(our_voxelizers(), "hermesh", {{"signs", "auto-sheets"}}), .voxel_size = 1.0}, context);
+               {.chosen = choose(our_voxelizers(), "hermesh", {{"signs", "auto-sheets"}}), .voxel_size = 1.0},
+               context);
   Kept kept{solid_of(polygons, level_set, rule, context), {}};
   if (kept.solid.solid.hermite.leaves.empty()) return kept;
   kept.mesh = extract(kept.solid.solid.level_set, nullptr,
@@ -145,7 +154,8 @@ void expect_kept(const Surface& surface, double thickness, std::uint64_t seed) {
   Random random(seed);
   const Matrix3d turn = seed % 4 == 0 ? Matrix3d(Matrix3d::Identity()) : random_turn(random);
   const PolygonMesh polygons = moved(wall(surface, thickness), turn, random_vector(random, 3.0));
-  SCOPED_TRACE(std::string(surface.name) + " of " + std::to_string(thickness) + ", seed " + std::to_string(seed));
+  SCOPED_TRACE(std::string(surface.name) + " of " + std::to_string(thickness) + ", seed " +
+               std::to_string(seed));
   RunContext context;
   const Kept kept = keep(polygons, context);
   ASSERT_FALSE(kept.mesh.empty());
@@ -165,8 +175,8 @@ void expect_kept(const Surface& surface, double thickness, std::uint64_t seed) {
   EXPECT_LT(report.from_reference->max, kWireRadius + 0.25);
 }
 
-/// Offsets of a strip of one side meet each other, and the cavity of a closed shell is kept only if its wall has samples
-/// everywhere.
+/// Offsets of a strip of one side meet each other, and the cavity of a closed shell is kept only if its wall
+/// has samples everywhere.
 bool is_possible(const Surface& surface, double thickness) {
   if (surface.closes_v) return thickness > 1.3;
   return thickness == 0.0 || (!surface.twisted && surface.name != std::string("ribbon"));
@@ -190,13 +200,14 @@ TEST(Slow, ThinPartsAreKeptIn300PositionsEach) {
 }
 
 TEST(ThinParts, OfAPlateAreOneAndAFifthVoxelsThick) {
-  // The shell around a plate of 24 × 17 is at most 1.2 thick, with half a cylinder of radius 0.6 at its border and up to a
-  // third of a voxel more where it is joined.
+  // The shell around a plate of 24 × 17 is at most 1.2 thick, with half a cylinder of radius 0.6 at its
+  // border and up to a third of a voxel more where it is joined.
   RunContext context;
   for (const double thickness : {0.0, 0.5})
     for (std::uint64_t seed = 1; seed < 4; ++seed) {
       Random random(seed);
-      const Kept kept = keep(moved(wall(surfaces()[0], thickness), random_turn(random), random_vector(random, 3.0)), context);
+      const Kept kept = keep(
+          moved(wall(surfaces()[0], thickness), random_turn(random), random_vector(random, 3.0)), context);
       const double volume = validation::judge(to_mesh_file(kept.mesh), kCounts, context).volume;
       EXPECT_GT(volume, 24 * 17 * 1.1);
       EXPECT_LT(volume, 24 * 17 * 1.25 + 2 * (24 + 17) * 1.2);
@@ -210,8 +221,8 @@ TEST(ThinParts, AreNotAddedWhereThereAreNone) {
   RunContext context;
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
     Random random(seed);
-    const PolygonMesh box = test_solids::placed(test_solids::cuboid({-6, -5, -4}, {12, 10, 8}), random_turn(random),
-                                                random_vector(random, 3.0));
+    const PolygonMesh box = test_solids::placed(test_solids::cuboid({-6, -5, -4}, {12, 10, 8}),
+                                                random_turn(random), random_vector(random, 3.0));
     const Kept kept = keep(box, context), dropped = keep(box, context, ThinRule::drop);
     EXPECT_FALSE(kept.solid.thin);
     EXPECT_EQ(kept.mesh, dropped.mesh);
@@ -231,7 +242,8 @@ TEST(VisibleLoss, OfAHoleIsItsShare) {
   MeshFile mesh = model;
   mesh.triangles.resize(10);
   const auto loss = [&](const MeshFile& a, const MeshFile& b) {
-    return validation::measure_visible_loss(validation::TriangleSoup(a), validation::TriangleSoup(b), 0.1, 20'000, context);
+    return validation::measure_visible_loss(validation::TriangleSoup(a), validation::TriangleSoup(b), 0.1,
+                                            20'000, context);
   };
   // Rays from samples on an edge may slip through it.
   EXPECT_LE(loss(model, model).lost.value, 1e-3);

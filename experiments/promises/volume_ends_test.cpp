@@ -1,4 +1,5 @@
-// Surfaces that run into the end of the data: closed flat or left open, by each of our extractors and OpenVDB's.
+// Surfaces that run into the end of the data: closed flat or left open, by each of our extractors and
+// OpenVDB's.
 #include "algorithms/extraction/volume_ends.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +31,8 @@ using Field = std::function<float(int, int, int)>;
 openvdb::FloatGrid::Ptr dense(const Coord& lower, const Coord& upper, float background, const Field& value) {
   initialize_openvdb();
   auto grid = openvdb::FloatGrid::create(background);
-  for (const Coord& at : openvdb::CoordBBox(lower, upper)) grid->tree().setValue(at, value(at.x(), at.y(), at.z()));
+  for (const Coord& at : openvdb::CoordBBox(lower, upper))
+    grid->tree().setValue(at, value(at.x(), at.y(), at.z()));
   return grid;
 }
 
@@ -41,7 +43,8 @@ openvdb::FloatGrid::Ptr ball(double z) {
   });
 }
 
-/// A level set of a sphere about the origin; OpenVDB's own function makes none with a band of a voxel or less.
+/// A level set of a sphere about the origin; OpenVDB's own function makes none with a band of a voxel or
+/// less.
 openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width) {
   initialize_openvdb();
   const float background = width * voxel;
@@ -58,9 +61,10 @@ openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width)
   return grid;
 }
 
-/// The grid as openvdb::tools::clip() leaves it, which does not compile as C++20: what is not kept is inactive
-/// background.
-openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach, const std::function<bool(const Coord&)>& keep) {
+/// The grid as openvdb::tools::clip() leaves it, which does not compile as C++20: what is not kept is
+/// inactive background.
+openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach,
+                             const std::function<bool(const Coord&)>& keep) {
   const openvdb::FloatGrid::Ptr clipped = grid->deepCopy();
   for (const Coord& at : openvdb::CoordBBox(Coord(-reach), Coord(reach)))
     if (!keep(at)) clipped->tree().setValueOff(at, grid->background());
@@ -173,9 +177,8 @@ class VolumeEnds : public testing::TestWithParam<Extractor> {
 
 TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
   // The lower half in x is full: a block of 10.5 x 18 x 16 voxels.
-  const LevelSet box = make_level_set(dense(Coord(0, 0, 0), Coord(20, 17, 15), -1.0f, [](int x, int, int) {
-    return x < 10 ? 100.0f : 0.0f;
-  }));
+  const LevelSet box = make_level_set(dense(Coord(0, 0, 0), Coord(20, 17, 15), -1.0f,
+                                            [](int x, int, int) { return x < 10 ? 100.0f : 0.0f; }));
   const EndedMesh ended = extract(box, 50.0, Ends::closed);
   EXPECT_EQ(ended.ends.text(), "-x, -y, +y, -z, +z");
   const validation::MeshReport report = counts_of(ended.mesh);
@@ -200,8 +203,8 @@ TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
 TEST_P(VolumeEnds, CapsKeepThePromiseThatNothingMeets) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> value(0.0f, 100.0f);
-  const LevelSet noise =
-      make_level_set(dense(Coord(0, 0, 0), Coord(11, 11, 11), -1.0f, [&](int, int, int) { return value(random); }));
+  const LevelSet noise = make_level_set(
+      dense(Coord(0, 0, 0), Coord(11, 11, 11), -1.0f, [&](int, int, int) { return value(random); }));
   const EndedMesh ended = extract(noise, 50.0, Ends::closed);
   const Promises& promises = GetParam().promises;
   const Judgement judgement = judge(to_mesh_file(ended.mesh), promises,
@@ -262,8 +265,9 @@ TEST_P(VolumeEnds, OpenBallHasOneLoopInThePlaneOfTheLastSamples) {
 
 TEST_P(VolumeEnds, TurnedMirroredAndFarAway) {
   const openvdb::FloatGrid::Ptr grid = ball(12.4);
-  const openvdb::math::Mat4d matrix(0.0, 2.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 1000.0, -2000.0, 500.0,
-                                     1.0);  // of rows; mirrors
+  const openvdb::math::Mat4d matrix(0.0, 2.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 1000.0,
+                                    -2000.0, 500.0,
+                                    1.0);  // of rows; mirrors
   grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
   const EndedMesh closed = extract(make_level_set(grid), 0.0, Ends::closed);
   const validation::MeshReport report = counts_of(closed.mesh);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
@@ -12,6 +11,7 @@
 #include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/lattice/placement.h"
+#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "packages/cpp/solid_data.h"
 #include "packages/cpp/stages.h"

@@ -1,10 +1,10 @@
-// What the public functions share on the inside: the way from public types to those of the rooms and back. Only the sources
-// of this folder include it.
+// What the public functions share on the inside: the way from public types to those of the rooms and back.
+// Only the sources of this folder include it.
 #pragma once
 
 // Public names must live in hermesh::v1 alone here, beside the rooms' own of the same names.
 #ifndef HERMESH_IMPLEMENTATION
-#error "only sources of packages/cpp, which its CMakeLists.txt compiles with HERMESH_IMPLEMENTATION, include this"
+#error "only sources of packages/cpp, compiled with HERMESH_IMPLEMENTATION, include this header"
 #endif
 
 #include <exception>
@@ -24,7 +24,8 @@
 #include "hermesh/options.h"
 #include "hermesh/volume.h"
 
-/// What lives in the public namespace and is not public: the shared libraries show that namespace, but for this.
+/// What lives in the public namespace and is not public: the shared libraries show that namespace, but for
+/// this.
 #define HERMESH_INNER __attribute__((visibility("hidden")))
 
 namespace hermesh::v1 {

@@ -21,11 +21,12 @@ HERMESH_INNER double voxel_size_of(const PolygonMesh& mesh, const VoxelizeOption
 /// Voxelizes polygons as they are, checks first that they fit in memory, and notes what the level set cannot
 /// show.
 /// @throws hermesh::Error, hermesh::Cancelled
-HERMESH_INNER LevelSet level_set_of(const PolygonMesh& mesh, double voxel_size, const VoxelizeOptions& options,
-                                    const ChosenVoxelizer& chosen, RunContext& context);
+HERMESH_INNER LevelSet level_set_of(const PolygonMesh& mesh, double voxel_size,
+                                    const VoxelizeOptions& options, const ChosenVoxelizer& chosen,
+                                    RunContext& context);
 
 /// Notes what of the polygons passes between the samples.
-HERMESH_INNER void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const Voxelizer& voxelizer,
-                                     RunContext& context);
+HERMESH_INNER void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set,
+                                     const Voxelizer& voxelizer, RunContext& context);
 
 }  // namespace hermesh::v1

@@ -1,9 +1,9 @@
 // CGAL: edge collapse with Garland and Heckbert's quadrics or Lindstrom and Turk's costs, the latter within a
 // polyhedral envelope, too, and alpha wrapping.
-//   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many stay
-//   cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER          the same
-//   cgal_peer envelope IN.obj OUT.obj TOLERANCE             as far as an envelope of that width allows; world
-//   units cgal_peer alpha-wrap IN.obj OUT.obj ALPHA OFFSET        world units
+//   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many
+//   stay cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER          the same cgal_peer envelope IN.obj OUT.obj
+//   TOLERANCE             as far as an envelope of that width allows; world units cgal_peer alpha-wrap IN.obj
+//   OUT.obj ALPHA OFFSET        world units
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
@@ -113,7 +113,8 @@ int main(int argc, char** argv) {
     const std::string method = argc > 1 ? argv[1] : "";
     if (argc != (method == "alpha-wrap" ? 6 : 5))
       throw std::runtime_error(
-          "cgal_peer garland-heckbert|lindstrom-turk|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA OFFSET");
+          "cgal_peer garland-heckbert|lindstrom-turk|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA "
+          "OFFSET");
     const peers::Mesh mesh = peers::read_obj(argv[2]);
     const double number = std::atof(argv[4]);
     peers::write_obj(argv[3], method == "garland-heckbert" ? garland_heckbert(mesh, number)

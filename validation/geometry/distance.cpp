@@ -32,8 +32,8 @@ struct DistanceSums {
 // point(i) and weight(i) for i < count. Neighbours in the list tend to be neighbours in space, so that the
 // answer of one query is a good first guess for the next.
 template <class Point, class Weight>
-DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& weight, const TriangleTree& to,
-                           const RunContext& context) {
+DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& weight,
+                           const TriangleTree& to, const RunContext& context) {
   const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, DistanceSums sums) {
     context.check();
     std::uint32_t guess = 0;
@@ -49,8 +49,8 @@ DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& 
     left.append(right);
     return left;
   };
-  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, count, 512), DistanceSums{}, add_range,
-                                            join);
+  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, count, 512), DistanceSums{},
+                                            add_range, join);
 }
 
 void fill_means(const DistanceSums& sums, Distances& result) {

@@ -1,9 +1,9 @@
 // Distances from one surface to another, by samples.
 #pragma once
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/triangle_soup.h"
 #include "validation/geometry/triangle_tree.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <random>
 
-#include "validation/hausdorff.h"
 #include "validation/geometry/surface_samples.h"
 #include "validation/geometry/test_meshes.h"
+#include "validation/hausdorff.h"
 
 namespace hermesh::validation {
 namespace {
@@ -187,8 +187,8 @@ TEST(Hausdorff, BracketsDenseSampling) {
   EXPECT_LE(certified.upper - certified.lower, 3e-3 + 1e-7);
 }
 
-// A needle a hundred million times as long as it is high, whose computed plane is tilted by that much. The truth is from
-// quadruple precision: the foot is within the needle.
+// A needle a hundred million times as long as it is high, whose computed plane is tilted by that much. The
+// truth is from quadruple precision: the foot is within the needle.
 TEST(Hausdorff, ToANeedle) {
   MeshFile needle;
   needle.points = {{-0.19135289940533243, 0.25855359820650692, 0.166432725163458},

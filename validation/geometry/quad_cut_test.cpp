@@ -6,9 +6,9 @@
 #include <cmath>
 #include <utility>
 
-#include "validation/mesh_report.h"
 #include "validation/geometry/test_meshes.h"
 #include "validation/geometry/triangle_soup.h"
+#include "validation/mesh_report.h"
 
 namespace hermesh::validation {
 namespace {
@@ -68,7 +68,8 @@ TEST(QuadCut, OfABentQuadTheJudgedMeshSaysWhichSurfaceItIs) {
 TEST(QuadCut, ABentConcaveQuadIsCutAsItsMakerSays) {
   // Folded by a tenth: its two cuts are two surfaces, of which a proof may have looked at one.
   const std::vector<Eigen::Vector3d> points = {{2, 0, 0.1}, {0.5, 0.5, 0}, {0, 2, 0.1}, {0, 0, 0}};
-  for (const Quad& q : {Quad{0, 1, 2, 3}, Quad{1, 2, 3, 0}}) EXPECT_FALSE(cut_along_other(points, q, QuadRule::as_given));
+  for (const Quad& q : {Quad{0, 1, 2, 3}, Quad{1, 2, 3, 0}})
+    EXPECT_FALSE(cut_along_other(points, q, QuadRule::as_given));
   EXPECT_TRUE(cut_along_other(points, {0, 1, 2, 3}, QuadRule::better));
   std::vector<Eigen::Vector3d> rounded = points;
   for (Eigen::Vector3d& p : rounded) p.z() *= 1e-4;

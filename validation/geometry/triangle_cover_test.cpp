@@ -6,8 +6,8 @@
 #include <functional>
 #include <random>
 
-#include "validation/hausdorff.h"
 #include "validation/geometry/test_meshes.h"
+#include "validation/hausdorff.h"
 
 namespace hermesh::validation {
 namespace {

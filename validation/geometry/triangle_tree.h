@@ -116,8 +116,8 @@ class TriangleTree {
  private:
   static constexpr int kMaxDepth = 40;
 
-  // A segment against boxes: the interval of its parameter between each pair of planes, a little widened, so that
-  // rounding loses no box.
+  // A segment against boxes: the interval of its parameter between each pair of planes, a little widened, so
+  // that rounding loses no box.
   struct Slabs {
     Eigen::Vector3d from, inverse;
     Slabs(const Eigen::Vector3d& start, const Eigen::Vector3d& end)

@@ -16,12 +16,13 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kLevels = 4;  ///< blocks of 2^kLevels voxels are the largest
-/// A node's point may be this share of the tolerance from the planes that it stands for, root mean square. (With 0.45 some tenth
-/// of the points come back in the proof, on CAD three quarters, and with 0.1 bold collapses take three times as long.)
+/// A node's point may be this share of the tolerance from the planes that it stands for, root mean square.
+/// (With 0.45 some tenth of the points come back in the proof, on CAD three quarters, and with 0.1 bold
+/// collapses take three times as long.)
 constexpr double kShare = 0.3;
-/// The share of a collapse's greatest cost that a node's planes may cost, where there is one. (Without this bound blocks leave a
-/// mesh twice as far away as collapses alone; with a tenth they cost 2 % of the distance, with a fiftieth nothing, and save half
-/// of the time.)
+/// The share of a collapse's greatest cost that a node's planes may cost, where there is one. (Without this
+/// bound blocks leave a mesh twice as far away as collapses alone; with a tenth they cost 2 % of the
+/// distance, with a fiftieth nothing, and save half of the time.)
 constexpr double kMomentShare = 0.05;
 
 /// Makes the trees of sets in one block of the largest kind after another. One object for each thread.
@@ -31,8 +32,9 @@ class BlockTrees {
              double moment, const FilePoints& file)
       : fine_(fine), tolerance_(tolerance), pinned_(pinned), moment_(moment), file_(file) {}
 
-  /// Makes the sets of the block whose points are in `order` from `begin` to `end`. `position` has each point's place
-  /// in `order`. Writes node_of of these points, counted from 0, and appends to `nodes`, children first.
+  /// Makes the sets of the block whose points are in `order` from `begin` to `end`. `position` has each
+  /// point's place in `order`. Writes node_of of these points, counted from 0, and appends to `nodes`,
+  /// children first.
   void run(std::span<const std::uint32_t> order, std::span<const std::uint32_t> position, std::uint32_t begin,
            std::uint32_t end, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
     points_ = order.subspan(begin, end - begin);
@@ -77,20 +79,23 @@ class BlockTrees {
     for (int a = 0; a < 3; ++a) cells_[i][a] = static_cast<std::int32_t>(std::floor(sum.places[a]));
   }
 
-  /// The level of the least block that holds two points: the highest bit in which their cells differ. Two's complement
-  /// makes blocks below zero as wide as the others.
+  /// The level of the least block that holds two points: the highest bit in which their cells differ. Two's
+  /// complement makes blocks below zero as wide as the others.
   int level(std::uint32_t i, std::uint32_t j) const {
     std::uint32_t differ = 1;
     for (int a = 0; a < 3; ++a) differ |= static_cast<std::uint32_t>((cells_[i][a] ^ cells_[j][a]));
     return std::bit_width(differ);
   }
 
-  /// Lists the edges and triangles whose points are all in the block and not pinned, by the level of the least block
-  /// that holds them. So an edge of a level connects points of different smaller blocks, never of one set.
+  /// Lists the edges and triangles whose points are all in the block and not pinned, by the level of the
+  /// least block that holds them. So an edge of a level connects points of different smaller blocks, never of
+  /// one set.
   void gather(std::span<const std::uint32_t> position, std::uint32_t begin, std::uint32_t end) {
     for (auto& edges : edges_) edges.clear();
     for (auto& triangles : triangles_) triangles.clear();
-    const auto joins = [&](std::uint32_t p) { return position[p] >= begin && position[p] < end && !pinned_[p]; };
+    const auto joins = [&](std::uint32_t p) {
+      return position[p] >= begin && position[p] < end && !pinned_[p];
+    };
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
       const std::uint32_t p = points_[i];
       if (pinned_[p]) continue;
@@ -124,16 +129,18 @@ class BlockTrees {
       const std::uint32_t a = find(i), b = find(j);
       if (a == b) continue;
       for (const std::uint32_t root : {a, b})
-        if (node_at_[root] == MergeForest::kNone || node_at_[root] < first_new) merged_.push_back({root, node_at_[root]});
+        if (node_at_[root] == MergeForest::kNone || node_at_[root] < first_new)
+          merged_.push_back({root, node_at_[root]});
       parent_[b] = a;
       sums_[a].add(sums_[b]);
       node_at_[a] = first_new;  // some new node
     }
-    // Only now, for the sets of this level are known: an edge or a triangle lies in the set of any of its points.
+    // Only now, for the sets of this level are known: an edge or a triangle lies in the set of any of its
+    // points.
     for (const auto& [i, j] : edges_[level - 1]) --sums_[find(i)].euler;
     for (const std::uint32_t i : triangles_[level - 1]) ++sums_[find(i)].euler;
-    // One new node for each root; sets and single points of before become its children. A set that does not merge gets
-    // one as well, for a larger one around it may.
+    // One new node for each root; sets and single points of before become its children. A set that does not
+    // merge gets one as well, for a larger one around it may.
     for (const auto& [root, node] : merged_) node_at_[find(root)] = MergeForest::kNone;
     for (const auto& [root, node] : merged_) {
       std::uint32_t& at = node_at_[find(root)];
@@ -141,16 +148,18 @@ class BlockTrees {
         at = static_cast<std::uint32_t>(nodes.size());
         nodes.push_back(node_of_sum(sums_[find(root)], level));
       }
-      if (node == MergeForest::kNone) node_of[points_[root]] = at;
-      else nodes[node].parent = at;
+      if (node == MergeForest::kNone)
+        node_of[points_[root]] = at;
+      else
+        nodes[node].parent = at;
     }
   }
 
   MergeForest::Node node_of_sum(const Sum& sum, int level) const {
     MergeForest::Node node;
     node.first = sum.first;
-    // Connected, with Euler characteristic 1: a disc or a tree, which can shrink to a point without a change of
-    // topology.
+    // Connected, with Euler characteristic 1: a disc or a tree, which can shrink to a point without a change
+    // of topology.
     if (sum.euler != 1) return node;
     const Vector3d middle = sum.places / double(sum.points);
     WideQuadric q = sum.quadric;  // about the middle
@@ -178,9 +187,9 @@ class BlockTrees {
   std::span<const std::uint32_t> points_;
   Vector3d anchor_;
   std::vector<std::array<std::int32_t, 3>> cells_;
-  std::vector<Sum> sums_;              ///< one per point; a root's is that of its set
-  std::vector<std::uint32_t> parent_;  ///< disjoint sets of points
-  std::vector<std::uint32_t> node_at_; ///< node of each root, or kNone
+  std::vector<Sum> sums_;               ///< one per point; a root's is that of its set
+  std::vector<std::uint32_t> parent_;   ///< disjoint sets of points
+  std::vector<std::uint32_t> node_at_;  ///< node of each root, or kNone
   std::array<std::vector<std::pair<std::uint32_t, std::uint32_t>>, kLevels> edges_;
   std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< one corner of each, for each level
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;
@@ -190,18 +199,22 @@ class BlockTrees {
 std::uint64_t block_key(const Vector3d& p) {
   std::uint64_t key = 0;
   for (int a = 0; a < 3; ++a)
-    key = key << 21 | ((static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[a]))) >> kLevels) & 0x1fffff);
+    key = key << 21 |
+          ((static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[a]))) >> kLevels) & 0x1fffff);
   return key;
 }
 
 }  // namespace
 
-MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
-                         double moment, const FilePoints& file, const RunContext& context) {
+MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
+                         std::span<const std::uint8_t> pinned, double moment, const FilePoints& file,
+                         const RunContext& context) {
   const std::vector<Vector3d>& points = fine.points();
   // Points by block, in each by number: one order for every number of threads.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
-  parallel_blocks(points.size(), context, [&](std::size_t p) { keys[p] = {block_key(points[p]), static_cast<std::uint32_t>(p)}; });
+  parallel_blocks(points.size(), context, [&](std::size_t p) {
+    keys[p] = {block_key(points[p]), static_cast<std::uint32_t>(p)};
+  });
   tbb::parallel_sort(keys.begin(), keys.end());
   std::vector<std::uint32_t> order(points.size()), position(points.size()), first;
   for (std::uint32_t i = 0; i < keys.size(); ++i) {
@@ -215,7 +228,8 @@ MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
   std::vector<std::uint32_t> node_of(points.size(), MergeForest::kNone);
   const std::size_t n = first.size() - 1;
   std::vector<std::vector<MergeForest::Node>> nodes(n);
-  tbb::enumerable_thread_specific<BlockTrees> trees([&] { return BlockTrees(fine, tolerance, pinned, moment, file); });
+  tbb::enumerable_thread_specific<BlockTrees> trees(
+      [&] { return BlockTrees(fine, tolerance, pinned, moment, file); });
   parallel_blocks(n, context, [&](std::size_t b) {
     trees.local().run(order, position, first[b], first[b + 1], node_of, nodes[b]);
   });

@@ -31,12 +31,13 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
   // *Propose* by blocks, the cheapest way by far to be rid of most points, and by collapses that look at the
   // quadrics alone. Only the topology is looked at yet: distances are proved once edges have been collapsed
   // with care, too.
-  MergeForest forest =
-      timed("decimate", [&] { return block_forest(fine, tolerance, pinned, nearness.moment, file, context); });
+  MergeForest forest = timed(
+      "decimate", [&] { return block_forest(fine, tolerance, pinned, nearness.moment, file, context); });
   MergeProof proof(forest, fine, tolerance, context, pieces);
   const auto collapse = [&](std::span<const std::uint8_t> where, Collapses kind) {
     timed("decimate", [&] {
-      collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, nearness.moment, file, context);
+      collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, nearness.moment, file,
+                     context);
     });
   };
   timed("decimate", [&] { proof.sort_out(); });

@@ -1,12 +1,12 @@
 // A coarse mesh whose distance from a fine one is proved.
 //
-// *Propose*: sets of points become one, the minimiser of the squared distances to the planes of all triangles that they stand
-// for (quadrics, Garland & Heckbert 1997): first those of blocks of up to 16 voxels (block_forest.h), then the ends of edges,
-// cheapest first (decimation.h).
-// *Prove*: the mesh that results (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that
-// it was made of, at last into single points; so this ends, at worst with the fine mesh.
-// Collapses come boldly first, by the quadrics alone and shy of the tolerance, which does much of the work in a small part of the
-// time; then with care; and once the proof has taken sets back with care again, around these alone.
+// *Propose*: sets of points become one, the minimiser of the squared distances to the planes of all triangles
+// that they stand for (quadrics, Garland & Heckbert 1997): first those of blocks of up to 16 voxels
+// (block_forest.h), then the ends of edges, cheapest first (decimation.h). *Prove*: the mesh that results
+// (merge_proof.h). What cannot be proved is taken back, set by set, into the smaller sets that it was made
+// of, at last into single points; so this ends, at worst with the fine mesh. Collapses come boldly first, by
+// the quadrics alone and shy of the tolerance, which does much of the work in a small part of the time; then
+// with care; and once the proof has taken sets back with care again, around these alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@ namespace hermesh {
 
 /// A coarse mesh, with the fine triangle that each of its triangles stands for.
 struct CertifiedMesh {
-  std::vector<Eigen::Vector3d> points;       ///< FilePoints::rounded()
+  std::vector<Eigen::Vector3d> points;  ///< FilePoints::rounded()
   std::vector<Triangle> triangles;
   /// For each triangle one of the fine mesh, whose corners went into the corners of this one.
   std::vector<std::uint32_t> fine_triangle;
@@ -31,7 +31,8 @@ struct CertifiedMesh {
 
 /// What is done for the root mean square distance, beside the bound of the greatest one.
 struct Nearness {
-  /// Greatest cost of a collapse, voxels⁴ (collapse_edges()); 0 for none, so that triangles are as few as the tolerance allows.
+  /// Greatest cost of a collapse, voxels⁴ (collapse_edges()); 0 for none, so that triangles are as few as the
+  /// tolerance allows.
   double moment = 0;
   /// Sweeps of propose_relaxation() over the mesh; 0 for none.
   int relaxation = 0;

@@ -16,9 +16,9 @@ constexpr double kShortestStep = 0.03;
 
 bool CollapseDistance::passes() { return attach_samples() && point_is_near() && new_edges_are_near(); }
 
-/// Attaches every sample concerned to a new triangle within its tolerance: those of the faces that go or change, and
-/// the ends that move, unless they have moved before and are samples of a face already. So each place of the fine mesh
-/// that is a point has the new mesh near it.
+/// Attaches every sample concerned to a new triangle within its tolerance: those of the faces that go or
+/// change, and the ends that move, unless they have moved before and are samples of a face already. So each
+/// place of the fine mesh that is a point has the new mesh near it.
 bool CollapseDistance::attach_samples() {
   reach_.clear();
   for (const Collapse::NewFace& made : collapse_.made) reach_.emplace_back(made.at);
@@ -29,7 +29,8 @@ bool CollapseDistance::attach_samples() {
   if (collapse_.v_moves && !attach_own(collapse_.v)) return false;
   if (!attach_own(collapse_.going)) return false;
   for (const std::uint32_t f : collapse_.old)
-    for (std::uint32_t s = mesh_.first_sample[cube_.faces[f].global]; s != kNoSample; s = mesh_.next_sample[s])
+    for (std::uint32_t s = mesh_.first_sample[cube_.faces[f].global]; s != kNoSample;
+         s = mesh_.next_sample[s])
       if (!attach(s)) return false;
   return true;
 }
@@ -50,7 +51,8 @@ bool CollapseDistance::attach(std::uint32_t sample) {
 
 /// Whether the new point is near the fine mesh, looked for from a triangle around a sample next to it.
 bool CollapseDistance::point_is_near() {
-  if (collapse_.attached.empty()) return false;  // no place to start from; rare, for ends that move leave samples behind
+  if (collapse_.attached.empty())
+    return false;  // no place to start from; rare, for ends that move leave samples behind
   const FineMesh& fine = *mesh_.fine;
   below_ = fine.walk(fine.around(collapse_.attached.front().sample).front(), collapse_.x);
   return near_fine_around(collapse_.x, 0.0);
@@ -73,15 +75,17 @@ bool CollapseDistance::near_fine_around(const Vector3d& p, double radius) {
 bool CollapseDistance::near_fine(std::uint32_t t, const Vector3d& p, double radius) const {
   const FineMesh& fine = *mesh_.fine;
   const Triangle& c = fine.triangles()[t];
-  const double within = std::min({mesh_.tolerance[c[0]], mesh_.tolerance[c[1]], mesh_.tolerance[c[2]]}) - radius;
+  const double within =
+      std::min({mesh_.tolerance[c[0]], mesh_.tolerance[c[1]], mesh_.tolerance[c[2]]}) - radius;
   const Vector3d& corner = fine.points()[c[0]];
   constexpr double kRounding = 1e-4;  // of the normals' single precision, over a triangle's size
-  if (within < 0 || std::abs(fine.normal(t).cast<double>().dot(p - corner)) > within + kRounding) return false;
+  if (within < 0 || std::abs(fine.normal(t).cast<double>().dot(p - corner)) > within + kRounding)
+    return false;
   return squared_distance(p, corner, fine.points()[c[1]], fine.points()[c[2]]) <= within * within;
 }
 
-/// Whether the new edges are near the fine mesh. Samples alone would not tell: a narrow ridge could rise above the fine
-/// mesh and yet have its flanks near every edge of that.
+/// Whether the new edges are near the fine mesh. Samples alone would not tell: a narrow ridge could rise
+/// above the fine mesh and yet have its flanks near every edge of that.
 bool CollapseDistance::new_edges_are_near() {
   const std::uint32_t below_x = below_;
   for (const Collapse::NewFace& made : collapse_.made) {
@@ -93,15 +97,15 @@ bool CollapseDistance::new_edges_are_near() {
   return true;
 }
 
-/// A quick answer for the edge from the new point, which may be no where a longer look says yes: the fine edges right below
-/// or above it, one after another, seen along a new triangle's normal.
+/// A quick answer for the edge from the new point, which may be no where a longer look says yes: the fine
+/// edges right below or above it, one after another, seen along a new triangle's normal.
 bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal) const {
   constexpr int kMostSteps = 256;
   const FineMesh& fine = *mesh_.fine;
   const Vector3d along = to - collapse_.x, across = normal.cross(along);
   const double squared = along.squaredNorm(), height = 1.0 / normal.norm();
-  // All relative to the new point. `across` is at right angles to the plane that stands on the edge: its sign tells on
-  // which side of the edge a fine point is seen.
+  // All relative to the new point. `across` is at right angles to the plane that stands on the edge: its sign
+  // tells on which side of the edge a fine point is seen.
   std::uint32_t t = below_;
   int entry = -1;
   for (int step = 0; step < kMostSteps; ++step) {
@@ -112,7 +116,8 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
       at[i] = fine.points()[c[i]] - collapse_.x;
       side[i] = across.dot(at[i]);
     }
-    // Counter-clockwise seen from outside, so the way leaves by the side that leads from its right to its left.
+    // Counter-clockwise seen from outside, so the way leaves by the side that leads from its right to its
+    // left.
     int exit = -1;
     for (int i = 0; i < 3; ++i)
       if (i != entry && side[i] < 0 && side[(i + 1) % 3] >= 0) exit = i;
@@ -120,8 +125,8 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
     const int j = (exit + 1) % 3;
     const double share = side[exit] / (side[exit] - side[j]);
     const Vector3d q = at[exit] + share * (at[j] - at[exit]);
-    // How far along the edge it passes over the fine one, and how high there. Between two such places the fine mesh is
-    // flat and the edge straight, so nothing in between is farther.
+    // How far along the edge it passes over the fine one, and how high there. Between two such places the
+    // fine mesh is flat and the edge straight, so nothing in between is farther.
     const double way = q.dot(along) / squared;
     if (way >= 1.0) return true;
     const double within = std::min(mesh_.tolerance[c[exit]], mesh_.tolerance[c[j]]);
@@ -134,14 +139,15 @@ bool CollapseDistance::is_near_below(const Vector3d& to, const Vector3d& normal)
   return false;
 }
 
-/// Whether a segment is near the fine mesh: in steps, each near one fine triangle as a whole, that are found by a walk
-/// over the fine mesh beside the segment.
+/// Whether a segment is near the fine mesh: in steps, each near one fine triangle as a whole, that are found
+/// by a walk over the fine mesh beside the segment.
 bool CollapseDistance::segment_is_near(const Vector3d& from, const Vector3d& to) {
   const double length = (to - from).norm();
   double done = 0, step = 1.0;
   while (done < length) {
     step = std::min(step, length - done);
-    const Vector3d begin = from + (done / length) * (to - from), end = from + ((done + step) / length) * (to - from);
+    const Vector3d begin = from + (done / length) * (to - from),
+                   end = from + ((done + step) / length) * (to - from);
     // The distance to a triangle is convex: with both ends of the step within the bound all of it is.
     if (near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) {
       done += step;
@@ -150,7 +156,8 @@ bool CollapseDistance::segment_is_near(const Vector3d& from, const Vector3d& to)
     }
     const Vector3d middle = 0.5 * (begin + end);
     below_ = mesh_.fine->walk(below_, middle);
-    if ((near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) || near_fine_around(middle, 0.5 * step)) {
+    if ((near_fine(below_, begin, 0.0) && near_fine(below_, end, 0.0)) ||
+        near_fine_around(middle, 0.5 * step)) {
       done += step;
       step *= 2;
     } else if ((step *= 0.5) < kShortestStep) {

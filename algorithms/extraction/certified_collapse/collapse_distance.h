@@ -13,8 +13,9 @@ class CollapseDistance {
   CollapseDistance(DecimatedMesh& mesh, CubeMesh& cube, Collapse& collapse)
       : mesh_(mesh), cube_(cube), collapse_(collapse) {}
 
-  /// Whether the collapse keeps to the tolerance: every sample of the old triangles, and the ends that move, have a new
-  /// triangle within their tolerance, and the new point and the new edges are within the tolerance of the fine mesh.
+  /// Whether the collapse keeps to the tolerance: every sample of the old triangles, and the ends that move,
+  /// have a new triangle within their tolerance, and the new point and the new edges are within the tolerance
+  /// of the fine mesh.
   bool passes();
 
  private:

@@ -13,21 +13,25 @@ using Eigen::Vector3d;
 constexpr double kPoorShape = 0.05;
 /// A triangle may not turn by more than some 84 degrees in one collapse.
 constexpr double kLeastCosineToOld = 0.1;
-/// How far a triangle of a bold collapse, where nobody looks at what is below, may face away from the fine triangle
-/// that it began as: some 72 degrees. A triangle that faced the wrong way before need not do so for ever then.
+/// How far a triangle of a bold collapse, where nobody looks at what is below, may face away from the fine
+/// triangle that it began as: some 72 degrees. A triangle that faced the wrong way before need not do so for
+/// ever then.
 constexpr double kLeastCosineToFine = 0.3;
 
-/// Shape of a triangle, 1 for equilateral and 0 for degenerate: its area over the sum of its squared sides, scaled.
+/// Shape of a triangle, 1 for equilateral and 0 for degenerate: its area over the sum of its squared sides,
+/// scaled.
 double shape(const Corners& t) {
   const double twice_area = (t[1] - t[0]).cross(t[2] - t[0]).norm();
-  const double squares = (t[1] - t[0]).squaredNorm() + (t[2] - t[1]).squaredNorm() + (t[0] - t[2]).squaredNorm();
+  const double squares =
+      (t[1] - t[0]).squaredNorm() + (t[2] - t[1]).squaredNorm() + (t[0] - t[2]).squaredNorm();
   return squares > 0 ? 2.0 * std::sqrt(3.0) * twice_area / squares : 0.0;
 }
 
 }  // namespace
 
-CubeCollapse::CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
-                           std::span<const std::uint32_t> triangles, CubeNumbers& numbers)
+CubeCollapse::CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints& file,
+                           const DecimationCube& cube, std::span<const std::uint32_t> triangles,
+                           CubeNumbers& numbers)
     : mesh_(mesh),
       kind_(kind),
       file_(file),
@@ -82,8 +86,8 @@ bool CubeCollapse::gather(std::uint32_t going, std::uint32_t v, const Vector3d& 
   return make_faces(going) && (!collapse_.v_moves || make_faces(v));
 }
 
-/// Makes the faces around one end of the edge as they will be, but for the two beside the edge, which go. If the other
-/// end moves, the same is done for it.
+/// Makes the faces around one end of the edge as they will be, but for the two beside the edge, which go. If
+/// the other end moves, the same is done for it.
 bool CubeCollapse::make_faces(std::uint32_t moved) {
   const std::uint32_t other = moved == collapse_.v ? collapse_.going : collapse_.v;
   bool good = true;
@@ -104,8 +108,8 @@ bool CubeCollapse::make_faces(std::uint32_t moved) {
   return good;
 }
 
-/// Whether the new edges of a face are no longer than a cube of this round may make; where they are, the next round
-/// may.
+/// Whether the new edges of a face are no longer than a cube of this round may make; where they are, the next
+/// round may.
 bool CubeCollapse::is_short(const Corners& at, std::uint32_t moved) {
   const double limit = cube_.longest_edge * cube_.longest_edge;
   const bool is = (at[1] - at[0]).squaredNorm() <= limit && (at[2] - at[0]).squaredNorm() <= limit;
@@ -115,12 +119,15 @@ bool CubeCollapse::is_short(const Corners& at, std::uint32_t moved) {
 
 /// Whether a face keeps some area, does not turn over and is no sliver.
 bool CubeCollapse::is_well_shaped(const Collapse::NewFace& made, const Corners& before) const {
-  const Vector3d normal_before = kind_ == Collapses::bold
-                                     ? mesh_.fine->normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
-                                     : (before[1] - before[0]).cross(before[2] - before[0]);
-  const double size = made.normal.norm(), least = kind_ == Collapses::bold ? kLeastCosineToFine : kLeastCosineToOld;
+  const Vector3d normal_before =
+      kind_ == Collapses::bold
+          ? mesh_.fine->normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
+          : (before[1] - before[0]).cross(before[2] - before[0]);
+  const double size = made.normal.norm(),
+               least = kind_ == Collapses::bold ? kLeastCosineToFine : kLeastCosineToOld;
   constexpr double kDegenerate = 1e-9;  // of its sides squared
-  if (size <= kDegenerate * ((made.at[1] - made.at[0]).squaredNorm() + (made.at[2] - made.at[0]).squaredNorm()))
+  if (size <=
+      kDegenerate * ((made.at[1] - made.at[0]).squaredNorm() + (made.at[2] - made.at[0]).squaredNorm()))
     return false;
   if (made.normal.dot(normal_before) < least * size * normal_before.norm()) return false;
   const double now = shape(made.at);
@@ -130,8 +137,8 @@ bool CubeCollapse::is_well_shaped(const Collapse::NewFace& made, const Corners& 
 bool CubeCollapse::passes() { return kind_ == Collapses::bold || distance_.passes(); }
 
 void CubeCollapse::apply() {
-  // All old faces are gone first, and those that are only changed come back: what is gone then are the two beside the
-  // edge. Samples are in the lists of the new faces alone.
+  // All old faces are gone first, and those that are only changed come back: what is gone then are the two
+  // beside the edge. Samples are in the lists of the new faces alone.
   for (const std::uint32_t f : collapse_.old) mesh_.first_sample[local_.faces[f].global] = kNoSample;
   for (const std::uint32_t f : collapse_.old) local_.faces[f].gone = true;
   for (const Collapse::NewFace& made : collapse_.made) {
@@ -141,7 +148,8 @@ void CubeCollapse::apply() {
     mesh_.triangles[face.global][made.corner] = local_.vertices[collapse_.v].global;
   }
   for (const std::uint32_t f : collapse_.old)
-    if (local_.faces[f].gone) mesh_.triangles[local_.faces[f].global] = {kNoTriangle, kNoTriangle, kNoTriangle};
+    if (local_.faces[f].gone)
+      mesh_.triangles[local_.faces[f].global] = {kNoTriangle, kNoTriangle, kNoTriangle};
   for (const Collapse::Attached& entry : collapse_.attached) {
     const std::uint32_t triangle = local_.faces[collapse_.made[entry.triangle].face].global;
     mesh_.next_sample[entry.sample] = mesh_.first_sample[triangle];

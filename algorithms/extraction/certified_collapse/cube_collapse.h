@@ -6,8 +6,8 @@
 
 namespace hermesh {
 
-/// The collapses of one cube, one after another. For each first gather(), then passes(), then apply(), each only if the
-/// one before said yes.
+/// The collapses of one cube, one after another. For each first gather(), then passes(), then apply(), each
+/// only if the one before said yes.
 class CubeCollapse {
  public:
   CubeCollapse(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
@@ -16,11 +16,12 @@ class CubeCollapse {
   CubeMesh& mesh() { return local_; }
   const Collapse& collapse() const { return collapse_; }
 
-  /// Makes the faces as they will be when `going` and `v`, two ends of an edge, have become the point at `x`. v keeps
-  /// its number, and moves only if x is not where it is; whichever of the two moves must be free. False if x lies
-  /// outside of the cube, or if a face turns over, degenerates or gets too long.
+  /// Makes the faces as they will be when `going` and `v`, two ends of an edge, have become the point at `x`.
+  /// v keeps its number, and moves only if x is not where it is; whichever of the two moves must be free.
+  /// False if x lies outside of the cube, or if a face turns over, degenerates or gets too long.
   bool gather(std::uint32_t going, std::uint32_t v, const Eigen::Vector3d& x);
-  /// Whether the gathered collapse keeps near enough to the fine mesh (decimation.h); the topology is the caller's.
+  /// Whether the gathered collapse keeps near enough to the fine mesh (decimation.h); the topology is the
+  /// caller's.
   bool passes();
   /// Carries out the collapse that was gathered, and notes what it joins.
   void apply();

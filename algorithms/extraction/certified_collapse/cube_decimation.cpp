@@ -11,17 +11,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What the mean squared distance of the new point to the planes that an edge's ends stand for may be, in tolerances
-/// squared: beyond, the edge is not worth a test. (1 would lose some 4 % of the collapses of a scan, 4 none and save
-/// nothing.)
+/// What the mean squared distance of the new point to the planes that an edge's ends stand for may be, in
+/// tolerances squared: beyond, the edge is not worth a test. (1 would lose some 4 % of the collapses of a
+/// scan, 4 none and save nothing.)
 constexpr double kHopeless = 2.0;
-/// What the mean squared distance of the new point to the planes may be in a bold collapse, in tolerances squared:
-/// nothing else is asked of distances there. (With 0.3 the proof takes back a third of what is collapsed, with 0.03 nearly all is
-/// left to careful collapses, which cost five times as much each.)
+/// What the mean squared distance of the new point to the planes may be in a bold collapse, in tolerances
+/// squared: nothing else is asked of distances there. (With 0.3 the proof takes back a third of what is
+/// collapsed, with 0.03 nearly all is left to careful collapses, which cost five times as much each.)
 constexpr double kBold = 0.12;
 
-/// Collapses edges of a cube, cheapest first. The heap may hold proposals that are out of date: the versions of their
-/// ends tell.
+/// Collapses edges of a cube, cheapest first. The heap may hold proposals that are out of date: the versions
+/// of their ends tell.
 class EdgeCollapses {
   struct Proposal {
     float cost;
@@ -34,15 +34,16 @@ class EdgeCollapses {
   };
 
  public:
-  EdgeCollapses(CubeCollapse& collapses, double hopeless) : collapses_(collapses), mesh_(collapses.mesh()), hopeless_(hopeless) {}
+  EdgeCollapses(CubeCollapse& collapses, double hopeless)
+      : collapses_(collapses), mesh_(collapses.mesh()), hopeless_(hopeless) {}
 
   void run(const RunContext& context) {
     for (const CubeMesh::Face& face : mesh_.faces) {
       if (!face.own || face.gone) continue;
       for (int i = 0; i < 3; ++i) {
         const std::uint32_t u = face.corners[i], v = face.corners[(i + 1) % 3];
-        // Each edge between two own faces once. One at the border of these may be left out: both its ends have a face
-        // that is not the cube's, and neither may move.
+        // Each edge between two own faces once. One at the border of these may be left out: both its ends
+        // have a face that is not the cube's, and neither may move.
         if (u < v && (collapses_.is_dirty(u) || collapses_.is_dirty(v))) propose(u, v);
       }
     }
@@ -52,7 +53,8 @@ class EdgeCollapses {
       const Proposal next = heap_.back();
       heap_.pop_back();
       const CubeMesh::Vertex &u = mesh_.vertices[next.u], &v = mesh_.vertices[next.v];
-      if (!u.gone && !v.gone && u.version == next.version_u && v.version == next.version_v) try_edge(next.u, next.v);
+      if (!u.gone && !v.gone && u.version == next.version_u && v.version == next.version_v)
+        try_edge(next.u, next.v);
     }
   }
 
@@ -78,7 +80,8 @@ class EdgeCollapses {
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();
     const double off = q(x), tolerance = std::min(collapses_.tolerance_at(u), collapses_.tolerance_at(v));
     const double now = forgets ? cost(x) : off;
-    const bool hopeless = off > hopeless_ * tolerance * tolerance * q.a.trace() || (forgets && now > collapses_.moment());
+    const bool hopeless =
+        off > hopeless_ * tolerance * tolerance * q.a.trace() || (forgets && now > collapses_.moment());
     // Where planes tell nothing apart, as on flat parts, short edges come before long ones.
     return {middle + x, now + kPull * cost.a.trace() * squared, hopeless};
   }
@@ -105,8 +108,8 @@ class EdgeCollapses {
     try_at(u, v, q(at_u - at_v) < q(Vector3d::Zero()) ? at_u : at_v);
   }
 
-  /// Whether the link condition holds (Dey et al. 1999): the ends have two adjacent vertices in common, those opposite
-  /// the edge. A tetrahedron, all of whose vertices have three faces, must not collapse either.
+  /// Whether the link condition holds (Dey et al. 1999): the ends have two adjacent vertices in common, those
+  /// opposite the edge. A tetrahedron, all of whose vertices have three faces, must not collapse either.
   bool keeps_topology(std::uint32_t u, std::uint32_t v) {
     const std::uint32_t question = mesh_.ask();
     std::size_t at_u = 0, at_v = 0;
@@ -142,9 +145,9 @@ class EdgeCollapses {
 
 }  // namespace
 
-std::vector<Join> decimate_cube(DecimatedMesh& mesh, Collapses kind, const FilePoints& file, const DecimationCube& cube,
-                                std::span<const std::uint32_t> triangles, CubeNumbers& numbers,
-                                const RunContext& context) {
+std::vector<Join> decimate_cube(DecimatedMesh& mesh, Collapses kind, const FilePoints& file,
+                                const DecimationCube& cube, std::span<const std::uint32_t> triangles,
+                                CubeNumbers& numbers, const RunContext& context) {
   CubeCollapse collapses(mesh, kind, file, cube, triangles, numbers);
   EdgeCollapses(collapses, kind == Collapses::bold ? kBold : kHopeless).run(context);
   return std::move(collapses.joins());

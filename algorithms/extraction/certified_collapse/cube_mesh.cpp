@@ -2,8 +2,8 @@
 
 namespace hermesh {
 
-CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::span<const std::uint32_t> triangles,
-                   CubeNumbers& numbers) {
+CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube,
+                   std::span<const std::uint32_t> triangles, CubeNumbers& numbers) {
   numbers.vertex.resize(mesh.points.size(), kNone);
   vertices.reserve(triangles.size() / 2 + 64);
   faces.resize(triangles.size());
@@ -20,15 +20,18 @@ CubeMesh::CubeMesh(const DecimatedMesh& mesh, const DecimationCube& cube, std::s
       if (v >= vertices.size() || vertices[v].global != point) {
         v = numbers.vertex[point] = static_cast<std::uint32_t>(vertices.size());
         const bool here = cube.holds(mesh.points[point]);
-        vertices.push_back({.point = mesh.points[point], .global = point, .here = here, .free = here && !mesh.pinned[point]});
+        vertices.push_back({.point = mesh.points[point],
+                            .global = point,
+                            .here = here,
+                            .free = here && !mesh.pinned[point]});
       }
       face.corners[i] = v;
       face.own = face.own && vertices[v].here;
       next_corner[3 * f + i] = vertices[v].first_corner;
       vertices[v].first_corner = 3 * f + static_cast<std::uint32_t>(i);
     }
-    // All triangles of a point in the cube are listed, for they touch it. The point may move if all of them lie in it:
-    // no other cube sees any of them then.
+    // All triangles of a point in the cube are listed, for they touch it. The point may move if all of them
+    // lie in it: no other cube sees any of them then.
     if (!face.own)
       for (const std::uint32_t v : face.corners) vertices[v].free = false;
   }

@@ -10,14 +10,14 @@
 
 namespace hermesh {
 
-/// What a thread keeps from cube to cube: numbers in a cube by numbers in the whole mesh. Entries left by other cubes
-/// do no harm.
+/// What a thread keeps from cube to cube: numbers in a cube by numbers in the whole mesh. Entries left by
+/// other cubes do no harm.
 struct CubeNumbers {
   std::vector<std::uint32_t> vertex;
 };
 
-/// The triangles that touch a cube. Vertices and faces have numbers of their own here, in the order in which the
-/// triangles name them.
+/// The triangles that touch a cube. Vertices and faces have numbers of their own here, in the order in which
+/// the triangles name them.
 struct CubeMesh {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -27,9 +27,9 @@ struct CubeMesh {
     std::uint32_t first_corner = kNone;
     std::uint32_t version = 0;  ///< goes up when the vertex changes
     bool here = false;          ///< in the cube, so that all its triangles are known
-    bool free = false;          ///< all its triangles belong to the cube and it is not pinned, so that it may move
+    bool free = false;  ///< all its triangles belong to the cube and it is not pinned, so that it may move
     bool gone = false;
-    std::uint32_t seen = 0;     ///< number of the last question that it was looked at for
+    std::uint32_t seen = 0;  ///< number of the last question that it was looked at for
   };
   struct Face {
     std::array<std::uint32_t, 3> corners;
@@ -46,7 +46,8 @@ struct CubeMesh {
     for (std::uint32_t corner = vertices[v].first_corner; corner != kNone; corner = next_corner[corner])
       if (!faces[corner / 3].gone) f(corner / 3, static_cast<int>(corner % 3));
   }
-  /// Gives `staying` the corners of `going` that are left: dead ones would make the walk around it longer and longer.
+  /// Gives `staying` the corners of `going` that are left: dead ones would make the walk around it longer and
+  /// longer.
   void merge_corners(std::uint32_t going, std::uint32_t staying);
   /// Begins a new question, and returns its number for Vertex::seen.
   std::uint32_t ask() { return ++question; }
@@ -73,10 +74,10 @@ struct Collapse {
 
   std::uint32_t v, going;
   Eigen::Vector3d x;
-  bool v_moves;                     ///< else x is where v is, and its faces stay unless `going` is in them
-  std::vector<std::uint32_t> old;   ///< faces that go or change
-  std::vector<NewFace> made;        ///< faces as they will be
-  std::vector<Attached> attached;   ///< samples of the old faces, and those of the vertices that move
+  bool v_moves;                    ///< else x is where v is, and its faces stay unless `going` is in them
+  std::vector<std::uint32_t> old;  ///< faces that go or change
+  std::vector<NewFace> made;       ///< faces as they will be
+  std::vector<Attached> attached;  ///< samples of the old faces, and those of the vertices that move
 };
 
 }  // namespace hermesh

@@ -199,8 +199,8 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::sp
 
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
                     const FineMesh& fine, std::span<const float> tolerance,
-                    std::span<const std::uint8_t> pinned, Collapses kind, double moment, const FilePoints& file,
-                    RunContext& context) {
+                    std::span<const std::uint8_t> pinned, Collapses kind, double moment,
+                    const FilePoints& file, RunContext& context) {
   DecimatedMesh mesh = begin(forest, merged, where, fine, tolerance, context);
   mesh.pinned = pinned;
   mesh.moment = moment;

@@ -62,16 +62,17 @@ enum class Collapses { bold, careful };
 /// @param tolerance by point of `fine`, voxels
 /// @param pinned by point of `fine`: points that stay as and where they are
 /// @param kind how collapses are tested
-/// @param moment 0: collapses cost the squared distances to the planes of all that the new point stands for, and go on as
-///   far as the tests allow. Else the greatest cost of a collapse, voxels⁴, which is the sum of squared distances of the new
-///   point to the planes of the triangles around the edge as they are now, weighted by their areas: without a memory, and
-///   the cheapest first, as Lindstrom & Turk's (1998)
+/// @param moment 0: collapses cost the squared distances to the planes of all that the new point stands for,
+/// and go on as
+///   far as the tests allow. Else the greatest cost of a collapse, voxels⁴, which is the sum of squared
+///   distances of the new point to the planes of the triangles around the edge as they are now, weighted by
+///   their areas: without a memory, and the cheapest first, as Lindstrom & Turk's (1998)
 /// @param file rounds places to the file's precision
 /// @param context told of progress, and asked whether to stop
 /// @throws Cancelled
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
                     const FineMesh& fine, std::span<const float> tolerance,
-                    std::span<const std::uint8_t> pinned, Collapses kind, double moment, const FilePoints& file,
-                    RunContext& context);
+                    std::span<const std::uint8_t> pinned, Collapses kind, double moment,
+                    const FilePoints& file, RunContext& context);
 
 }  // namespace hermesh

@@ -32,7 +32,8 @@ void for_each_range(std::size_t points, F&& f) {
 
 }  // namespace
 
-FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles, const RunContext& context)
+FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles,
+                   const RunContext& context)
     : points_(std::move(points)), triangles_(std::move(triangles)), first_(points_.size() + 1) {
   // `around_` has three entries for each triangle, which `first_` counts in 32 bits.
   if (triangles_.size() > kNone / 3)
@@ -49,7 +50,8 @@ FineMesh::FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> tr
     }
   });
   // Triangles by point: count, scan, fill, so that those around a point ascend.
-  constexpr std::uint32_t kBetweenChecks = 1 << 16;  // triangles, which are millions: all of them take tenths of a second
+  constexpr std::uint32_t kBetweenChecks =
+      1 << 16;  // triangles, which are millions: all of them take tenths of a second
   const auto for_each_corner = [&](std::uint32_t first, std::uint32_t end, auto&& f) {
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       if (t % kBetweenChecks == 0) context.check();

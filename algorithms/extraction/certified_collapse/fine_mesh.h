@@ -21,7 +21,8 @@ class FineMesh {
   static constexpr std::uint32_t kNone = 0xffffffffu;
   /// Finds the normals of the triangles, those around each point and those beyond each side.
   /// @throws Error if three times the triangles are more than 32 bits can number; Cancelled.
-  FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles, const RunContext& context = RunContext());
+  FineMesh(std::vector<Eigen::Vector3d> points, std::vector<Triangle> triangles,
+           const RunContext& context = RunContext());
 
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   const std::vector<Triangle>& triangles() const { return triangles_; }

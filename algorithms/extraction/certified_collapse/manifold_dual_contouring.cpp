@@ -35,10 +35,11 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
   report(uniform.counts, context);
   const bool merges = options.tolerance > 0 || at_points.simplifies();
-  return finished(uniform.points.empty() || !merges
-                      ? as_they_are(std::move(uniform))
-                      : by_collapses(std::move(uniform), at_points, options.tolerance, options.nearness, file, context),
-                  at_points, file, context);
+  return finished(
+      uniform.points.empty() || !merges
+          ? as_they_are(std::move(uniform))
+          : by_collapses(std::move(uniform), at_points, options.tolerance, options.nearness, file, context),
+      at_points, file, context);
 }
 
 namespace {
@@ -48,11 +49,14 @@ const OptionTable<Nearness>& nearness_option_table() {
   static const auto table =
       OptionTable<Nearness>()
           .number("moment", &Nearness::moment, {.maximum = 1e30},
-                  "greatest sum of squared distances to the planes of the triangles around, weighted by their areas, that "
-                  "the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives triangles to where they "
+                  "greatest sum of squared distances to the planes of the triangles around, weighted by "
+                  "their areas, that "
+                  "the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives "
+                  "triangles to where they "
                   "lower the root mean square distance most; 0 for as few as the tolerance allows")
           .choice("relaxation", &Nearness::relaxation, {{"0", 0}, {"1", 1}, {"3", 3}, {"6", 6}},
-                  "sweeps that move the points to where the root mean square distance to the uniform mesh is least, as far "
+                  "sweeps that move the points to where the root mean square distance to the uniform mesh is "
+                  "least, as far "
                   "as the tolerance and the freedom from self-intersection are proved; 3 get most of it");
   return table;
 }
@@ -62,8 +66,7 @@ const OptionTable<Nearness>& nearness_option_table() {
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   ManifoldDualContouringOptions options{.nearness = nearness_option_table().read(input.options),
                                         .uniform = read_dual_contouring_options(input)};
-  return contour_certified(input, "manifold-dual-contouring",
-                           options.uniform.needs_normals(),
+  return contour_certified(input, "manifold-dual-contouring", options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
                              options.tolerance = tolerance;
                              return manifold_dual_contouring(grid, options, input.field, input.context);

@@ -1,6 +1,6 @@
-// Adaptive contouring with guarantees: closed, oriented, manifold, free of self-intersection, and within a stated distance
-// of the uniform mesh, whatever the input. Of the two ways to it this is the one with the fewest polygons: any points of
-// the uniform mesh may be merged.
+// Adaptive contouring with guarantees: closed, oriented, manifold, free of self-intersection, and within a
+// stated distance of the uniform mesh, whatever the input. Of the two ways to it this is the one with the
+// fewest polygons: any points of the uniform mesh may be merged.
 #pragma once
 
 #include "algorithms/core/polygon_mesh.h"
@@ -12,8 +12,8 @@
 namespace hermesh {
 
 struct ManifoldDualContouringOptions {
-  /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer polygons.
-  /// 0 gives the uniform mesh itself.
+  /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer
+  /// polygons. 0 gives the uniform mesh itself.
   double tolerance = 0.1;
   /// What is done for the root mean square distance (certified_decimation.h).
   Nearness nearness = {};

@@ -34,7 +34,8 @@ FloatHermite sphere() {
 
 /// A cube of side 20, turned about two axes.
 struct TurnedCube {
-  Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.4, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY())).matrix();
+  Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(0.4, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY())).matrix();
   static constexpr double kHalf = 10.0;
 
   FloatHermite hermite() const {
@@ -57,12 +58,14 @@ struct TurnedCube {
 
 PolygonMesh contour(const FloatHermite& hermite, double tolerance, const AdaptivityField* field = nullptr) {
   RunContext context;
-  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
+  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
+                                  context);
 }
 
 double volume(const PolygonMesh& mesh) {
   double sum = 0;
-  for (const Triangle& t : triangulated(mesh)) sum += mesh.world(t[0]).dot(mesh.world(t[1]).cross(mesh.world(t[2]))) / 6.0;
+  for (const Triangle& t : triangulated(mesh))
+    sum += mesh.world(t[0]).dot(mesh.world(t[1]).cross(mesh.world(t[2]))) / 6.0;
   return sum;
 }
 
@@ -73,7 +76,8 @@ TEST(ManifoldDualContouring, SphereStaysWithinTheTolerance) {
     const PolygonMesh mesh = contour(hermite, tolerance);
     EXPECT_LT(mesh.triangle_count(), fine.triangle_count() / (tolerance < 0.1 ? 2 : 6)) << tolerance;
     constexpr double kOfTheUniformMesh = 0.03;  // its points lie on tangent planes of the sphere
-    for (const Eigen::Vector3f& p : mesh.points) EXPECT_NEAR(p.norm(), kRadius, tolerance + kOfTheUniformMesh);
+    for (const Eigen::Vector3f& p : mesh.points)
+      EXPECT_NEAR(p.norm(), kRadius, tolerance + kOfTheUniformMesh);
     EXPECT_NEAR(volume(mesh), volume(fine), tolerance * 4 * M_PI * kRadius * kRadius);
   }
 }
@@ -106,7 +110,8 @@ TEST(ManifoldDualContouring, TurnedCubeNeedsFewTrianglesAndKeepsItsCorners) {
     const Vector3d wanted =
         cube.turn * Vector3d(corner & 1 ? 10 : -10, corner & 2 ? 10 : -10, corner & 4 ? 10 : -10);
     double nearest = 1e9;
-    for (std::size_t i = 0; i < mesh.points.size(); ++i) nearest = std::min(nearest, (mesh.world(i) - wanted).norm());
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+      nearest = std::min(nearest, (mesh.world(i) - wanted).norm());
     EXPECT_LT(nearest, 0.12) << corner;
   }
   EXPECT_NEAR(volume(mesh), 8000.0, 0.1 * 2400.0);
@@ -128,7 +133,8 @@ double mean_distance_from_edges(const TurnedCube& cube, const PolygonMesh& mesh)
       double nearest = 1e9;
       for (const Triangle& t : triangles)
         if ((mesh.world(t[0]) - p).squaredNorm() < 9.0)
-          nearest = std::min(nearest, squared_distance(p, mesh.world(t[0]), mesh.world(t[1]), mesh.world(t[2])));
+          nearest =
+              std::min(nearest, squared_distance(p, mesh.world(t[0]), mesh.world(t[1]), mesh.world(t[2])));
       sum += std::sqrt(nearest);
     }
   return sum / places;
@@ -140,10 +146,12 @@ std::int64_t euler_characteristic(const PolygonMesh& mesh) {
   return static_cast<std::int64_t>(mesh.points.size()) - triangles / 2;
 }
 
-/// A plate along a diagonal of the lattice whose samples touch one another across faces alone, and the same plate as a gap
-/// that cuts a box in two: either is whole.
+/// A plate along a diagonal of the lattice whose samples touch one another across faces alone, and the same
+/// plate as a gap that cuts a box in two: either is whole.
 TEST(ManifoldDualContouring, ThinDiagonalPlatesAndGapsStayWhole) {
-  const auto distance_to = [](const Vector3d& half, const Vector3d& p) { return (p.cwiseAbs() - half).maxCoeff(); };
+  const auto distance_to = [](const Vector3d& half, const Vector3d& p) {
+    return (p.cwiseAbs() - half).maxCoeff();
+  };
   const Vector3d plate(9.3, 0.6, 6.3), box(9.3, 5.2, 6.3);
   for (const bool gap : {false, true}) {
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(M_PI / 4, Vector3d::UnitZ()).matrix();
@@ -161,24 +169,27 @@ TEST(ManifoldDualContouring, ThinDiagonalPlatesAndGapsStayWhole) {
       return g;
     };
     RunContext context;
-    const FloatHermite hermite = sample_function({.value = value, .gradient = gradient, .lipschitz = 1.0}, IndexToWorld(),
-                                                 {-16, -16, -16}, {16, 16, 16}, 1e-9, context);
+    const FloatHermite hermite =
+        sample_function({.value = value, .gradient = gradient, .lipschitz = 1.0}, IndexToWorld(),
+                        {-16, -16, -16}, {16, 16, 16}, 1e-9, context);
     EXPECT_EQ(euler_characteristic(contour(hermite, 0.0)), gap ? 4 : 2) << gap;
     EXPECT_EQ(euler_characteristic(contour(hermite, 0.25)), gap ? 4 : 2) << gap;
   }
 }
 
-/// Inside corners of a convex solid that touch across a face belong together: cut off one by one they would leave notches
-/// in the cube's edges.
+/// Inside corners of a convex solid that touch across a face belong together: cut off one by one they would
+/// leave notches in the cube's edges.
 TEST(ManifoldDualContouring, TurnedCubeHasNoNotches) {
   for (const double angle : {0.1, 0.35, 0.6, 0.7854}) {
     TurnedCube cube;
-    cube.turn = (Eigen::AngleAxisd(0.7854, Vector3d::UnitZ()) * Eigen::AngleAxisd(angle, Vector3d::UnitX())).matrix();
+    cube.turn =
+        (Eigen::AngleAxisd(0.7854, Vector3d::UnitZ()) * Eigen::AngleAxisd(angle, Vector3d::UnitX())).matrix();
     const PolygonMesh mesh = contour(cube.hermite(), 0.0);
     double farthest = 0;
     for (const Triangle& t : triangulated(mesh)) {
       const Vector3d middle = (mesh.world(t[0]) + mesh.world(t[1]) + mesh.world(t[2])) / 3.0;
-      farthest = std::max(farthest, std::abs((cube.turn.transpose() * middle).cwiseAbs().maxCoeff() - TurnedCube::kHalf));
+      farthest = std::max(
+          farthest, std::abs((cube.turn.transpose() * middle).cwiseAbs().maxCoeff() - TurnedCube::kHalf));
     }
     EXPECT_LT(farthest, 0.03) << angle;
   }
@@ -217,9 +228,11 @@ TEST(ManifoldDualContouring, ScaleOfZeroInOneHalfLeavesTheOtherToMerge) {
   AdaptivityField field;
   field.scale = make_level_set(scale);
   RunContext context;
-  const PolygonMesh mesh = manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.5, .uniform = {}}, &field, context);
+  const PolygonMesh mesh =
+      manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.5, .uniform = {}}, &field, context);
   const auto count = [](const PolygonMesh& of, float from, float to) {
-    return std::ranges::count_if(of.points, [&](const Eigen::Vector3f& p) { return p[0] > from && p[0] < to; });
+    return std::ranges::count_if(of.points,
+                                 [&](const Eigen::Vector3f& p) { return p[0] > from && p[0] < to; });
   };
   const PolygonMesh fine = contour(hermite, 0.0);
   EXPECT_EQ(count(mesh, -30, -2), count(fine, -30, -2));
@@ -242,17 +255,21 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
     ASSERT_FALSE(part.empty());
     for (const Triangle& t : part.triangles) {
       const Vector3d middle = (part.world(t[0]) + part.world(t[1]) + part.world(t[2])) / 3.0;
-      EXPECT_LT((middle - Vector3d(0, 0, kRadius)).norm(), 12.0 + std::sqrt(3.0));  // its cell's middle is inside
+      EXPECT_LT((middle - Vector3d(0, 0, kRadius)).norm(),
+                12.0 + std::sqrt(3.0));  // its cell's middle is inside
     }
   }
 }
 
 /// The mesh of certified_octree() or of manifold_dual_contouring().
-PolygonMesh certified(bool octree, const FloatHermite& hermite, double tolerance, const AdaptivityField* field) {
+PolygonMesh certified(bool octree, const FloatHermite& hermite, double tolerance,
+                      const AdaptivityField* field) {
   RunContext context;
   if (octree)
-    return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
-  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
+    return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
+                            context);
+  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
+                                  context);
 }
 
 /// A flat face becomes two triangles, and the middles of both may be far from a mask that shows some of it.
@@ -286,7 +303,8 @@ TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
     }
 }
 
-/// A mask of just the cells that the surface passes through leaves out nothing, though merged polygons lie beside them.
+/// A mask of just the cells that the surface passes through leaves out nothing, though merged polygons lie
+/// beside them.
 TEST(ManifoldDualContouring, MaskOfTheSurfacesOwnCellsLeavesOutNothing) {
   initialize_openvdb();
   const FloatHermite hermite = sphere();
@@ -362,10 +380,13 @@ TEST(ManifoldDualContouring, NeedsNoLastResortForAThinPlate) {
       .value = [&](const Vector3d& p) { return std::max(std::abs(across.dot(p)) - 0.35, p.norm() - 12.0); },
       .gradient =
           [&](const Vector3d& p) {
-            return std::abs(across.dot(p)) - 0.35 > p.norm() - 12.0 ? Vector3d(across.dot(p) < 0 ? -across : across) : p;
+            return std::abs(across.dot(p)) - 0.35 > p.norm() - 12.0
+                       ? Vector3d(across.dot(p) < 0 ? -across : across)
+                       : p;
           },
   };
-  const FloatHermite hermite = sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
+  const FloatHermite hermite =
+      sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
   manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
   EXPECT_EQ(share_held(context), 0.0);
 }

@@ -25,7 +25,8 @@ void MergeForest::join(std::uint32_t going, Node node) {
 void MergeForest::settle() {
   const std::size_t n = nodes_.size();
   std::vector<std::uint32_t> top(n, kNone);
-  // Parents come behind their children, so downwards each node finds what its parent has: the greatest set that merges.
+  // Parents come behind their children, so downwards each node finds what its parent has: the greatest set
+  // that merges.
   for (std::size_t i = n; i-- > 0;) {
     const std::uint32_t parent = nodes_[i].parent;
     if (parent != kNone) top[i] = top[parent];

@@ -145,9 +145,9 @@ void MergeProof::build() {
 }
 
 /// Calls the set at a fine triangle's corners unproven that was joined last: before that join its merged
-/// triangle was another one, which most likely was good. (The fandisk at 400 voxels has 4 % fewer triangles so
-/// than where the set with the largest error is split, scans as many.) Whatever fails has a set to blame, so
-/// the proof goes on. Moves are taken back before anything is split that was joined.
+/// triangle was another one, which most likely was good. (The fandisk at 400 voxels has 4 % fewer triangles
+/// so than where the set with the largest error is split, scans as many.) Whatever fails has a set to blame,
+/// so the proof goes on. Moves are taken back before anything is split that was joined.
 void MergeProof::call_unproven(std::uint32_t t) {
   const auto moves = [&](std::uint32_t p) {
     const std::uint32_t set = forest_.set_of(p);
@@ -170,7 +170,9 @@ void MergeProof::call_unproven(std::uint32_t t) {
 /// (Edges of the fine mesh itself may be those of several patches.)
 void MergeProof::look_at_topology() {
   const FineMesh& mesh = *merged_.mesh;
-  const auto is_set = [&](std::uint32_t p) { return forest_.set_of(merged_.leaders[p]) != MergeForest::kNone; };
+  const auto is_set = [&](std::uint32_t p) {
+    return forest_.set_of(merged_.leaders[p]) != MergeForest::kNone;
+  };
   parallel_blocks(mesh.points().size(), context_, [&](std::size_t p) {
     const auto point = static_cast<std::uint32_t>(p);
     const auto around = mesh.around(point);

@@ -16,20 +16,23 @@
 
 namespace hermesh {
 
-/// The mesh that the merges of a forest make of a fine one: a triangle stays if its corners go into three points, be they
-/// sets or single points; the others vanish.
+/// The mesh that the merges of a forest make of a fine one: a triangle stays if its corners go into three
+/// points, be they sets or single points; the others vanish.
 struct MergedMesh {
-  std::optional<FineMesh> mesh;        ///< nothing before the first call of sort_out() or prove()
-  std::vector<std::uint32_t> leaders;  ///< for each of its points the fine one that it goes by (MergeForest::leader())
-  std::vector<std::uint32_t> origin;   ///< for each of its triangles the fine one; ascending
-  /// For each fine point that a point here goes by, that point; else FineMesh::kNone, as for a leader without triangles.
+  std::optional<FineMesh> mesh;  ///< nothing before the first call of sort_out() or prove()
+  std::vector<std::uint32_t>
+      leaders;  ///< for each of its points the fine one that it goes by (MergeForest::leader())
+  std::vector<std::uint32_t> origin;  ///< for each of its triangles the fine one; ascending
+  /// For each fine point that a point here goes by, that point; else FineMesh::kNone, as for a leader without
+  /// triangles.
   std::vector<std::uint32_t> number;
 };
 
-/// Splits sets of a forest until the merged mesh is proved. Who makes and joins sets sees to it that each is a disc, and no
-/// two triangles of the fine mesh may meet, for what fails at single points has no set to split. What was proved of a
-/// triangle is kept until a set near it is split or joined. Many threads call sets unproven, by flags that they only set,
-/// and one thread splits these sets: so the outcome does not depend on threads.
+/// Splits sets of a forest until the merged mesh is proved. Who makes and joins sets sees to it that each is
+/// a disc, and no two triangles of the fine mesh may meet, for what fails at single points has no set to
+/// split. What was proved of a triangle is kept until a set near it is split or joined. Many threads call
+/// sets unproven, by flags that they only set, and one thread splits these sets: so the outcome does not
+/// depend on threads.
 class MergeProof {
  public:
   /// @param forest whose sets are split; between calls others may join some, and settle() it; must outlive
@@ -41,9 +44,9 @@ class MergeProof {
   MergeProof(MergeForest& forest, const FineMesh& fine, std::span<const float> tolerance, RunContext& context,
              std::span<const TrianglePieces> pieces = {});
 
-  /// Splits sets until no edge leads from one point to another twice, and returns the mesh. As sets are discs, it has the
-  /// topology of the fine one, but for parts of which no triangle is left, which only prove() brings back. Nothing is
-  /// promised of distances and contacts. @throws Cancelled
+  /// Splits sets until no edge leads from one point to another twice, and returns the mesh. As sets are
+  /// discs, it has the topology of the fine one, but for parts of which no triangle is left, which only
+  /// prove() brings back. Nothing is promised of distances and contacts. @throws Cancelled
   const MergedMesh& sort_out();
   /// Splits sets until the merged mesh keeps its promises, and returns it: the topology of the fine one, no
   /// two triangles that meet but in shared corners and edges, each mesh within the tolerance and
@@ -54,20 +57,22 @@ class MergeProof {
   const MergedMesh& prove();
 
   const MergedMesh& merged() const { return merged_; }
-  /// Flags by point of the fine mesh: 1 for the leaders of all parts of sets that were split in the last call of sort_out() or
-  /// prove(), also for those that were there before. The next call overwrites them.
+  /// Flags by point of the fine mesh: 1 for the leaders of all parts of sets that were split in the last call
+  /// of sort_out() or prove(), also for those that were there before. The next call overwrites them.
   std::span<const std::uint8_t> brought_back() const { return brought_back_; }
 
  private:
   using Places = std::array<OverTriangle::Place, 3>;
   /// What is known of a fine triangle, as bits.
   enum Proof : std::uint8_t {
-    kStays = 1,    ///< it is a triangle of the merged mesh
-    kNear = 2,     ///< the merged triangle is near the fine mesh
-    kApart = 4,    ///< the merged triangle has been tested against all others; it meets none, or waits for a split
+    kStays = 1,  ///< it is a triangle of the merged mesh
+    kNear = 2,   ///< the merged triangle is near the fine mesh
+    kApart =
+        4,  ///< the merged triangle has been tested against all others; it meets none, or waits for a split
     kCovered = 8,  ///< the fine triangle is near the merged mesh
-    kFar = 16,  ///< the proof of kCovered rests on a merged triangle, too, with no corner in the fine triangle's sets
-    kOpen = 32  ///< the fine triangle is in `open_`
+    kFar = 16,     ///< the proof of kCovered rests on a merged triangle, too, with no corner in the fine
+                   ///< triangle's sets
+    kOpen = 32     ///< the fine triangle is in `open_`
   };
   /// Takes fine triangles that lie over a merged triangle as proved to be near it, where they are.
   class Above;

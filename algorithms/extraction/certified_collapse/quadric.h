@@ -9,8 +9,8 @@
 
 namespace hermesh {
 
-/// A quadric relative to an anchor that its owner keeps, so that single precision is enough. Voxels, weights in square
-/// voxels.
+/// A quadric relative to an anchor that its owner keeps, so that single precision is enough. Voxels, weights
+/// in square voxels.
 struct PlaneQuadric {
   Eigen::Matrix<float, 6, 1> a = Eigen::Matrix<float, 6, 1>::Zero();  ///< xx xy xz yy yz zz
   Eigen::Vector3f b = Eigen::Vector3f::Zero();
@@ -20,12 +20,13 @@ struct PlaneQuadric {
   void add_plane(const Eigen::Vector3d& unit_normal, double weight) {
     const Eigen::Vector3f n = unit_normal.cast<float>();
     const float w = static_cast<float>(weight);
-    a += w * Eigen::Matrix<float, 6, 1>(n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2], n[2] * n[2]);
+    a += w * Eigen::Matrix<float, 6, 1>(n[0] * n[0], n[0] * n[1], n[0] * n[2], n[1] * n[1], n[1] * n[2],
+                                        n[2] * n[2]);
   }
 };
 
-/// The quadric of the triangles around a point of a fine mesh, about that point; each triangle gives a third of its
-/// area to each of its corners.
+/// The quadric of the triangles around a point of a fine mesh, about that point; each triangle gives a third
+/// of its area to each of its corners.
 inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
   PlaneQuadric quadric;
   for (const std::uint32_t t : fine.around(point)) {
@@ -37,11 +38,12 @@ inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
   return quadric;
 }
 
-/// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to decide on a plane.
+/// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to
+/// decide on a plane.
 inline constexpr double kPull = 1e-6;
 
-/// A quadric in double precision about any anchor, for one decision. The trace of `a` is the sum of the weights, for
-/// normals are of unit length: the quadric over the trace is a mean squared distance.
+/// A quadric in double precision about any anchor, for one decision. The trace of `a` is the sum of the
+/// weights, for normals are of unit length: the quadric over the trace is a mean squared distance.
 struct WideQuadric {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -71,7 +73,8 @@ struct WideQuadric {
     q.c = static_cast<float>((*this)(x));
     return q;
   }
-  /// Minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which decides where planes do not.
+  /// Minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which decides where
+  /// planes do not.
   Eigen::Vector3d minimiser() const {
     const double weight = kPull * a.trace() + 1e-12;
     return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b);

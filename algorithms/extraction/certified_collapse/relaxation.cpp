@@ -16,16 +16,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Rounds over all points in which the equations of one sweep are solved. (Twice as many change the distance by less than a
-/// hundredth.)
+/// Rounds over all points in which the equations of one sweep are solved. (Twice as many change the distance
+/// by less than a hundredth.)
 constexpr int kRounds = 10;
-/// How strongly a point is held where a round has it, as a share of the weights around it: along a plane or a crease nothing
-/// else says where it is to be.
+/// How strongly a point is held where a round has it, as a share of the weights around it: along a plane or a
+/// crease nothing else says where it is to be.
 constexpr double kHold = 1e-2;
 /// Longest way of a point in one sweep, as a share of its shortest edge.
 constexpr double kLongestWay = 0.5;
-/// How near to its tolerance a point may go. The optimum lies beyond it on round surfaces: collapses go on until the middles of
-/// triangles are a tolerance away, and the points should then be farther on the other side.
+/// How near to its tolerance a point may go. The optimum lies beyond it on round surfaces: collapses go on
+/// until the middles of triangles are a tolerance away, and the points should then be farther on the other
+/// side.
 constexpr double kNearTolerance = 0.95;
 /// Parts of its way that a point may stop at, where the proof does not let it go on.
 constexpr double kParts[] = {0.25, 0.5, 1.0};
@@ -38,7 +39,8 @@ struct Sample {
   float height = 0;             ///< above the triangle's plane, voxels
 };
 
-/// The sum of weight × (barycentric · heights of the corners − height)² over a triangle's samples, but for its constant.
+/// The sum of weight × (barycentric · heights of the corners − height)² over a triangle's samples, but for
+/// its constant.
 struct TriangleSum {
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
   Vector3d heights = Vector3d::Zero();
@@ -54,8 +56,9 @@ struct Ceiling {
 /// The sweeps, over places of the merged mesh's points.
 class Relaxation {
  public:
-  Relaxation(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
-             std::span<const std::uint8_t> pinned, const RunContext& context)
+  Relaxation(const MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
+             std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
+             const RunContext& context)
       : forest_(forest),
         merged_(merged),
         fine_(fine),
@@ -112,8 +115,9 @@ class Relaxation {
   int sweeps_ = 0;
 };
 
-/// Gives each sample its weight. Three quarters of a triangle's area at its middle and a twelfth at each corner is a rule of
-/// degree two, so that squared distances of flat triangles to planes are summed up exactly.
+/// Gives each sample its weight. Three quarters of a triangle's area at its middle and a twelfth at each
+/// corner is a rule of degree two, so that squared distances of flat triangles to planes are summed up
+/// exactly.
 void Relaxation::weigh_samples() {
   const std::size_t points = fine_.points().size();
   for (std::uint32_t t = 0; t < fine_.triangles().size(); ++t) {
@@ -139,15 +143,16 @@ Vector3d Relaxation::place(std::size_t sample) const {
   return (at[0] + at[1] + at[2]) / 3.0;
 }
 
-/// Finds the triangle under each sample. A wrong one spoils a place and no promise, so a walk will do, from where the sample's
-/// point went or where the sample was found last.
+/// Finds the triangle under each sample. A wrong one spoils a place and no promise, so a walk will do, from
+/// where the sample's point went or where the sample was found last.
 void Relaxation::lay_samples(const FineMesh& mesh) {
   parallel_blocks(samples_.size(), context_, [&](std::size_t i) {
     Sample& sample = samples_[i];
     if (!(sample.weight > 0)) return;
     if (sample.face == FineMesh::kNone) {
       const std::uint32_t point = merged_.number[forest_.leader(fine_point(i))];
-      if (point == MergeForest::kNone) return;  // all that hangs together here has vanished; the proof brings it back
+      if (point == MergeForest::kNone)
+        return;  // all that hangs together here has vanished; the proof brings it back
       sample.face = mesh.around(point).front();
     }
     const Vector3d p = place(i);
@@ -168,7 +173,8 @@ void Relaxation::lay_samples(const FineMesh& mesh) {
   });
 }
 
-/// Sums up what the samples say of each triangle; in one thread, so that the sums are the same for every number of them.
+/// Sums up what the samples say of each triangle; in one thread, so that the sums are the same for every
+/// number of them.
 void Relaxation::sum_up(const FineMesh& mesh) {
   sums_.assign(mesh.triangles().size(), {});
   for (const Sample& sample : samples_) {
@@ -178,8 +184,9 @@ void Relaxation::sum_up(const FineMesh& mesh) {
     sums_[sample.face].heights += double(sample.weight) * double(sample.height) * share;
   }
   normals_.resize(sums_.size());
-  parallel_blocks(normals_.size(), context_,
-                  [&](std::size_t t) { normals_[t] = mesh.normal(static_cast<std::uint32_t>(t)).cast<double>(); });
+  parallel_blocks(normals_.size(), context_, [&](std::size_t t) {
+    normals_[t] = mesh.normal(static_cast<std::uint32_t>(t)).cast<double>();
+  });
 }
 
 void Relaxation::find_ceilings() {
@@ -206,7 +213,8 @@ void Relaxation::improve(const FineMesh& mesh, std::uint32_t v, std::vector<Vect
     const Vector3d& n = normals_[t];
     // The height of a triangle's corner goes with its way along the normal.
     a += sum.products(i, i) * n * n.transpose();
-    b += n * (sum.heights[i] - sum.products(i, j) * n.dot(ways[c[j]]) - sum.products(i, k) * n.dot(ways[c[k]]));
+    b += n *
+         (sum.heights[i] - sum.products(i, j) * n.dot(ways[c[j]]) - sum.products(i, k) * n.dot(ways[c[k]]));
   }
   const double hold = kHold * a.trace();
   if (!(hold > 0)) return;
@@ -218,7 +226,8 @@ void Relaxation::improve(const FineMesh& mesh, std::uint32_t v, std::vector<Vect
   way += (std::clamp(height, -ceiling.limit, ceiling.limit) - height) * ceiling.up;
 }
 
-Vector3d Relaxation::no_longer_than_allowed(const FineMesh& mesh, std::uint32_t v, const Vector3d& way) const {
+Vector3d Relaxation::no_longer_than_allowed(const FineMesh& mesh, std::uint32_t v,
+                                            const Vector3d& way) const {
   double shortest = std::numeric_limits<double>::max();
   for (const std::uint32_t t : mesh.around(v))
     shortest = std::min(shortest, (mesh.points()[mesh.next(t, v)] - places_[v]).norm());
@@ -228,12 +237,14 @@ Vector3d Relaxation::no_longer_than_allowed(const FineMesh& mesh, std::uint32_t 
 
 }  // namespace
 
-void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine, std::span<const float> tolerance,
-                        std::span<const std::uint8_t> pinned, int sweeps, const FilePoints& file, RunContext& context) {
+void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const FineMesh& fine,
+                        std::span<const float> tolerance, std::span<const std::uint8_t> pinned, int sweeps,
+                        const FilePoints& file, RunContext& context) {
   if (sweeps <= 0) return;
   Relaxation relaxation(forest, merged, fine, tolerance, pinned, context);
   for (int i = 0; i < sweeps; ++i) relaxation.sweep();
-  // All first parts come before all second ones: of the sets at a failure the last is split first, and so the longest way.
+  // All first parts come before all second ones: of the sets at a failure the last is split first, and so the
+  // longest way.
   for (const double part : kParts)
     for (std::uint32_t v = 0; v < merged.leaders.size(); ++v) {
       if (relaxation.is_pinned(v)) continue;

@@ -39,7 +39,8 @@ FineMesh sphere(int n, double radius) {
             c[(axis + 2) % 3] = b;
             return at(c[0], c[1], c[2]);
           };
-          std::array<std::uint32_t, 4> quad = {corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)};
+          std::array<std::uint32_t, 4> quad = {corner(i, j), corner(i + 1, j), corner(i + 1, j + 1),
+                                               corner(i, j + 1)};
           if (side == 0) std::swap(quad[1], quad[3]);
           triangles.push_back({quad[0], quad[1], quad[2]});
           triangles.push_back({quad[0], quad[2], quad[3]});
@@ -61,7 +62,8 @@ double rms(const FineMesh& fine, const CertifiedMesh& coarse) {
   for (const Vector3d& p : fine.points()) {
     double least = 1e300;
     for (const Triangle& t : coarse.triangles)
-      least = std::min(least, squared_distance(p, coarse.points[t[0]], coarse.points[t[1]], coarse.points[t[2]]));
+      least =
+          std::min(least, squared_distance(p, coarse.points[t[0]], coarse.points[t[1]], coarse.points[t[2]]));
     sum += least;
   }
   return std::sqrt(sum / double(fine.points().size()));
@@ -69,8 +71,8 @@ double rms(const FineMesh& fine, const CertifiedMesh& coarse) {
 
 CertifiedMesh decimated(const FineMesh& fine, float tolerance, const Nearness& nearness) {
   RunContext context;
-  return decimate_certified(fine, std::vector<float>(fine.points().size(), tolerance), {}, FilePoints(IndexToWorld()), context,
-                            nearness);
+  return decimate_certified(fine, std::vector<float>(fine.points().size(), tolerance), {},
+                            FilePoints(IndexToWorld()), context, nearness);
 }
 
 TEST(Relaxation, BringsAPointBackThatWasMovedOff) {
@@ -83,12 +85,13 @@ TEST(Relaxation, BringsAPointBackThatWasMovedOff) {
   MergeForest forest = one_move(fine, 100, 1.02 * home);
   MergeProof proof(forest, fine, tolerance, context);
   propose_relaxation(forest, proof.prove(), fine, tolerance, pinned, 4, FilePoints(IndexToWorld()), context);
-  // With all others in their places the sum of squares is 0 where the point came from, 0.4 below; along the sphere, where it
-  // hardly grows, the point may be elsewhere.
+  // With all others in their places the sum of squares is 0 where the point came from, 0.4 below; along the
+  // sphere, where it hardly grows, the point may be elsewhere.
   const Vector3d& place = forest.node(forest.set_of(100)).place;
   EXPECT_NEAR(place.norm(), 20.0, 0.01);
   EXPECT_NEAR((place - home).norm(), 0.0, 0.05);
-  for (std::uint32_t p = 0; p < pinned.size(); ++p) EXPECT_EQ(forest.set_of(p) == MergeForest::kNone, p != 100);
+  for (std::uint32_t p = 0; p < pinned.size(); ++p)
+    EXPECT_EQ(forest.set_of(p) == MergeForest::kNone, p != 100);
 }
 
 TEST(Relaxation, AMoveIsTakenBackAndWhatItMovedStays) {
@@ -117,7 +120,8 @@ TEST(Relaxation, ASphereIsNearerByAFourthWithItsTriangles) {
   for (const Vector3d& p : fine.points()) {
     double least = 1e300;
     for (const Triangle& t : after.triangles)
-      least = std::min(least, squared_distance(p, after.points[t[0]], after.points[t[1]], after.points[t[2]]));
+      least =
+          std::min(least, squared_distance(p, after.points[t[0]], after.points[t[1]], after.points[t[2]]));
     EXPECT_LE(std::sqrt(least), 0.305);
   }
 }
@@ -144,8 +148,9 @@ TEST(Relaxation, EndsWhenTheWorkIsCancelled) {
   const MergedMesh& merged = proof.prove();
   const std::atomic<bool> cancel = true;
   context.cancel = &cancel;
-  EXPECT_THROW(propose_relaxation(forest, merged, fine, tolerance, pinned, 1, FilePoints(IndexToWorld()), context),
-               Cancelled);
+  EXPECT_THROW(
+      propose_relaxation(forest, merged, fine, tolerance, pinned, 1, FilePoints(IndexToWorld()), context),
+      Cancelled);
 }
 
 TEST(Relaxation, SameBytesAtAnyThreadCount) {

@@ -25,7 +25,7 @@ BlockMask moved_up(const BlockMask& mask, const BlockMask& below, int axis) {
 }  // namespace
 
 CellRegions::CellRegions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
-                 const FilePoints& file, RunContext& context)
+                         const FilePoints& file, RunContext& context)
     : cells_(cells), points_(points), options_(options), file_(file), blocks_(cells.size()) {
   Stage stage(context, "propose regions");
   // The largest cubes are asked for in every block that the surface passes through; what is no such cube is
@@ -56,7 +56,8 @@ void CellRegions::propose_parts(RunContext& context) {
   });
   const auto added_to = [&](std::size_t i) {
     std::array<std::uint64_t, kLevels> added;
-    for (std::size_t at = 0; at < added.size(); ++at) added[at] = blocks_[asked[i]].proposed[at] & ~before[i][at];
+    for (std::size_t at = 0; at < added.size(); ++at)
+      added[at] = blocks_[asked[i]].proposed[at] & ~before[i][at];
     return added;
   };
   // Numbers are for good: others keep them as names of corners. All 4³ and 8³ cubes that a block ever has of
@@ -95,7 +96,7 @@ void CellRegions::propose_parts(RunContext& context) {
 // Larger cubes first: what is asked for and does not pass is asked for in parts, at the next finer level, in
 // the same call.
 void CellRegions::propose(RegionProposals& proposals, std::int32_t number, BlockRegions& block,
-                      std::vector<ProposedCube>& found) {
+                          std::vector<ProposedCube>& found) {
   for (int level = kLevels; level > 0; --level) {
     const auto at = static_cast<std::size_t>(level - 1);
     std::uint64_t asked = std::exchange(block.asked[at], 0);
@@ -147,7 +148,7 @@ std::array<BlockMask, 3> CellRegions::inner_faces(std::int32_t block) const {
 }
 
 std::array<BlockMask, 3> CellRegions::merged_edges(std::int32_t block,
-                                               const std::array<BlockMask, 3>& lone) const {
+                                                   const std::array<BlockMask, 3>& lone) const {
   const auto& neighbours = cells_.source(block).neighbours;
   const std::array<BlockMask, 3> inner = inner_faces(block);
   // Four cells are around an edge: its own, the one below along u, the one below along v, and the one below
@@ -201,7 +202,8 @@ std::array<BlockMask, 3> CellRegions::lone_edges(std::int32_t block) const {
 Vector3d CellRegions::normal(const Region& region) const {
   if (region.merged()) return cubes_[number(region)].normal.cast<double>();
   Vector3d sum = Vector3d::Zero();
-  const int signs = cells_.corner_code(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints
+  const int signs =
+      cells_.corner_code(cells_.cell_number(region.block, region.cell));  // Hermite data have no joints
   for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
     const CellBlocks::Edge at = cells_.edge_of_cell(region.block, region.cell, std::countr_zero(edges));
     const auto n = cells_.grid().crossing(at.block, at.sample, at.axis).normal;

@@ -1,4 +1,5 @@
-// Cubes of cells that share one point: 2³, 4³ or 8³ cells of a block, as the thesis's mask grid has them (Aldén 2011, §6.2).
+// Cubes of cells that share one point: 2³, 4³ or 8³ cells of a block, as the thesis's mask grid has them
+// (Aldén 2011, §6.2).
 #pragma once
 
 #include <Eigen/Core>
@@ -10,10 +11,10 @@
 
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/embedded_mesh/cell_blocks.h"
-#include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/certified_octree/region_cubes.h"
 #include "algorithms/extraction/certified_octree/region_proposals.h"
+#include "algorithms/extraction/embedded_mesh/cell_blocks.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
@@ -42,7 +43,7 @@ class CellRegions {
   /// @param context told of progress, and asked whether to stop
   /// @throws Error if there are more cubes than 32 bits can number; Cancelled
   CellRegions(const CellBlocks& cells, const UniformPoints& points, const RegionOptions& options,
-          const FilePoints& file, RunContext& context);
+              const FilePoints& file, RunContext& context);
 
   /// The region of an active cell.
   Region at(std::int32_t block, int cell) const {
@@ -73,10 +74,12 @@ class CellRegions {
     const BlockRegions& own = blocks_[static_cast<std::size_t>(cube.block)];
     const int number = cube_of(cube.cell, cube.level);
     std::uint64_t before = own.proposed[cube.level - 1u] & ((std::uint64_t{1} << number) - 1);
-    if (cube.level > 1) return own.first_cube[cube.level - 2u] + static_cast<std::uint32_t>(std::popcount(before));
+    if (cube.level > 1)
+      return own.first_cube[cube.level - 2u] + static_cast<std::uint32_t>(std::popcount(before));
     const int larger = cube_of(cube.cell, 2);
     before &= parts_of(larger, 2);
-    return own.first_part[static_cast<std::size_t>(larger)] + static_cast<std::uint32_t>(std::popcount(before));
+    return own.first_part[static_cast<std::size_t>(larger)] +
+           static_cast<std::uint32_t>(std::popcount(before));
   }
   /// Splits a cube; its cells are alone until propose_parts() is called. Safe to call for several blocks at
   /// once.

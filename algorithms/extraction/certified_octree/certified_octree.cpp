@@ -22,18 +22,19 @@ CellTolerances cell_tolerances(const CellBlocks& cells, const FieldAtPoints& fie
   return CellTolerances(std::move(result));
 }
 
-CertifiedPolygons by_regions(const HermiteView& grid, const CertifiedOctreeOptions& options, const FieldAtPoints& field,
-                             const FilePoints& file, RunContext& context) {
+CertifiedPolygons by_regions(const HermiteView& grid, const CertifiedOctreeOptions& options,
+                             const FieldAtPoints& field, const FilePoints& file, RunContext& context) {
   UniformCells uniform(grid, options.uniform, file, context);
-  const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context), options.flatness,
-                            options.largest_cube};
+  const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context),
+                            options.flatness, options.largest_cube};
   // Caps may hold a mean off the hull of crossings whose samples were mirrored and rounded (volume_ends.h).
   const Bounds& caps = options.uniform.caps;
   const bool has_caps = caps.lower.array().isFinite().any() || caps.upper.array().isFinite().any();
   const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average && !has_caps;
   RegionMesh merged = merge_regions(uniform, in_hulls, asked, file, context);
   report(uniform.counts(), context);
-  CertifiedPolygons result{std::move(merged.points), std::move(merged.triangles), std::move(merged.quads), {}};
+  CertifiedPolygons result{
+      std::move(merged.points), std::move(merged.triangles), std::move(merged.quads), {}};
   if (field.leaves_out_outside())
     // All cells of a cube have a tolerance, and so are in the mask.
     show(result, [&](std::size_t, int, std::uint32_t point) { return merged.of_cube[point] != 0; });
@@ -42,8 +43,8 @@ CertifiedPolygons by_regions(const HermiteView& grid, const CertifiedOctreeOptio
 
 }  // namespace
 
-PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& given, const AdaptivityField* field,
-                             RunContext& context) {
+PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& given,
+                             const AdaptivityField* field, RunContext& context) {
   CertifiedOctreeOptions options = given;
   options.uniform.reach = 0;
   const FilePoints file(grid.placement(), options.uniform.caps);
@@ -63,11 +64,13 @@ const OptionTable<CertifiedOctreeOptions>& octree_option_table() {
   static const auto table =
       OptionTable<Options>()
           .number("flatness", &Options::flatness, {.maximum = 1e6},
-                  "how far a cube's point may be from the planes of its crossings, in voxels, root mean square, if "
+                  "how far a cube's point may be from the planes of its crossings, in voxels, root mean "
+                  "square, if "
                   "tolerance allows more; 0 for what tolerance allows")
-          .choice("largest_cube", &Options::largest_cube, {{"8", 8}, {"4", 4}, {"2", 2}},
-                  "cells a side of the largest cubes; where flatness is below 0.2 or so, 4 is as fast as 8, and "
-                  "nearer");
+          .choice(
+              "largest_cube", &Options::largest_cube, {{"8", 8}, {"4", 4}, {"2", 2}},
+              "cells a side of the largest cubes; where flatness is below 0.2 or so, 4 is as fast as 8, and "
+              "nearer");
   return table;
 }
 
@@ -76,8 +79,7 @@ const OptionTable<CertifiedOctreeOptions>& octree_option_table() {
 PolygonMesh certified_octree(const ExtractionInput& input) {
   CertifiedOctreeOptions options = octree_option_table().read(input.options);
   options.uniform = read_placement_options(input);
-  return contour_certified(input, "certified-octree",
-                           options.uniform.needs_normals(),
+  return contour_certified(input, "certified-octree", options.uniform.needs_normals(),
                            [&](const HermiteView& grid, double tolerance) {
                              options.tolerance = tolerance;
                              return certified_octree(grid, options, input.field, input.context);

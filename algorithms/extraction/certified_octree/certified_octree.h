@@ -1,5 +1,6 @@
-// Adaptive contouring with the guarantees of `manifold-dual-contouring`, many times as fast and with more polygons: cubes of
-// 2³, 4³ and 8³ cells become one point each, as an octree does, and points stay within their cells.
+// Adaptive contouring with the guarantees of `manifold-dual-contouring`, many times as fast and with more
+// polygons: cubes of 2³, 4³ and 8³ cells become one point each, as an octree does, and points stay within
+// their cells.
 #pragma once
 
 #include "algorithms/core/polygon_mesh.h"
@@ -10,19 +11,20 @@
 namespace hermesh {
 
 struct CertifiedOctreeOptions {
-  /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer polygons.
-  /// 0 gives the uniform mesh itself.
+  /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer
+  /// polygons. 0 gives the uniform mesh itself.
   double tolerance = 0.1;
-  double flatness = 0;            ///< how far a cube's point may be from its planes (RegionOptions), in voxels
-  int largest_cube = 8;           ///< cells a side: 2, 4 or 8
-  DualContouringOptions uniform;  ///< placement of the uniform mesh's points, whose `reach` is 0 whatever it says
+  double flatness = 0;   ///< how far a cube's point may be from its planes (RegionOptions), in voxels
+  int largest_cube = 8;  ///< cells a side: 2, 4 or 8
+  DualContouringOptions
+      uniform;  ///< placement of the uniform mesh's points, whose `reach` is 0 whatever it says
 };
 
-/// Uniform mesh within its cells (uniform_mesh.h), then cubes of cells merged of which those stay that are proved to keep
-/// the topology, the freedom from self-intersection and the bound (region_mesh.h). The same bytes for every number of
-/// threads. The field means what it means to manifold_dual_contouring().
-PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& options, const AdaptivityField* field,
-                             RunContext& context);
+/// Uniform mesh within its cells (uniform_mesh.h), then cubes of cells merged of which those stay that are
+/// proved to keep the topology, the freedom from self-intersection and the bound (region_mesh.h). The same
+/// bytes for every number of threads. The field means what it means to manifold_dual_contouring().
+PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& options,
+                             const AdaptivityField* field, RunContext& context);
 
 /// The table's entry.
 PolygonMesh certified_octree(const ExtractionInput& input);

@@ -29,7 +29,7 @@ class PolygonStars {
 
  private:
   static constexpr std::uint32_t kTurned = 1u << 31;
-  std::vector<std::uint8_t> asked_;   ///< 1 for points that are asked about
+  std::vector<std::uint8_t> asked_;  ///< 1 for points that are asked about
   std::vector<std::uint32_t>
       marks_;  ///< for each point kTurned, and how many triangles lie across one ray from it
 };

@@ -78,7 +78,8 @@ class RegionPolygons {
   /// this was asked last.
   std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "test loose polygons");
-    const LargeArray<BlockMask> changed = std::exchange(untested_, filled(made_.size(), BlockMask{}, context));
+    const LargeArray<BlockMask> changed =
+        std::exchange(untested_, filled(made_.size(), BlockMask{}, context));
     return that_meet(changed, two_on(changed), nullptr, context, [&](std::size_t b, auto&& test) {
       // The triangles of a fan have one edge, and are told apart by a count over the block.
       std::uint64_t part = 0;
@@ -256,7 +257,9 @@ class RegionPolygons {
       const auto for_each_asked = [&](std::size_t b, auto&& f) {
         if (!near[b]) return;
         for (const std::uint32_t number : made_[b].loose)
-          if (const Polygon& polygon = made_[b].polygons[number]; test(changed[b], polygon.sample()) == is_new) f(polygon);
+          if (const Polygon& polygon = made_[b].polygons[number];
+              test(changed[b], polygon.sample()) == is_new)
+            f(polygon);
       };
       // Count, scan, fill: the list, and so the result, is in the order of blocks.
       std::vector<std::uint64_t> first(made_.size());
@@ -363,7 +366,7 @@ class RegionPolygons {
   const std::uint32_t first_cube_;  ///< name
   EdgeMasks lone_edges_;            ///< edges whose polygons are of the uniform mesh
   std::vector<Made> made_;          ///< one for each block
-  LargeArray<BlockMask> untested_;   ///< changed samples not yet tested against the uniform mesh, by block
+  LargeArray<BlockMask> untested_;  ///< changed samples not yet tested against the uniform mesh, by block
 };
 
 /// The tolerance of each point of the uniform mesh, those on fanned edges included, whose tolerance is the
@@ -391,8 +394,8 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
 /// Splits cubes until all promises are kept, and makes the mesh. `connect(edges)` returns the polygons of the
 /// uniform mesh, of these edges at least.
 template <class Connect>
-RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof, Connect&& connect,
-                 RunContext& context) {
+RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof,
+                 Connect&& connect, RunContext& context) {
   RegionPolygons merged(regions, points, context);
   const auto call_unproven = [&](const std::vector<CellBlocks::Edge>& meeting) {
     for (const CellBlocks::Edge& edge : meeting) proof.call_unproven(edge);

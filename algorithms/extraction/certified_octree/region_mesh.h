@@ -7,8 +7,8 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/certified_octree/cell_regions.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 
 namespace hermesh {

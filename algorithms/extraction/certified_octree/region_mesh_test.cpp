@@ -7,13 +7,13 @@
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/extraction/certified_collapse/manifold_dual_contouring.h"
 #include "algorithms/extraction/certified_octree/certified_octree.h"
 #include "algorithms/extraction/certified_octree/region_proof.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -25,13 +25,14 @@ FloatHermite sample(const AnalyticSurface& surface) {
   return sample_function(surface, IndexToWorld(), {-24, -24, -24}, {24, 24, 24}, 1e-9, context);
 }
 FloatHermite sphere(double radius) {
-  return sample({.value = [=](const Vector3d& p) { return p.norm() - radius; }, .gradient = [](const Vector3d& p) { return p; }});
+  return sample({.value = [=](const Vector3d& p) { return p.norm() - radius; },
+                 .gradient = [](const Vector3d& p) { return p; }});
 }
 
 PolygonMesh contour(const FloatHermite& hermite, double tolerance, double flatness = 0) {
   RunContext context;
-  return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .flatness = flatness, .uniform = {}},
-                          nullptr, context);
+  return certified_octree(view_of(hermite, context),
+                          {.tolerance = tolerance, .flatness = flatness, .uniform = {}}, nullptr, context);
 }
 
 /// Distances of a mesh's corners and middles of edges and triangles from a sphere about the origin, at most.
@@ -90,10 +91,11 @@ std::int64_t euler_characteristic(const PolygonMesh& mesh) {
 TEST(RegionMesh, HasTheUniformMeshesTopology) {
   // A torus whose tube is two voxels thick, so that the walls of one cube are near one another.
   const auto value = [](const Vector3d& p) { return std::hypot(std::hypot(p[0], p[1]) - 14.0, p[2]) - 2.0; };
-  const FloatHermite hermite = sample({.value = value, .gradient = [](const Vector3d& p) {
-                                         const double ring = std::hypot(p[0], p[1]);
-                                         return Vector3d(p[0] * (1 - 14.0 / ring), p[1] * (1 - 14.0 / ring), p[2]);
-                                       }});
+  const FloatHermite hermite =
+      sample({.value = value, .gradient = [](const Vector3d& p) {
+                const double ring = std::hypot(p[0], p[1]);
+                return Vector3d(p[0] * (1 - 14.0 / ring), p[1] * (1 - 14.0 / ring), p[2]);
+              }});
   const PolygonMesh fine = contour(hermite, 0.0);
   EXPECT_EQ(euler_characteristic(fine), 0);
   for (const double tolerance : {0.3, 1.0, 3.0, 6.0, 16.0}) {
@@ -103,8 +105,8 @@ TEST(RegionMesh, HasTheUniformMeshesTopology) {
   }
 }
 
-/// One sample that is barely inside: two cubes may have four cells of it each, all in the face between them, and no third region
-/// around any edge.
+/// One sample that is barely inside: two cubes may have four cells of it each, all in the face between them,
+/// and no third region around any edge.
 TEST(RegionMesh, NoSpeckVanishes) {
   initialize_openvdb();
   for (int place = 0; place < 8; ++place)
@@ -127,17 +129,20 @@ TEST(RegionMesh, ToleranceOfZeroIsTheUniformMeshWithPointsInTheirCells) {
   RunContext context;
   ManifoldDualContouringOptions options{.tolerance = 0, .uniform = {}};
   options.uniform.reach = 0;
-  EXPECT_TRUE(contour(hermite, 0) == manifold_dual_contouring(view_of(hermite, context), options, nullptr, context));
+  EXPECT_TRUE(contour(hermite, 0) ==
+              manifold_dual_contouring(view_of(hermite, context), options, nullptr, context));
 }
 
 /// A sphere with waves of some fifteen voxels, on which cubes of all sizes stay.
 FloatHermite waves() {
-  return sample({.value = [](const Vector3d& p) { return p.norm() - 18 - std::sin(p[0] / 2.5) * std::cos(p[1] / 3.0); },
-                 .gradient = [](const Vector3d& p) {
-                   const Vector3d slope(std::cos(p[0] / 2.5) * std::cos(p[1] / 3.0) / 2.5,
-                                        -std::sin(p[0] / 2.5) * std::sin(p[1] / 3.0) / 3.0, 0);
-                   return Vector3d(p.normalized() - slope);
-                 }});
+  return sample(
+      {.value = [](const Vector3d& p) { return p.norm() - 18 - std::sin(p[0] / 2.5) * std::cos(p[1] / 3.0); },
+       .gradient =
+           [](const Vector3d& p) {
+             const Vector3d slope(std::cos(p[0] / 2.5) * std::cos(p[1] / 3.0) / 2.5,
+                                  -std::sin(p[0] / 2.5) * std::sin(p[1] / 3.0) / 3.0, 0);
+             return Vector3d(p.normalized() - slope);
+           }});
 }
 
 TEST(RegionMesh, SameBytesAtAnyThreadCount) {
@@ -182,8 +187,8 @@ TEST(RegionMesh, SameBytesAtEverySimdLevel) {
   unsetenv("HERMESH_SIMD");
 }
 
-/// Proposals that are good for one tolerance are all taken back where another one is asked for, which none can keep: the
-/// proof does not rest on what was proposed.
+/// Proposals that are good for one tolerance are all taken back where another one is asked for, which none
+/// can keep: the proof does not rest on what was proposed.
 TEST(RegionProof, SplitsWhatIsNotNear) {
   const FloatHermite hermite = sphere(12.0);
   RunContext context;
@@ -225,11 +230,12 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
 TEST(RegionProof, KeepsWhatIsFlat) {
   const FloatHermite hermite =
       sample({.value = [](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - 20.4; },
-              .gradient = [](const Vector3d& p) {
-                int axis;
-                p.cwiseAbs().maxCoeff(&axis);
-                return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
-              }});
+              .gradient =
+                  [](const Vector3d& p) {
+                    int axis;
+                    p.cwiseAbs().maxCoeff(&axis);
+                    return Vector3d(Vector3d::Unit(axis) * (p[axis] < 0 ? -1.0 : 1.0));
+                  }});
   EXPECT_LT(contour(hermite, 0.1).points.size(), contour(hermite, 0.0).points.size() / 5);
 }
 

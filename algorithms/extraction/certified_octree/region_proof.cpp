@@ -144,8 +144,8 @@ void RegionProof::look_at_polygons(std::size_t b) {
       looked_at[word] = edges[a][word] & (dirty_[b][word] | (shell_ ? open_[b][a][word] : 0));
       if (slabs_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
     }
-    // A loose polygon may reach into any cube near it, so it is added again where new ones have been begun; to
-    // widen the slabs of others once more changes nothing.
+    // A loose polygon may reach into any cube near it, so it is added again where new ones have been begun;
+    // to widen the slabs of others once more changes nothing.
     if (slabs_)
       for_each_bit(loose_[b][a], [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
@@ -185,7 +185,9 @@ void RegionProof::look_at_slabs() {
   });
 }
 
-void RegionProof::call_unproven(const CellBlocks::Edge& edge) { call_unproven(ring_of(regions_, edge).largest()); }
+void RegionProof::call_unproven(const CellBlocks::Edge& edge) {
+  call_unproven(ring_of(regions_, edge).largest());
+}
 
 void RegionProof::call_unproven(const Region& cube) {
   // Bits that are only ever set while others look; split() reads them when all are done.
@@ -200,8 +202,8 @@ bool RegionProof::is_unproven(const Region& cube) {
   return (bits >> cube_of(cube.cell, cube.level)) & 1;
 }
 
-/// Splits the cubes that were called unproven, proposes smaller ones in their place, and marks what has changed.
-/// Returns how many cubes were split.
+/// Splits the cubes that were called unproven, proposes smaller ones in their place, and marks what has
+/// changed. Returns how many cubes were split.
 std::size_t RegionProof::split() {
   std::vector<std::uint32_t> splits(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {

@@ -9,11 +9,11 @@
 
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/certified_octree/cell_regions.h"
 #include "algorithms/extraction/certified_octree/region_polygon.h"
 #include "algorithms/extraction/certified_octree/region_shell.h"
 #include "algorithms/extraction/certified_octree/region_slabs.h"
-#include "algorithms/extraction/certified_octree/cell_regions.h"
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
 
 namespace hermesh {
@@ -93,14 +93,14 @@ class RegionProof {
   std::vector<std::array<std::uint64_t, CellRegions::kLevels>>
       unproven_;                            ///< cubes to be split, for each block at level − 1
   std::vector<std::uint8_t> any_unproven_;  ///< 1 for blocks that have one of these
-  LargeArray<BlockMask> changed_;       ///< cells dirty since take_changed()
+  LargeArray<BlockMask> changed_;           ///< cells dirty since take_changed()
   // Cells of each block:
-  LargeArray<BlockMask> split_cells_;     ///< cells of cubes that were split last (all at the beginning)
-  LargeArray<BlockMask> dirty_;   ///< split cells and those next to one
-  bool is_new_ = true;            ///< nothing was looked at yet
+  LargeArray<BlockMask> split_cells_;  ///< cells of cubes that were split last (all at the beginning)
+  LargeArray<BlockMask> dirty_;        ///< split cells and those next to one
+  bool is_new_ = true;                 ///< nothing was looked at yet
   std::vector<std::array<BlockMask, 3>>
       open_;  ///< edges whose polygons are not shown, for each block and axis; with a shell
-  std::vector<std::array<BlockMask, 3>> loose_;  ///< edges of loose polygons, likewise; with slabs
+  std::vector<std::array<BlockMask, 3>> loose_;      ///< edges of loose polygons, likewise; with slabs
   std::array<std::vector<std::uint32_t>, 8> turns_;  ///< blocks of each parity; with slabs or a shell
   tbb::enumerable_thread_specific<std::vector<Region>> split_;
 };

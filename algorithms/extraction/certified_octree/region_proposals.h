@@ -81,9 +81,10 @@ class RegionProposals {
   const CellBlocks& cells_;
   const RegionOptions& options_;
   const FilePoints& file_;
-  std::int32_t block_ = -1;                 ///< the block that what follows belongs to
-  BlockMask free_{};                        ///< cells that may be part of a cube, active or not
-  std::array<BlockMask, 3> lower_faces_{};  ///< for each axis the cells whose lower face is passed by the surface
+  std::int32_t block_ = -1;  ///< the block that what follows belongs to
+  BlockMask free_{};         ///< cells that may be part of a cube, active or not
+  std::array<BlockMask, 3>
+      lower_faces_{};  ///< for each axis the cells whose lower face is passed by the surface
   std::array<EdgeCrossing, 3 * 512> crossings_;
   std::array<Sum, 64> sums_;  ///< one for each cube of a level
 };

@@ -26,7 +26,8 @@ constexpr double kFirst = 0.5, kLow = 0.125;
 /// What keeps within this cosine, of a little less than 45 degrees, of one direction keeps within a right
 /// angle of each other.
 constexpr double kUpright = 0.7072;
-static_assert(2 * kUpright * kUpright - 1 > 0, "the cosine of twice the angle is that of less than a right angle");
+static_assert(2 * kUpright * kUpright - 1 > 0,
+              "the cosine of twice the angle is that of less than a right angle");
 
 /// What single precision may make of places a few blocks away from the one that they are relative to, in
 /// voxels, and far more.
@@ -126,8 +127,8 @@ class RegionShell::Search {
   std::array<Planes, kMostTriangles> planes_;
 };
 
-RegionShell::RegionShell(const CellRegions& regions, const EdgePolygons& polygons, const UniformPoints& points,
-                         std::span<const float> tolerance, RunContext& context)
+RegionShell::RegionShell(const CellRegions& regions, const EdgePolygons& polygons,
+                         const UniformPoints& points, std::span<const float> tolerance, RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),
       polygons_(polygons),
@@ -351,7 +352,8 @@ void RegionShell::Search::gather() {
                     [](const shell_kernels::Window& window) { return window.block->cells->first_point; });
 }
 
-/// Adds the part of a block whose corner is at `corner` from the base, and its fans, which the kernels do not know.
+/// Adds the part of a block whose corner is at `corner` from the base, and its fans, which the kernels do not
+/// know.
 void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3],
                                  const int (&to)[3]) {
   const auto part_from = [&](int below) {

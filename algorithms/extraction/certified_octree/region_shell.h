@@ -14,11 +14,11 @@
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/certified_octree/cell_regions.h"
 #include "algorithms/extraction/certified_octree/kernels/shell_kernels.h"
 #include "algorithms/extraction/certified_octree/region_polygon.h"
-#include "algorithms/extraction/certified_octree/cell_regions.h"
 #include "algorithms/extraction/contact/triangle_contact.h"
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
@@ -77,8 +77,8 @@ class RegionShell {
   const std::span<const float> tolerance_;
   float least_tolerance_;
   std::vector<shell_kernels::Block> blocks_;
-  std::vector<Eigen::Vector3d> up_;  ///< mean normal of each block's quads
-  LargeArray<Quad> quads_;  ///< in the order of block, sample and axis; as EdgePolygons cuts them
+  std::vector<Eigen::Vector3d> up_;   ///< mean normal of each block's quads
+  LargeArray<Quad> quads_;            ///< in the order of block, sample and axis; as EdgePolygons cuts them
   LargeArray<std::uint8_t> upright_;  ///< 1 for quads that face up along their block's direction
   std::array<LargeArray<float>, 3>
       in_blocks_;  ///< coordinates of the cells' points, relative to the corners of their blocks

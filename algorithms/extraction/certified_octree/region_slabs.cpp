@@ -26,8 +26,8 @@ constexpr float kUnit = 4096;
 
 std::array<int, 3> coordinates(int cell) { return {cell >> 6, (cell >> 3) & 7, cell & 7}; }
 
-/// Replaces a value by a better one while other threads do the same. The least or the greatest of several is the
-/// same in any order.
+/// Replaces a value by a better one while other threads do the same. The least or the greatest of several is
+/// the same in any order.
 template <class Compare>
 void replace_if(float& value, float by, Compare better) {
   const std::atomic_ref<float> shared(value);
@@ -152,8 +152,8 @@ RegionSlabs::RegionSlabs(const CellRegions& regions, const UniformPoints* points
 
 void RegionSlabs::make_room() { slabs_.resize(regions_.cube_count()); }
 
-/// Calls f(place), in the block's coordinates, for the crossings and points in a box, its faces included. The box
-/// may reach eight samples below the block and, less its faces, as many above.
+/// Calls f(place), in the block's coordinates, for the crossings and points in a box, its faces included. The
+/// box may reach eight samples below the block and, less its faces, as many above.
 template <class F>
 void RegionSlabs::for_each_near(std::int32_t block, const BoundsOf<int>& box, F&& f) const {
   const auto& neighbours = cells_.source(block).neighbours;
@@ -411,9 +411,9 @@ bool RegionSlabs::is_inside(std::int32_t block, std::array<int, 3> from, const s
 /// Whether what is above a slab in a box is outside, what is below it inside, and a convex body with these
 /// corners near both: the distance to either is a convex function, so the corners tell. All is relative to
 /// the block; `known` is a sample of it.
-bool RegionSlabs::are_near_parts(std::int32_t block, const BoundsOf<int>& box, const std::array<int, 3>& known,
-                                 const Vector3d& up, const Slab& slab, std::span<const Vector3d> corners,
-                                 double tolerance) const {
+bool RegionSlabs::are_near_parts(std::int32_t block, const BoundsOf<int>& box,
+                                 const std::array<int, 3>& known, const Vector3d& up, const Slab& slab,
+                                 std::span<const Vector3d> corners, double tolerance) const {
   Eigen::Vector3i highest = box.upper, lowest = box.lower;
   Part above{{}, {}, up, double(slab.high)};
   double high = 0, low = 0;

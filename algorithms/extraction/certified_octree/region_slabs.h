@@ -10,8 +10,8 @@
 #include "algorithms/core/bounds.h"
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/run_context.h"
-#include "algorithms/extraction/certified_octree/region_polygon.h"
 #include "algorithms/extraction/certified_octree/cell_regions.h"
+#include "algorithms/extraction/certified_octree/region_polygon.h"
 
 namespace hermesh {
 
@@ -88,12 +88,11 @@ class RegionSlabs {
 
   const CellRegions& regions_;
   const CellBlocks& cells_;
-  std::vector<std::array<std::uint16_t, 65>>
-      bins_;                                 ///< where the places of each 2³ samples of a block begin
-  std::vector<std::uint32_t> first_;         ///< first place of each block
+  std::vector<std::array<std::uint16_t, 65>> bins_;  ///< where the places of each 2³ samples of a block begin
+  std::vector<std::uint32_t> first_;                 ///< first place of each block
   using Place = std::array<std::uint16_t, 3>;
-  LargeArray<Place> places_;                 ///< crossings and points in their block, in parts of a voxel
-  std::vector<Slab> slabs_;                  ///< one for each cube, heights over its point
+  LargeArray<Place> places_;  ///< crossings and points in their block, in parts of a voxel
+  std::vector<Slab> slabs_;   ///< one for each cube, heights over its point
 };
 
 }  // namespace hermesh

@@ -45,8 +45,8 @@ Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls)
     if (farthest < 0 || nearest >= prism.height()) continue;
     const Heights there = up > 0 ? Heights{nearest, farthest} : Heights{-farthest, -nearest};
     heights = heights.empty()
-                 ? there
-                 : Heights{std::min(heights.lowest, there.lowest), std::max(heights.highest, there.highest)};
+                  ? there
+                  : Heights{std::min(heights.lowest, there.lowest), std::max(heights.highest, there.highest)};
   }
   return heights;
 }
@@ -128,7 +128,8 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
     beyond[4][corner] = prism.bottom().signedDistance(triangle[corner]);
   }
   for (std::size_t side = 0; side < 3; ++side)
-    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kPrismRounding; })) return Meeting::none;
+    if (std::ranges::all_of(beyond[side], [](double by) { return by > -kPrismRounding; }))
+      return Meeting::none;
   const auto above = std::ranges::minmax(beyond[3]), below = std::ranges::minmax(beyond[4]);
   if (above.min > kPrismRounding || below.min > kPrismRounding) return Meeting::none;
   const Vector3d normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/extraction/certified_octree/kernels/shell_kernels.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {

@@ -8,8 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What a value, divided by the lengths that it is made of, must exceed to be certain: rounding is some 1e-13 for
-/// coordinates of thousands of voxels.
+/// What a value, divided by the lengths that it is made of, must exceed to be certain: rounding is some 1e-13
+/// for coordinates of thousands of voxels.
 constexpr double kCertain = 1e-10;
 
 struct Range {
@@ -35,8 +35,8 @@ bool disjoint_apart(const Corners& a, const Corners& b) {
   const std::array<Vector3d, 3> es = {s[1] - s[0], s[2] - s[1], s[0] - s[2]};
   const std::array<Vector3d, 3> et = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
   const Vector3d ns = es[0].cross(es[1]), nt = et[0].cross(et[1]);
-  // The candidates for two triangles: both normals, and the products of a side of each. Any axis along which the ranges
-  // are apart is a proof, however it was found, so an axis that is mostly rounding does no harm.
+  // The candidates for two triangles: both normals, and the products of a side of each. Any axis along which
+  // the ranges are apart is a proof, however it was found, so an axis that is mostly rounding does no harm.
   if (separates(ns) || separates(nt)) return true;
   for (const Vector3d& e : es)
     for (const Vector3d& f : et)
@@ -47,10 +47,11 @@ bool disjoint_apart(const Corners& a, const Corners& b) {
   return false;
 }
 
-/// Whether two wedges at the origin, that of a[0] and a[1] and that of b[0] and b[1], meet in the origin alone.
+/// Whether two wedges at the origin, that of a[0] and a[1] and that of b[0] and b[1], meet in the origin
+/// alone.
 bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2>& b) {
-  const double size = std::max({a[0].cwiseAbs().maxCoeff(), a[1].cwiseAbs().maxCoeff(), b[0].cwiseAbs().maxCoeff(),
-                                b[1].cwiseAbs().maxCoeff()});
+  const double size = std::max({a[0].cwiseAbs().maxCoeff(), a[1].cwiseAbs().maxCoeff(),
+                                b[0].cwiseAbs().maxCoeff(), b[1].cwiseAbs().maxCoeff()});
   const auto sign = [&](const Vector3d& axis, const Vector3d& p) {
     const double value = axis.dot(p), noise = kCertain * size * axis.cwiseAbs().maxCoeff();
     return value > noise ? 1 : value < -noise ? -1 : 0;
@@ -63,12 +64,14 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
     for (int j = 0; j < 2; ++j) {
       const Vector3d axis = a[i].cross(b[j]);
       // Of parallel rays it is noise, and so would be every sign.
-      if (axis.cwiseAbs().maxCoeff() <= kCertain * a[i].cwiseAbs().maxCoeff() * b[j].cwiseAbs().maxCoeff()) continue;
+      if (axis.cwiseAbs().maxCoeff() <= kCertain * a[i].cwiseAbs().maxCoeff() * b[j].cwiseAbs().maxCoeff())
+        continue;
       if (sign(axis, a[1 - i]) * sign(axis, b[1 - j]) < 0) return true;
     }
-  // A plane through one side of a wedge, at right angles to it, with all of the other beyond; one ray of that may lie in
-  // the plane if it points the other way, as where a straight line passes through the corner.
-  const auto beyond = [&](const std::array<Vector3d, 2>& w, const Vector3d& normal, const std::array<Vector3d, 2>& v) {
+  // A plane through one side of a wedge, at right angles to it, with all of the other beyond; one ray of that
+  // may lie in the plane if it points the other way, as where a straight line passes through the corner.
+  const auto beyond = [&](const std::array<Vector3d, 2>& w, const Vector3d& normal,
+                          const std::array<Vector3d, 2>& v) {
     for (int i = 0; i < 2; ++i) {
       const Vector3d beside = normal.cross(w[i]), other = normal.cross(w[1 - i]);
       const int own = sign(beside, w[1 - i]), own_other = sign(other, w[i]);
@@ -85,10 +88,11 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
   return beyond(a, na, b) || beyond(b, nb, a);
 }
 
-/// Whether the halves of planes that end in the line along `edge`, and hold a and b, are apart but for the line: they
-/// are unless they lie on one another.
+/// Whether the halves of planes that end in the line along `edge`, and hold a and b, are apart but for the
+/// line: they are unless they lie on one another.
 bool half_planes_apart(const Vector3d& edge, const Vector3d& a, const Vector3d& b) {
-  const double size = std::max({edge.cwiseAbs().maxCoeff(), a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
+  const double size =
+      std::max({edge.cwiseAbs().maxCoeff(), a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
   const Vector3d na = edge.cross(a), nb = edge.cross(b);
   const double noise = kCertain * size * na.cwiseAbs().maxCoeff();
   // At an angle they share the line alone; in one plane they are apart if they lie on opposite sides of it.

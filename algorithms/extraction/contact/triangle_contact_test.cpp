@@ -16,7 +16,8 @@ TEST(TriangleContact, NoSharedCorner) {
   const Corners flat = {o, x, y};
   EXPECT_TRUE(certainly_apart(flat, {o + z, x + z, y + z}, 0));
   EXPECT_TRUE(certainly_apart(flat, {x + y, x + y + x, x + y + y}, 0));  // beside it in its plane
-  EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, -1), Vector3d(0.3, 0.2, 1), Vector3d(0.2, 0.3, 1)}, 0));
+  EXPECT_FALSE(
+      certainly_apart(flat, {Vector3d(0.2, 0.2, -1), Vector3d(0.3, 0.2, 1), Vector3d(0.2, 0.3, 1)}, 0));
   EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, 0), x + y, y + y}, 0));  // overlaps in its plane
   EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, 0), x + z, y + z}, 0));  // a corner on it
   EXPECT_FALSE(certainly_apart(flat, {x, x + x, x + z}, 0));                      // a corner on its corner
@@ -25,24 +26,25 @@ TEST(TriangleContact, NoSharedCorner) {
 TEST(TriangleContact, OneSharedCorner) {
   const Corners flat = {o, x, y};
   EXPECT_TRUE(certainly_apart(flat, {o, x + z, y + z}, 1));
-  EXPECT_TRUE(certainly_apart(flat, {o, -x, -y}, 1));                      // in its plane, opposite
-  EXPECT_TRUE(certainly_apart(flat, {o, -x, -x - y}, 1));                  // a straight line through the corner
+  EXPECT_TRUE(certainly_apart(flat, {o, -x, -y}, 1));      // in its plane, opposite
+  EXPECT_TRUE(certainly_apart(flat, {o, -x, -x - y}, 1));  // a straight line through the corner
   EXPECT_TRUE(certainly_apart(flat, {o, -x, -y + 0.1 * x}, 1));
-  EXPECT_FALSE(certainly_apart(flat, {o, x + y, x + y + y}, 1));           // overlaps in its plane
-  EXPECT_FALSE(certainly_apart(flat, {o, x, -y}, 1));                      // shares more than is said
-  EXPECT_FALSE(certainly_apart(flat, {o, x + y + z, x + y - z}, 1));       // passes through it
+  EXPECT_FALSE(certainly_apart(flat, {o, x + y, x + y + y}, 1));      // overlaps in its plane
+  EXPECT_FALSE(certainly_apart(flat, {o, x, -y}, 1));                 // shares more than is said
+  EXPECT_FALSE(certainly_apart(flat, {o, x + y + z, x + y - z}, 1));  // passes through it
   EXPECT_TRUE(certainly_apart(flat, {o, -x - y + z, -x - y - z}, 1));
 }
 
 TEST(TriangleContact, SidesThatLieOnOneAnotherMeet) {
-  // Triangles with a corner in common, sides along one ray from it and the rest on either side, turned at random: the plane
-  // through two parallel sides is noise and separates nothing.
+  // Triangles with a corner in common, sides along one ray from it and the rest on either side, turned at
+  // random: the plane through two parallel sides is noise and separates nothing.
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const auto point = [&] { return Vector3d(unit(random), unit(random), unit(random)); };
   for (int i = 0; i < 2000; ++i) {
     const Vector3d corner = point(), ray = point();
-    const Corners a = {corner, corner + ray, corner + point()}, b = {corner, corner + 0.37 * ray, corner + point()};
+    const Corners a = {corner, corner + ray, corner + point()},
+                  b = {corner, corner + 0.37 * ray, corner + point()};
     EXPECT_FALSE(certainly_apart(a, b, 1)) << i;
   }
 }
@@ -55,7 +57,8 @@ TEST(TriangleContact, SharedEdge) {
   EXPECT_TRUE(certainly_apart(flat, {o, x, y + 0.001 * z}, 2));
 }
 
-/// Triangles that are called apart have no common point among many samples of both, turned and moved at random.
+/// Triangles that are called apart have no common point among many samples of both, turned and moved at
+/// random.
 TEST(TriangleContact, NeverWronglySaysApart) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);

@@ -12,9 +12,9 @@
 
 namespace hermesh {
 
-/// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing, that holds
-/// the triangles which are about as wide as a cell. So no triangle is in more than eight cells, however their sizes
-/// differ.
+/// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing,
+/// that holds the triangles which are about as wide as a cell. So no triangle is in more than eight cells,
+/// however their sizes differ.
 class TriangleGrid {
  public:
   /// Sorts triangles into lattices. `boxes` are those of the triangles, and must outlive this.
@@ -24,18 +24,21 @@ class TriangleGrid {
     const double least = std::max(1e-3, 1.5 * widths / std::max<double>(1.0, double(boxes.size())));
     std::vector<std::size_t> sizes;
     for (std::size_t t = 0; t < boxes.size(); ++t) {
-      level_[t] = static_cast<std::uint8_t>(std::max(0, std::ilogb(std::max(1e-3, width(boxes[t])) / least) + 1));
+      level_[t] =
+          static_cast<std::uint8_t>(std::max(0, std::ilogb(std::max(1e-3, width(boxes[t])) / least) + 1));
       if (sizes.size() <= level_[t]) sizes.resize(level_[t] + 1u);
       ++sizes[level_[t]];
     }
     for (std::size_t k = 0; k < sizes.size(); ++k) levels_.emplace_back(std::ldexp(least, int(k)), sizes[k]);
-    for (std::size_t t = 0; t < boxes.size(); ++t) levels_[level_[t]].add(static_cast<std::uint32_t>(t), boxes[t]);
+    for (std::size_t t = 0; t < boxes.size(); ++t)
+      levels_[level_[t]].add(static_cast<std::uint32_t>(t), boxes[t]);
   }
 
   int level(std::uint32_t triangle) const { return level_[triangle]; }
 
-  /// Calls visit(other) for the triangles from a level on whose cells the triangle's box touches: some of them more
-  /// than once, others besides, and itself. Each level from the triangle's own on has at most eight such cells.
+  /// Calls visit(other) for the triangles from a level on whose cells the triangle's box touches: some of
+  /// them more than once, others besides, and itself. Each level from the triangle's own on has at most eight
+  /// such cells.
   template <class Visit>
   void visit(std::uint32_t triangle, int from_level, Visit&& visit) const {
     for (auto k = static_cast<std::size_t>(from_level); k < levels_.size(); ++k)
@@ -62,7 +65,8 @@ class TriangleGrid {
     void visit(const Bounds& box, Visit&& visit) const {
       if (entries_.empty()) return;
       for_each_slot(box, [&](std::size_t slot) {
-        for (std::uint32_t link = first_[slot]; link != kNone; link = entries_[link].next) visit(entries_[link].triangle);
+        for (std::uint32_t link = first_[slot]; link != kNone; link = entries_[link].next)
+          visit(entries_[link].triangle);
       });
     }
 

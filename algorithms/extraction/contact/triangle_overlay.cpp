@@ -15,8 +15,8 @@ constexpr double kFacing = 0.05;
 
 }  // namespace
 
-// Cuts off what lies beyond each of the three sides in turn (Sutherland & Hodgman 1974), in coordinates in which each
-// side is where one of them is zero.
+// Cuts off what lies beyond each of the three sides in turn (Sutherland & Hodgman 1974), in coordinates in
+// which each side is where one of them is zero.
 ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
   std::array<Place, 24> before;
   std::copy(triangle.begin(), triangle.end(), corners.begin());
@@ -36,8 +36,8 @@ ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
   }
 }
 
-// The part of the segment that is within all three sides is an interval. A segment that runs along a side, or less than
-// kNarrow within it, leads nowhere that matters.
+// The part of the segment that is within all three sides is an interval. A segment that runs along a side, or
+// less than kNarrow within it, leads nowhere that matters.
 bool passes_over(const Place& from, const Place& to) {
   double begin = 0, end = 1;
   for (int i = 0; i < 3; ++i) {
@@ -67,8 +67,8 @@ bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Ei
                                               const std::array<Place, 3>& places, double within) {
   if (!(normal.cast<double>().dot(over.normal()) > kFacing)) return false;
   const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
-  // Heights are affine, so the corners' bound that of all of the face; only where they are too high is the part over
-  // the triangle looked at by itself.
+  // Heights are affine, so the corners' bound that of all of the face; only where they are too high is the
+  // part over the triangle looked at by itself.
   if (highest <= within) return true;
   const ClippedTriangle part(places);
   for (int i = 0; i < part.size; ++i)

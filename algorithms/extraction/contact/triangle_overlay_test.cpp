@@ -21,7 +21,8 @@ FineMesh sheet(int n, Height&& z) {
     for (int x = 0; x <= n; ++x) points.emplace_back(x, y, z(x, y));
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x) {
-      const auto at = static_cast<std::uint32_t>(y * (n + 1) + x), above = at + static_cast<std::uint32_t>(n) + 1;
+      const auto at = static_cast<std::uint32_t>(y * (n + 1) + x),
+                 above = at + static_cast<std::uint32_t>(n) + 1;
       triangles.push_back({at, at + 1, above + 1});
       triangles.push_back({at, above + 1, above});
     }
@@ -29,11 +30,14 @@ FineMesh sheet(int n, Height&& z) {
 }
 
 bool is_near(const Corners& t, const FineMesh& mesh, std::uint32_t start, double within) {
-  return TriangleOverlay(mesh.triangles().size()).is_near(t, mesh, start, [&](std::uint32_t) { return within; });
+  return TriangleOverlay(mesh.triangles().size()).is_near(t, mesh, start, [&](std::uint32_t) {
+    return within;
+  });
 }
 
 TEST(TriangleOverlay, FindsTheGreatestHeightWhereverItIs) {
-  // A tent whose ridge, at height 1, passes through no corner of the triangle: heights 1 and -0 at its own corners.
+  // A tent whose ridge, at height 1, passes through no corner of the triangle: heights 1 and -0 at its own
+  // corners.
   const FineMesh tent = sheet(8, [](int x, int) { return x == 4 ? 1.0 : 0.0; });
   const Corners t = {Vector3d(2.5, 2, 0), Vector3d(5.5, 2, 0), Vector3d(4, 5, 0)};
   const std::uint32_t start = 2 * (2 * 8 + 3);
@@ -47,12 +51,16 @@ TEST(TriangleOverlay, FindsTheGreatestHeightWhereverItIs) {
 
 TEST(TriangleOverlay, SaysNoWhereTheMeshEndsOrFacesTheOtherWay) {
   const FineMesh flat = sheet(4, [](int, int) { return 0.0; });
-  EXPECT_TRUE(is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(3.8, 0.2, 0.1), Vector3d(2, 3.8, 0.1)}, flat, 10, 0.2));
-  EXPECT_FALSE(is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(4.2, 0.2, 0.1), Vector3d(2, 3.8, 0.1)}, flat, 10, 0.2))
+  EXPECT_TRUE(
+      is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(3.8, 0.2, 0.1), Vector3d(2, 3.8, 0.1)}, flat, 10, 0.2));
+  EXPECT_FALSE(
+      is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(4.2, 0.2, 0.1), Vector3d(2, 3.8, 0.1)}, flat, 10, 0.2))
       << "one corner lies beyond the rim";
-  EXPECT_FALSE(is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(2, 3.8, 0.1), Vector3d(3.8, 0.2, 0.1)}, flat, 10, 0.2))
+  EXPECT_FALSE(
+      is_near({Vector3d(0.2, 0.2, 0.1), Vector3d(2, 3.8, 0.1), Vector3d(3.8, 0.2, 0.1)}, flat, 10, 0.2))
       << "turned over";
-  EXPECT_FALSE(is_near({Vector3d(9, 9, 0), Vector3d(10, 9, 0), Vector3d(9, 10, 0)}, flat, 10, 0.2)) << "elsewhere";
+  EXPECT_FALSE(is_near({Vector3d(9, 9, 0), Vector3d(10, 9, 0), Vector3d(9, 10, 0)}, flat, 10, 0.2))
+      << "elsewhere";
 }
 
 TEST(TriangleOverlay, SaysNoWhereTheFirstFaceLiesElsewhere) {
@@ -85,7 +93,8 @@ TEST(TriangleOverlay, NeverSaysYesWhereSamplesSayNo) {
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3.0;
     const double within = 0.3 + 0.3 * share(random);
     // Every other time from a face that need not be under the triangle at all.
-    const std::uint32_t start = trial % 2 ? rough.walk(0, middle) : static_cast<std::uint32_t>(random() % 128);
+    const std::uint32_t start =
+        trial % 2 ? rough.walk(0, middle) : static_cast<std::uint32_t>(random() % 128);
     const bool said = is_near(t, rough, start, within);
     (said ? near : far) += 1;
     if (!said) continue;

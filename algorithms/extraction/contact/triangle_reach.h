@@ -11,8 +11,9 @@
 
 namespace hermesh {
 
-/// Tells whether points are near a triangle, by the triangle's plane and the three planes through its sides at right
-/// angles to it. Most points are decided by these; only those beside the triangle need the exact distance.
+/// Tells whether points are near a triangle, by the triangle's plane and the three planes through its sides
+/// at right angles to it. Most points are decided by these; only those beside the triangle need the exact
+/// distance.
 class TriangleReach {
  public:
   TriangleReach() = default;
@@ -24,7 +25,8 @@ class TriangleReach {
       sides_.row(i) = out / out.norm();
       offsets_[i] = sides_.row(i).dot(corners[i]);
     }
-    // A degenerate triangle has no planes; then every comparison below is false and the exact distance decides.
+    // A degenerate triangle has no planes; then every comparison below is false and the exact distance
+    // decides.
   }
 
   /// How far p lies beyond the three sides, along the plane: negative inside.

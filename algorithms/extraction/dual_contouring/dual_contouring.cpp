@@ -14,12 +14,13 @@
 namespace hermesh {
 namespace {
 
-/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never coincide.
+/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never
+/// coincide.
 constexpr double kCellMargin = 1.0 / 1024.0;
 
-/// A point leaves its cell where the best place within it lies this far off the planes, in voxels and root mean square: next
-/// to a feature that passes outside. Letting every minimiser go nearly doubles the self-intersections of a scan, whose
-/// minimisers leave for nothing.
+/// A point leaves its cell where the best place within it lies this far off the planes, in voxels and root
+/// mean square: next to a feature that passes outside. Letting every minimiser go nearly doubles the
+/// self-intersections of a scan, whose minimisers leave for nothing.
 constexpr double kWorthLeaving = 0.1;
 
 /// What one block adds to the mesh, and where in it.
@@ -35,8 +36,8 @@ class Contourer {
       : grid_(grid), options_(options), outputs_(grid.blocks().size()) {}
 
   PolygonMesh run(RunContext& context) {
-    // Count, scan, fill (core/parallel.h): in each pass a block writes its own entries and reads others' of passes
-    // before. So the mesh is the same for any number of threads.
+    // Count, scan, fill (core/parallel.h): in each pass a block writes its own entries and reads others' of
+    // passes before. So the mesh is the same for any number of threads.
     const std::size_t blocks = outputs_.size();
     std::vector<std::uint64_t> points(blocks), quads(blocks);
     PolygonMesh mesh;
@@ -211,8 +212,9 @@ class Contourer {
       Eigen::Vector3d hit;
       for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
       hit[axis] += grid_.crossing(b, sample, axis).offset;
-      // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there. Where the
-      // sample before the crossing is inside, the outside lies along the axis; a map that mirrors turns that about.
+      // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there.
+      // Where the sample before the crossing is inside, the outside lies along the axis; a map that mirrors
+      // turns that about.
       if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
       if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
       *next++ = quad;
@@ -237,7 +239,8 @@ class Contourer {
       const Eigen::Vector3d a = positions_[quad[i]] - hit, c = positions_[quad[j]] - hit;
       return a[u] * c[v] - a[v] * c[u] > 0;
     };
-    // The grid edge's line passes through one of the diagonal's two triangles, which the side of the diagonal tells.
+    // The grid edge's line passes through one of the diagonal's two triangles, which the side of the diagonal
+    // tells.
     const double first = height(quad, left_of(0, 2) ? std::array{0, 2, 3} : std::array{0, 1, 2}, hit, axis);
     const double second = height(quad, left_of(1, 3) ? std::array{1, 3, 0} : std::array{1, 2, 3}, hit, axis);
     constexpr double kAlike = 1e-3;  // voxels
@@ -262,11 +265,13 @@ double DualContouringOptions::smooth_share() const {
   return linear_crossings ? Qef::kShareOfLinear : Qef::kShareOfExact;
 }
 
-Eigen::Vector3d place_by_planes(const Qef& qef, const Eigen::Vector3d& corner, const DualContouringOptions& options) {
+Eigen::Vector3d place_by_planes(const Qef& qef, const Eigen::Vector3d& corner,
+                                const DualContouringOptions& options) {
   const Eigen::Vector3d free = qef.minimiser(options.truncation), mass = qef.mass_point();
   const double share = qef.share_of_minimiser(options.smooth_share(), options.truncation);
   const double from_centre = (free - corner - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
-  // What lies on a plane of the lattice comes out on it. A level set's crossings there are rounded to both sides of it.
+  // What lies on a plane of the lattice comes out on it. A level set's crossings there are rounded to both
+  // sides of it.
   const double inside = options.linear_crossings ? 0.5 - kCellMargin : 0.5;
   if (from_centre <= inside) return mass + share * (free - mass);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
@@ -291,21 +296,26 @@ namespace {
 const OptionTable<DualContouringOptions>& contouring_option_table() {
   using Options = DualContouringOptions;
   using Placement = Options::Placement;
-  static const auto table =
-      OptionTable<Options>()
-          .choice("placement", &Options::placement,
-                  {{"unbiased", Placement::unbiased}, {"optimal", Placement::optimal}, {"average", Placement::average}},
-                  "where a cell's point goes: 'optimal' minimises the QEF and keeps sharp features; 'unbiased' does so, too, "
-                  "but takes back by how much that lies outside of smooth surfaces; 'average' takes the mean of its "
-                  "crossings")
-          .number("truncation", &Options::truncation, {.maximum = 1.0},
-                  "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
-                  "features",
-                  {"placement=unbiased|optimal"})
-          .number("reach", &Options::reach, {.maximum = 1e6},
-                  "voxels by which a point may leave its cell to meet a feature; larger keeps more, smaller folds "
-                  "the surface less",
-                  {"placement=unbiased|optimal"});
+  static const auto table = OptionTable<Options>()
+                                .choice("placement", &Options::placement,
+                                        {{"unbiased", Placement::unbiased},
+                                         {"optimal", Placement::optimal},
+                                         {"average", Placement::average}},
+                                        "where a cell's point goes: 'optimal' minimises the QEF and keeps "
+                                        "sharp features; 'unbiased' does so, too, "
+                                        "but takes back by how much that lies outside of smooth surfaces; "
+                                        "'average' takes the mean of its "
+                                        "crossings")
+                                .number("truncation", &Options::truncation, {.maximum = 1.0},
+                                        "singular values below this share of the largest are dropped; larger "
+                                        "is smoother and keeps fewer "
+                                        "features",
+                                        {"placement=unbiased|optimal"})
+                                .number("reach", &Options::reach, {.maximum = 1e6},
+                                        "voxels by which a point may leave its cell to meet a feature; "
+                                        "larger keeps more, smaller folds "
+                                        "the surface less",
+                                        {"placement=unbiased|optimal"});
   return table;
 }
 

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "algorithms/core/large_array.h"
-#include "algorithms/lattice/grid_placement.h"
-#include "algorithms/lattice/leaf_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/hermite/leaf_stencils.h"
+#include "algorithms/lattice/grid_placement.h"
+#include "algorithms/lattice/leaf_table.h"
 
 namespace hermesh {
 namespace {
@@ -25,7 +25,8 @@ using leaf_kernels::LeafCells;
 using leaf_kernels::UpperSigns;
 using Position = std::array<std::int32_t, 3>;  // index coordinates
 
-/// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more than filling it.
+/// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more
+/// than filling it.
 template <class T>
 void reserve_huge(std::vector<T>& array, std::size_t n) {
   constexpr std::size_t kPage = std::size_t{2} << 20;
@@ -45,7 +46,8 @@ class Plain final : public leaf_kernels::PlainCode {
   void place(const leaf_kernels::Plane* planes, int count, float* place) const override {
     Qef qef(Eigen::Vector3d::Zero());
     for (int i = 0; i < count; ++i)
-      qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(), Eigen::Vector3f(planes[i].normal).cast<double>());
+      qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(),
+                    Eigen::Vector3f(planes[i].normal).cast<double>());
     // Planes are relative to the cell's centre, so that its first corner is at −½.
     const Eigen::Vector3d found = place_by_planes(qef, Eigen::Vector3d::Constant(-0.5), options_);
     for (int k = 0; k < 3; ++k) place[k] = static_cast<float>(found[k]);
@@ -55,21 +57,27 @@ class Plain final : public leaf_kernels::PlainCode {
   const DualContouringOptions& options_;
 };
 
-/// Count, scan, fill. What bounds each pass, by profiles of the bunny and the Nefertiti at 800 voxels with AVX-512: reading
-/// the signs, memory bandwidth; counting, the leaves' neighbours, that is latency; average placement, a third of the time
-/// waiting for the samples' cache lines in spite of the prefetches, then the gathers of corners; optimal placement,
-/// arithmetic more than twice as long as all that (planes first, then crossings); the quads, instructions: lists of bits,
-/// shuffles. Where the machine clears pages slowly, a fifth of it all goes into the first touches of the results, so nothing
-/// is kept beside these that can be found anew.
+/// Count, scan, fill. What bounds each pass, by profiles of the bunny and the Nefertiti at 800 voxels with
+/// AVX-512: reading the signs, memory bandwidth; counting, the leaves' neighbours, that is latency; average
+/// placement, a third of the time waiting for the samples' cache lines in spite of the prefetches, then the
+/// gathers of corners; optimal placement, arithmetic more than twice as long as all that (planes first, then
+/// crossings); the quads, instructions: lists of bits, shuffles. Where the machine clears pages slowly, a
+/// fifth of it all goes into the first touches of the results, so nothing is kept beside these that can be
+/// found anew.
 class LevelSetContourer {
  public:
   LevelSetContourer(const LeafTable& table, const SampledVolume& volume, const IndexToWorld& placement,
                     const DualContouringOptions& options, RunContext& context)
-      : table_(table), volume_(volume), placement_(placement), options_(options), context_(context),
-        cells_(table_.size()), upper_(table_.size()) {}
+      : table_(table),
+        volume_(volume),
+        placement_(placement),
+        options_(options),
+        context_(context),
+        cells_(table_.size()),
+        upper_(table_.size()) {}
 
-  /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree lacks
-  /// although they hold active cells.
+  /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree
+  /// lacks although they hold active cells.
   std::vector<Position> count() {
     const Stage stage(context_, "count");
     std::vector<std::uint64_t> points(table_.size()), quads(table_.size());
@@ -132,7 +140,8 @@ class LevelSetContourer {
       }
       const Neighbours lower = table_.neighbours(live_[i], -1);
       for (int slot = 0; slot < 8; ++slot)
-        // A tile below has no cells, and none that is needed: contour_level_set() has made leaves of all that had some.
+        // A tile below has no cells, and none that is needed: contour_level_set() has made leaves of all that
+        // had some.
         input.cells[slot] = lower[slot] >= 0 ? &cells_[static_cast<std::size_t>(lower[slot])] : nullptr;
       kernels_.connect(input, mesh.quads[cells.first_quad].data());
     });
@@ -151,11 +160,12 @@ class LevelSetContourer {
   /// Where the leaf's first sample is in the mesh's coordinates.
   Eigen::Vector3d corner_of(std::size_t leaf) const {
     const auto [x, y, z] = table_.lower(leaf);
-    return placement_.local(Eigen::Vector3d(x - placement_.base[0], y - placement_.base[1], z - placement_.base[2]));
+    return placement_.local(
+        Eigen::Vector3d(x - placement_.base[0], y - placement_.base[1], z - placement_.base[2]));
   }
 
-  /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more than the
-  /// arithmetic. Those of the leaf below along z came just before.
+  /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more
+  /// than the arithmetic. Those of the leaf below along z came just before.
   void prefetch_samples(std::size_t leaf) const {
     const auto lines = [&](std::int32_t there, int first, int stride, int count) {
       if (there < 0) return;
@@ -173,20 +183,21 @@ class LevelSetContourer {
     lines(table_.neighbour(leaf, 0, -1, 0), 7 * 8, 64, 8);
   }
 
-  /// Samples around the leaf for average placement, which reads those of the upper neighbours that its last cells touch.
+  /// Samples around the leaf for average placement, which reads those of the upper neighbours that its last
+  /// cells touch.
   void find_corner_samples(std::size_t leaf, leaf_kernels::PlaceInput& input) const {
     static thread_local std::array<std::array<float, 512>, 8> tiles;
     std::uint64_t any = 0;
     for (const std::uint64_t word : input.cells->active) any |= word;
-    const unsigned touched = (input.cells->active[7] ? 1 : 0) | (any & kLastY ? 2 : 0) | (any & kLastZ ? 4 : 0);
+    const unsigned touched =
+        (input.cells->active[7] ? 1 : 0) | (any & kLastY ? 2 : 0) | (any & kLastZ ? 4 : 0);
     for (unsigned slot = 0; slot < 8; ++slot) {
       if (slot & ~touched) continue;
       const int dx = slot & 1, dy = slot >> 1 & 1, dz = static_cast<int>(slot >> 2);
       const std::int32_t there = upper_[leaf][slot];
       // A tile is spread out as the samples of a leaf, so that the kernels need not tell the two apart.
       if (there < 0) tiles[slot].fill(table_.value_at(leaf, 8 * dx, 8 * dy, 8 * dz));
-      input.values[neighbour_slot(dx, dy, dz)] =
-          there >= 0 ? table_.values(there) : tiles[slot].data();
+      input.values[neighbour_slot(dx, dy, dz)] = there >= 0 ? table_.values(there) : tiles[slot].data();
     }
   }
 
@@ -259,8 +270,8 @@ bool can_contour_level_set(const DualContouringOptions& options) {
          options.truncation >= leaf_kernels::kLeastTruncation;
 }
 
-PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const DualContouringOptions& options,
-                              RunContext& context) {
+PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue,
+                              const DualContouringOptions& options, RunContext& context) {
   const IndexToWorld placement = placement_of(level_set);
   LevelSet volume = level_set;
   while (true) {
@@ -272,8 +283,8 @@ PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue, const 
     LevelSetContourer contourer(table, sampled, placement, options, context);
     const std::vector<Position> missing = contourer.count();
     if (missing.empty()) return contourer.extract();
-    // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf brings no
-    // crossing edge of its own, so one round is enough; the loop does not rely on it.
+    // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf
+    // brings no crossing edge of its own, so one round is enough; the loop does not rely on it.
     volume = with_leaves(volume, missing);
   }
 }

@@ -16,9 +16,9 @@
 #include <tuple>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
 namespace {
@@ -43,7 +43,8 @@ auto order_in_tree(const std::array<std::int32_t, 3>& lower) {
   return std::tuple(at(12), at(7), at(3));
 }
 
-/// Numbers of the general way's points and quads in the order of the fast one's, and the function that places a point.
+/// Numbers of the general way's points and quads in the order of the fast one's, and the function that places
+/// a point.
 class Correspondence {
  public:
   std::vector<std::uint32_t> points, quads;
@@ -61,15 +62,17 @@ class Correspondence {
     }
     std::vector<std::size_t> order(blocks.size());
     std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return order_in_tree(blocks[a].lower) < order_in_tree(blocks[b].lower); });
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return order_in_tree(blocks[a].lower) < order_in_tree(blocks[b].lower);
+    });
     for (const std::size_t b : order) {
       for (std::uint32_t i = first_point[b]; i < first_point[b + 1]; ++i) points.push_back(i);
       for (std::uint32_t i = first_quad[b]; i < first_quad[b + 1]; ++i) quads.push_back(i);
     }
   }
 
-  /// Root mean square distance of a place from the planes of a cell, in voxels; both by the general way's number.
+  /// Root mean square distance of a place from the planes of a cell, in voxels; both by the general way's
+  /// number.
   double misfit(std::uint32_t point, const Eigen::Vector3d& local) const {
     const auto [b, cell] = cells_[point];
     const HermiteView::Block& block = view_.blocks()[b];
@@ -82,7 +85,8 @@ class Correspondence {
         int p[3] = {cell >> 6, cell >> 3 & 7, cell & 7};
         p[(axis + 1) % 3] += step & 1, p[(axis + 2) % 3] += step >> 1;
         const auto [there, sample] = locate(block.neighbours, p[0], p[1], p[2]);
-        if (there < 0 || !test(view_.blocks()[static_cast<std::size_t>(there)].crossing[axis], sample)) continue;
+        if (there < 0 || !test(view_.blocks()[static_cast<std::size_t>(there)].crossing[axis], sample))
+          continue;
         const EdgeCrossing crossing = view_.crossing(there, sample, axis);
         Eigen::Vector3d place(p[0], p[1], p[2]);
         place[axis] += crossing.offset;
@@ -98,14 +102,17 @@ class Correspondence {
   std::vector<std::pair<std::size_t, int>> cells_;  ///< block and cell of each point
 };
 
-/// Expects both ways to give the same quads around the same cells, but for a share of diagonals; points within 0.002
-/// voxel. Where a place is the best of several within rounding, the other way may take another: then both must fit the
-/// planes equally well, but for a share of cells at the threshold to being let out.
+/// Expects both ways to give the same quads around the same cells, but for a share of diagonals; points
+/// within 0.002 voxel. Where a place is the best of several within rounding, the other way may take another:
+/// then both must fit the planes equally well, but for a share of cells at the threshold to being let out.
 void expect_same_polygons(const LevelSet& volume, double isovalue, Placement placement, std::size_t at_least,
                           double share) {
-  SCOPED_TRACE(placement == Placement::average ? "average" : placement == Placement::optimal ? "optimal" : "unbiased");
+  SCOPED_TRACE(placement == Placement::average   ? "average"
+               : placement == Placement::optimal ? "optimal"
+                                                 : "unbiased");
   const DualContouringOptions options{.placement = placement, .linear_crossings = true};
-  const PolygonMesh general = by_hermite_data(volume, isovalue, options), fast = straight(volume, isovalue, options);
+  const PolygonMesh general = by_hermite_data(volume, isovalue, options),
+                    fast = straight(volume, isovalue, options);
   ASSERT_EQ(fast.points.size(), general.points.size());
   ASSERT_EQ(fast.quads.size(), general.quads.size());
   ASSERT_GE(fast.quads.size(), at_least);
@@ -138,7 +145,8 @@ void expect_same_polygons(const LevelSet& volume, double isovalue, Placement pla
   }
 }
 
-void expect_same_polygons(const LevelSet& volume, double isovalue, std::size_t at_least, double share = 0.01) {
+void expect_same_polygons(const LevelSet& volume, double isovalue, std::size_t at_least,
+                          double share = 0.01) {
   expect_same_polygons(volume, isovalue, Placement::average, at_least, 0.0005);
   for (const Placement placement : {Placement::unbiased, Placement::optimal})
     expect_same_polygons(volume, isovalue, placement, at_least, share);
@@ -189,7 +197,8 @@ class LevelSetContouringTest : public testing::Test {
 };
 
 TEST_F(LevelSetContouringTest, SpheresAcrossNodesOfTheTree) {
-  for (const openvdb::Vec3f centre : {openvdb::Vec3f(-2.3f, 127.6f, 1.7f), openvdb::Vec3f(4095.2f, 0.1f, -128.4f)})
+  for (const openvdb::Vec3f centre :
+       {openvdb::Vec3f(-2.3f, 127.6f, 1.7f), openvdb::Vec3f(4095.2f, 0.1f, -128.4f)})
     expect_same_polygons(make_level_set(sphere(30.0f, centre)), 0.0, 10000);
 }
 
@@ -208,7 +217,8 @@ TEST_F(LevelSetContouringTest, SharpEdgesAndPointsThatLeaveTheirCells) {
 
 TEST_F(LevelSetContouringTest, ATransformThatMirrorsShearsAndIsFarAway) {
   const FloatGrid::Ptr grid = sphere(15.0f, {0.2f, 0.1f, 0.7f});
-  const openvdb::Mat4d matrix(-0.5, 0.1, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.05, 0.0, 0.5, 0.0, 1e6, -2e5, 3.0, 1.0);
+  const openvdb::Mat4d matrix(-0.5, 0.1, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.05, 0.0, 0.5, 0.0, 1e6, -2e5, 3.0,
+                              1.0);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
   expect_same_polygons(make_level_set(grid), 0.0, 3000);
 }
@@ -228,8 +238,8 @@ TEST_F(LevelSetContouringTest, ScatteredActiveSamplesOfAVolumeThatIsNoLevelSet) 
       std::mt19937 random(12);
       std::uniform_real_distribution<float> noise(-1.0f, 1.0f);
       const auto value = [&](int, int, int) { return noise(random); };
-      expect_same_polygons(make_level_set(cube(background, false, value, [&] { return random() % 3 != 0; })), isovalue,
-                           10000, 0.03);
+      expect_same_polygons(make_level_set(cube(background, false, value, [&] { return random() % 3 != 0; })),
+                           isovalue, 10000, 0.03);
     }
 }
 
@@ -271,7 +281,8 @@ TEST_F(LevelSetContouringTest, ABandThatWasClipped) {
 }
 
 TEST_F(LevelSetContouringTest, OnASphereEveryAveragePointIsTheMeanOfItsCellsCrossings) {
-  // One voxel inside at the origin, all others at 1: each of the eight cells around it has three crossings, at 1/4.
+  // One voxel inside at the origin, all others at 1: each of the eight cells around it has three crossings,
+  // at 1/4.
   const FloatGrid::Ptr grid = FloatGrid::create(1.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->tree().setValueOn(Coord(0, 0, 0), -1.0f / 3.0f);

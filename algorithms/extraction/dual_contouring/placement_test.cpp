@@ -20,7 +20,8 @@ using Placement = DualContouringOptions::Placement;
 double six_volumes(const PolygonMesh& mesh) {
   double sum = 0;
   const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    sum += mesh.points[a].cast<double>().dot(mesh.points[b].cast<double>().cross(mesh.points[c].cast<double>()));
+    sum +=
+        mesh.points[a].cast<double>().dot(mesh.points[b].cast<double>().cross(mesh.points[c].cast<double>()));
   };
   for (const Quad& q : mesh.quads) add(q[0], q[1], q[2]), add(q[0], q[2], q[3]);
   return sum;
@@ -43,14 +44,16 @@ Shape torus(double major, double minor, const Vector3d& centre) {
     const Vector3d d = x - centre;
     return d - major * Vector3d(d.x(), d.y(), 0).normalized();
   };
-  return {{.value = [=](const Vector3d& x) { return from_circle(x).norm() - minor; }, .gradient = from_circle},
-          2 * M_PI * M_PI * major * minor * minor};
+  return {
+      {.value = [=](const Vector3d& x) { return from_circle(x).norm() - minor; }, .gradient = from_circle},
+      2 * M_PI * M_PI * major * minor * minor};
 }
 
 /// The part by which a mesh's volume is off, of exact Hermite data.
 double volume_error(const Shape& shape, int size, Placement placement) {
   RunContext context;
-  const FloatHermite hermite = sample_function(shape.surface, {}, {-size, -size, -size}, {size, size, size}, 1e-9, context);
+  const FloatHermite hermite =
+      sample_function(shape.surface, {}, {-size, -size, -size}, {size, size, size}, 1e-9, context);
   const auto view = view_of(hermite, context);
   const PolygonMesh mesh = dual_contouring(view, {.placement = placement}, context);
   return six_volumes(mesh) / 6.0 / shape.volume - 1.0;
@@ -72,18 +75,19 @@ TEST(Placement, AVolumeIsAtLeastSixTimesNearerThanThatOfTheMinimisers) {
 /// The polyhedron within planes of unit normals and distances from the centre.
 AnalyticSurface polyhedron(std::vector<std::pair<Vector3d, double>> planes, const Vector3d& centre) {
   const auto farthest = [=](const Vector3d& x) {
-    return std::ranges::max_element(planes, {}, [&](const auto& plane) {
-      return plane.first.dot(x - centre) - plane.second;
-    });
+    return std::ranges::max_element(
+        planes, {}, [&](const auto& plane) { return plane.first.dot(x - centre) - plane.second; });
   };
-  return {.value = [=](const Vector3d& x) { return farthest(x)->first.dot(x - centre) - farthest(x)->second; },
-          .gradient = [=](const Vector3d& x) -> Vector3d { return farthest(x)->first; }};
+  return {
+      .value = [=](const Vector3d& x) { return farthest(x)->first.dot(x - centre) - farthest(x)->second; },
+      .gradient = [=](const Vector3d& x) -> Vector3d { return farthest(x)->first; }};
 }
 
 std::vector<AnalyticSurface> polyhedra(double size, const Vector3d& centre) {
-  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(0.7, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()) *
-                                Eigen::AngleAxisd(0.35, Vector3d::UnitX()))
-                                   .toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(0.7, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3d::UnitY()) *
+       Eigen::AngleAxisd(0.35, Vector3d::UnitX()))
+          .toRotationMatrix();
   std::vector<std::pair<Vector3d, double>> cube, prism, octahedron;
   for (const double side : {-1.0, 1.0}) {
     for (int axis = 0; axis < 3; ++axis) cube.push_back({turn * Vector3d(side * Vector3d::Unit(axis)), size});
@@ -113,15 +117,20 @@ TEST(Placement, PolyhedraAreReproducedButForSpursBesideCorners) {
           EXPECT_LT(std::abs(off), 0.2);
           spurs += std::abs(off) > 1e-5;
         }
-        // Where a cell's edges miss the third plane of a corner its point lies on the crease of two, beyond the corner.
+        // Where a cell's edges miss the third plane of a corner its point lies on the crease of two, beyond
+        // the corner.
         EXPECT_LE(spurs, 4u) << size;
       }
 }
 
 TEST(Placement, FacesOnTheLatticesPlanesComeOutOnThem) {
   RunContext context;
-  const auto box = polyhedron({{Vector3d(1, 0, 0), 5}, {Vector3d(-1, 0, 0), 3}, {Vector3d(0, 1, 0), 6},
-                               {Vector3d(0, -1, 0), 2}, {Vector3d(0, 0, 1), 4}, {Vector3d(0, 0, -1), 4}},
+  const auto box = polyhedron({{Vector3d(1, 0, 0), 5},
+                               {Vector3d(-1, 0, 0), 3},
+                               {Vector3d(0, 1, 0), 6},
+                               {Vector3d(0, -1, 0), 2},
+                               {Vector3d(0, 0, 1), 4},
+                               {Vector3d(0, 0, -1), 4}},
                               Vector3d::Zero());
   const FloatHermite hermite = sample_function(box, {}, {-12, -12, -12}, {12, 12, 12}, 1e-9, context);
   const auto view = view_of(hermite, context);

@@ -22,9 +22,9 @@ double Qef::error(const Eigen::Vector3d& x) const {
   return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
 }
 
-/// True where the planes are nearly parallel, as in most cells, so that two singular values are dropped for certain.
-/// Then `axis` is the vector of the third one and `value` its square, found by a few products: whatever a start along
-/// the largest column has of the others shrinks by truncation² / 2 in each.
+/// True where the planes are nearly parallel, as in most cells, so that two singular values are dropped for
+/// certain. Then `axis` is the vector of the third one and `value` its square, found by a few products:
+/// whatever a start along the largest column has of the others shrinks by truncation² / 2 in each.
 bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const {
   int largest = 0;
   ata_.diagonal().maxCoeff(&largest);
@@ -42,13 +42,15 @@ bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const
 }
 
 bool Qef::planes_meet(const Eigen::Vector3d& free, const Eigen::Vector3d& held) const {
-  // All but the first test are of sums of squares: a sum bounds its largest term, so no plane is farther than the root.
+  // All but the first test are of sums of squares: a sum bounds its largest term, so no plane is farther than
+  // the root.
   const double least = error(free), there = error(held);
   return turned() >= kFeature && least <= kMeet * kMeet && there > kApart * kApart && there > 100.0 * least;
 }
 
 double Qef::turned() const {
-  // Of a symmetric matrix the squared Frobenius norm is the sum of the squared eigenvalues, and the trace is their sum.
+  // Of a symmetric matrix the squared Frobenius norm is the sum of the squared eigenvalues, and the trace is
+  // their sum.
   const double squared = ata_.trace() * ata_.trace();
   return 0.5 * (squared - ata_.squaredNorm()) / squared;
 }
@@ -65,7 +67,8 @@ Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncat
   Eigen::Vector3d axis;
   double value;
   // A step along the one axis that is kept; across it the start stays where it is.
-  if (is_flat(truncation, axis, value)) return start + axis.dot(atb_ - ata_ * (start - anchor_)) / value * axis;
+  if (is_flat(truncation, axis, value))
+    return start + axis.dot(atb_ - ata_ * (start - anchor_)) / value * axis;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
   const Eigen::Vector3d& values = solver.eigenvalues();  // squares of the singular values of A, ascending
   const Eigen::Vector3d residual = solver.eigenvectors().transpose() * (atb_ - ata_ * (start - anchor_));
@@ -84,7 +87,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved
   // for.
   const Eigen::Vector3d low = lower - anchor_, high = upper - anchor_;
-  // Free coordinates start at the mass point, moved into the box. It also is the answer where no choice is better.
+  // Free coordinates start at the mass point, moved into the box. It also is the answer where no choice is
+  // better.
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
   double best_error = error(anchor_ + mass);

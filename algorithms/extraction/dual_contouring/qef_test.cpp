@@ -83,8 +83,8 @@ TEST(Qef, MassPointAndMinimiserLieAsFarOffACurvedSurfaceToBothSides) {
 
 TEST(Qef, TheShareRisesFromSmoothSurfacesToFeatures) {
   const double smooth = Qef::kShareOfExact;
-  // Four corners of a square of side 1 about the axis: the sum of the products of two eigenvalues over the square of their
-  // sum is k² / 2 for small k, which is 0.7 of the truncation's square at k = 0.118.
+  // Four corners of a square of side 1 about the axis: the sum of the products of two eigenvalues over the
+  // square of their sum is k² / 2 for small k, which is 0.7 of the truncation's square at k = 0.118.
   const auto share = [&](double k) {
     return bowl(k, {{0.5, 0.5}, {-0.5, 0.5}, {-0.5, -0.5}, {0.5, -0.5}}).share_of_minimiser(smooth, 0.1);
   };

@@ -7,9 +7,9 @@
 
 namespace hermesh {
 
-/// Values of type T for the blocks of a lattice. Memory is taken only for blocks that have a value; reading any other
-/// block gives an empty value. Different threads may write different blocks at once, but no block may be read while
-/// another thread may write it.
+/// Values of type T for the blocks of a lattice. Memory is taken only for blocks that have a value; reading
+/// any other block gives an empty value. Different threads may write different blocks at once, but no block
+/// may be read while another thread may write it.
 template <class T>
 class ByBlock {
  public:

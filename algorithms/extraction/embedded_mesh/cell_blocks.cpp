@@ -14,11 +14,12 @@ namespace {
 /// Whether all crossings of an ambiguous face belong to one sheet.
 bool has_one_sheet(const CellSheets& sheets, int face) {
   const std::array<int, 4> edges = face_edges(face);
-  return std::ranges::all_of(edges, [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
+  return std::ranges::all_of(edges,
+                             [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
 }
 
-/// Whether every other corner is inside: to join several faces of such a cell could leave loops that no plane separates
-/// (cell_sheets.h).
+/// Whether every other corner is inside: to join several faces of such a cell could leave loops that no plane
+/// separates (cell_sheets.h).
 bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 
 }  // namespace
@@ -39,8 +40,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     is_plain[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
-  // Count, scan, fill (core/parallel.h): each block finds its active cells by itself, and a prefix sum numbers them, so
-  // that numbers do not depend on threads.
+  // Count, scan, fill (core/parallel.h): each block finds its active cells by itself, and a prefix sum
+  // numbers them, so that numbers do not depend on threads.
   std::vector<std::vector<std::uint8_t>> found(n);
   parallel_blocks(n, context, [&](std::size_t b) {
     Block& block = blocks_[b] = {};
@@ -48,7 +49,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     block.joints = cells_with_cuts(static_cast<std::int32_t>(b));
     for (int word = 0; word < 8; ++word) {
       std::uint64_t all = ~std::uint64_t{0}, some = 0;
-      // Active are cells whose corners differ, eight words at a time, and joints: the ends of a cut may both be inside.
+      // Active are cells whose corners differ, eight words at a time, and joints: the ends of a cut may both
+      // be inside.
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
     }
@@ -71,8 +73,8 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   });
   // How faces are cut decides how many sheets a cell has, so it comes before points are numbered.
   draw_ambiguous_faces(context);
-  // A first sheet's point has its cell's number within the block, which plain_points() relies on; the points of further
-  // sheets come behind. Only special cells can have such.
+  // A first sheet's point has its cell's number within the block, which plain_points() relies on; the points
+  // of further sheets come behind. Only special cells can have such.
   parallel_blocks(n, context, [&](std::size_t b) {
     std::uint16_t later = 0;
     for_each_bit(blocks_[b].special, [&](int cell) {
@@ -87,9 +89,9 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
 }
 
-/// Cuts ambiguous faces first as the normals say, and then those that are pinched the other way. The second pass takes
-/// one face after the other, for what is done to one may help the next one of its cells; and one such pass is enough,
-/// for it parts sheets and joins none.
+/// Cuts ambiguous faces first as the normals say, and then those that are pinched the other way. The second
+/// pass takes one face after the other, for what is done to one may help the next one of its cells; and one
+/// such pass is enough, for it parts sheets and joins none.
 void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   struct Face {
     std::int32_t block;
@@ -100,30 +102,35 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(blocks_[b].special, [&](int cell) {
-      // Each face once, as an upper face of the cell below it. Nothing is marked as joined yet, so sheets() is that of
-      // kCellSheets for all cells without a cut. Faces of joints stay as they are: the lattice draws both of their
-      // sides (fracture/label_repair.h).
+      // Each face once, as an upper face of the cell below it. Nothing is marked as joined yet, so sheets()
+      // is that of kCellSheets for all cells without a cut. Faces of joints stay as they are: the lattice
+      // draws both of their sides (fracture/label_repair.h).
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
-        if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell) && grid_.is_of_one_piece(block, cell, face))
+        if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell) &&
+            grid_.is_of_one_piece(block, cell, face))
           faces[b].push_back({block, cell, face, normals_join(block, cell, face)});
       }
     });
   });
   std::vector<std::uint8_t> joined(codes_.size());  // faces, by active cell
-  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& { return joined[cell_number(at.block, at.cell)]; };
+  const auto joined_faces = [&](const Cell& at) -> std::uint8_t& {
+    return joined[cell_number(at.block, at.cell)];
+  };
   const auto code = [&](const Cell& at) { return codes_[cell_number(at.block, at.cell)]; };
   // Both cells beside a face note how it is cut, so their segments on it agree and the surface stays closed.
   const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
     joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
     joined_faces(upper) ^= static_cast<std::uint8_t>(1 << (face ^ 1));
   };
-  // Both passes run in one thread, in the order of blocks, cells and faces: the second one's outcome depends on it.
+  // Both passes run in one thread, in the order of blocks, cells and faces: the second one's outcome depends
+  // on it.
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
-      if (join && !is_checkerboard(code(lower)) && !is_checkerboard(code(upper))) cut_the_other_way(lower, upper, face);
+      if (join && !is_checkerboard(code(lower)) && !is_checkerboard(code(upper)))
+        cut_the_other_way(lower, upper, face);
     }
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
@@ -139,14 +146,15 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
       const std::size_t at = cell_number(static_cast<std::int32_t>(b), cell);
       if (joined[at] == 0) return;
       blocks_[b].joined[cell >> 6] |= std::uint64_t{1} << (cell & 63);
-      joined_sheets_.at(b).emplace_back(static_cast<std::uint16_t>(cell), cell_sheets(codes_[at], joined[at]));
+      joined_sheets_.at(b).emplace_back(static_cast<std::uint16_t>(cell),
+                                        cell_sheets(codes_[at], joined[at]));
     });
   });
 }
 
-/// Whether the normals say that the inside corners of an ambiguous face are joined: whether the pair of segments that
-/// cuts off the outside corners lies better in the tangent planes through its ends. The segments of an edge or of a
-/// thin wall run along it, whatever the distances along the lattice's edges are.
+/// Whether the normals say that the inside corners of an ambiguous face are joined: whether the pair of
+/// segments that cuts off the outside corners lies better in the tangent planes through its ends. The
+/// segments of an edge or of a thin wall run along it, whatever the distances along the lattice's edges are.
 bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
   const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
   std::array<Eigen::Vector3d, 4> points, normals;
@@ -161,7 +169,8 @@ bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
     const Eigen::Vector3d along = (points[j] - points[i]).normalized();
     return std::abs(normals[i].dot(along)) + std::abs(normals[j].dot(along));
   };
-  const int inside = (codes_[cell_number(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
+  const int inside =
+      (codes_[cell_number(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
   // The two edges that meet in a corner are the one before it and its own; the corner opposite is two on.
   const auto cut_off = [&](int corner) {
     return slant((corner + 3) % 4, corner % 4) + slant((corner + 1) % 4, (corner + 2) % 4);
@@ -183,16 +192,19 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
   return locate(block, at[0], at[1], at[2]);
 }
 
-/// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any of the four
-/// corners of offset 0 along it.
+/// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any
+/// of the four corners of offset 0 along it.
 BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
   if (cuts_.empty()) return {};
-  return cells_with_edges(source_, static_cast<std::size_t>(b),
-                          [&](std::int32_t there) -> const auto& { return cuts_[static_cast<std::size_t>(there)]; });
+  return cells_with_edges(
+      source_, static_cast<std::size_t>(b), [&](std::int32_t there) -> const auto& {
+        return cuts_[static_cast<std::size_t>(there)];
+      });
 }
 
-/// Signs of the corners of every cell of a block, from the first corner's and the crossings on the way that are no
-/// cuts. So no block is asked for its signs but this one, and the upper samples may be where there is no block.
+/// Signs of the corners of every cell of a block, from the first corner's and the crossings on the way that
+/// are no cuts. So no block is asked for its signs but this one, and the upper samples may be where there is
+/// no block.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   static constexpr BlockMask kNone{};
   const HermiteView::Block& block = source_[b];
@@ -220,7 +232,8 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
 
 Eigen::Vector3d CellBlocks::rounding_in_file() const {
   const IndexToWorld& placement = grid_.placement();
-  Eigen::Vector3d farthest = Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
+  Eigen::Vector3d farthest =
+      Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
   // The farthest corner along each axis of the world, for rounding grows with the coordinate.
   const auto include = [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
     for (int corner = 0; corner < 8; ++corner) {
@@ -242,7 +255,8 @@ Eigen::Vector3d CellBlocks::rounding_in_file() const {
   } else {
     for (const HermiteView::Block& block : source_) include(lower_of(block), lower_of(block) + side);
   }
-  // Of single precision about the origin, and of double precision where the file's coordinates lie (FilePoints).
+  // Of single precision about the origin, and of double precision where the file's coordinates lie
+  // (FilePoints).
   const Eigen::Vector3d in_world = farthest * 0x1p-24 + (placement.origin.cwiseAbs() + farthest) * 0x1p-53;
   // Back to voxels: no place moves farther along an axis of the lattice than its row of magnitudes allows.
   return placement.linear.inverse().cwiseAbs() * in_world;
@@ -252,9 +266,11 @@ double CellBlocks::margin_for_rounding() const {
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding_.maxCoeff());
   static_assert(kLargestMargin == 0.25);  // eight times what the error names
   if (!(margin <= kLargestMargin))
-    throw Error("the coordinates of a mesh file cannot hold a mesh of this volume to a thirty-second of a voxel, so "
-                "nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far, or lies too far from "
-                "the origin; resample, divide or move it, or use --extractor dual-contouring");
+    throw Error(
+        "the coordinates of a mesh file cannot hold a mesh of this volume to a thirty-second of a voxel, so "
+        "nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far, or lies too "
+        "far from "
+        "the origin; resample, divide or move it, or use --extractor dual-contouring");
   return margin;
 }
 
@@ -297,8 +313,8 @@ int CellBlocks::crossings_on(const Edge& first, int length) const {
   if (first.block < 0) return 0;
   const BlockMask& crossing = source(first.block).crossing[static_cast<std::size_t>(first.axis)];
   const int word = first.sample >> 6, bit = first.sample & 63;
-  // A mask has a word for each x, in it a row of eight bits for each y: edges along x are 64 bits apart, along y eight,
-  // and along z they follow one another.
+  // A mask has a word for each x, in it a row of eight bits for each y: edges along x are 64 bits apart,
+  // along y eight, and along z they follow one another.
   if (first.axis == 0) {
     int found = 0;
     for (int k = 0; k < length; ++k) found += test(crossing, first.sample + 64 * k);
@@ -353,8 +369,8 @@ bool CellBlocks::comes_first(const Edge& a, const Edge& b) const {
   // By coordinates and not by block numbers: the order is then one of the lattice itself.
   const auto place = [&](const Edge& edge) {
     const auto& lower = source_[edge.block].lower;
-    return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7), lower[2] + (edge.sample & 7),
-                      std::int32_t(edge.axis)};
+    return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7),
+                      lower[2] + (edge.sample & 7), std::int32_t(edge.axis)};
   };
   return place(a) < place(b);
 }

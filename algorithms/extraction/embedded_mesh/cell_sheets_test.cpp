@@ -26,8 +26,7 @@ TEST(CellSheets, SegmentsCloseToLoopsOfCrossedEdges) {
     for (int edge = 0; edge < 12; ++edge) {
       std::array<int, 3> first = edge_offset(edge), second = first;
       second[edge_axis(edge)] = 1;
-      const bool crossed =
-          (((signs >> corner_number(first)) ^ (signs >> corner_number(second))) & 1) != 0;
+      const bool crossed = (((signs >> corner_number(first)) ^ (signs >> corner_number(second))) & 1) != 0;
       int ends = 0;
       for (int face = 0; face < 6; ++face) {
         const int other = cell.partner[face][edge];
@@ -51,7 +50,8 @@ TEST(CellSheets, BothSidesOfAFaceCutItAlike) {
     for (int axis = 0; axis < 3; ++axis)
       for (int pattern = 0; pattern < 16; ++pattern) {
         const int lower = 2 * axis, upper = 2 * axis + 1;
-        int below = 0, above = 0;  // signs of a cell with the face above it, and of the cell on its other side
+        int below = 0,
+            above = 0;  // signs of a cell with the face above it, and of the cell on its other side
         for (int i = 0; i < 4; ++i) {
           below |= ((pattern >> i) & 1) << face_corners(upper)[i];
           above |= ((pattern >> i) & 1) << face_corners(lower)[i];
@@ -127,7 +127,8 @@ TEST(CellSheets, APlaneSeparatesEveryTwoLoops) {
   for (int signs = 0; signs < 256; ++signs)
     for (unsigned joined = 0; joined < 64; ++joined) {
       if (joined & ~unsigned{kCellSheets[signs].ambiguous_faces}) continue;
-      if (joined && kCellSheets[signs].sheets == 4) continue;  // every other corner is inside: the header's exception
+      if (joined && kCellSheets[signs].sheets == 4)
+        continue;  // every other corner is inside: the header's exception
       ++patterns;
       const CellSheets cell = cell_sheets(signs, joined);
       for (int a = 0; a < cell.sheets; ++a)

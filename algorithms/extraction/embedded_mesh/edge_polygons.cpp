@@ -25,13 +25,13 @@ std::vector<CellBlocks::Cell> listed(const ByBlock<BlockMask>& masks) {
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                            RunContext& context)
     : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()), centred_(cells.size()) {
-  // Each block decides for its own edges and writes nothing else, by points of cells that are all there: so the result
-  // does not depend on threads.
+  // Each block decides for its own edges and writes nothing else, by points of cells that are all there: so
+  // the result does not depend on threads.
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (only_ && !only_->has(b)) return;
-    // Nearly all edges lie among plain cells. Their points are looked up once for the block, and crossings are read in
-    // one go: both are asked for by the order of edges.
+    // Nearly all edges lie among plain cells. Their points are looked up once for the block, and crossings
+    // are read in one go: both are asked for by the order of edges.
     PlainPoints near;
     near.read(cells_, block);
     std::array<EdgeCrossing, 3 * 512> crossings;
@@ -59,8 +59,8 @@ bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
 
 void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                         RunContext& context) {
-  // All are marked before any edge decides: an edge looks at all four cells around it. Edges of one cell may be in
-  // several blocks, so this runs in one thread; there are few such cells.
+  // All are marked before any edge decides: an edge looks at all four cells around it. Edges of one cell may
+  // be in several blocks, so this runs in one thread; there are few such cells.
   for (const CellBlocks::Cell& cell : cells) set(held_.at(static_cast<std::size_t>(cell.block)), cell.cell);
   decide_again(cells, points, context);
 }
@@ -100,7 +100,8 @@ void EdgePolygons::number_all(RunContext& context) {
       const int fans = count(fanned), all = count(edges(block, axis));
       crossing_points[b] += static_cast<std::uint64_t>(fans);
       quads[b] += static_cast<std::uint64_t>(all - fans);
-      // An edge without explicit faces has four triangles, one that speaks for its segments more, others fewer.
+      // An edge without explicit faces has four triangles, one that speaks for its segments more, others
+      // fewer.
       for_each_bit(fanned, [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
         triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
@@ -121,8 +122,8 @@ void EdgePolygons::number_all(RunContext& context) {
   }
 }
 
-/// How many triangles polygons_of() makes of a fanned edge: 0 where the other ends of its segments speak for all of
-/// them.
+/// How many triangles polygons_of() makes of a fanned edge: 0 where the other ends of its segments speak for
+/// all of them.
 int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const {
   int made = 0;
   for (int i = 0; i < 4; ++i) {
@@ -170,7 +171,8 @@ std::uint32_t EdgePolygons::crossing_point(const CellBlocks::Edge& edge) const {
   const BlockEdges& edges = of(edge.block);
   // Points on fanned edges are numbered by block, axis and sample.
   std::uint32_t number = edges.first_crossing_point;
-  for (int axis = 0; axis < edge.axis; ++axis) number += static_cast<std::uint32_t>(count(edges.fanned[axis]));
+  for (int axis = 0; axis < edge.axis; ++axis)
+    number += static_cast<std::uint32_t>(count(edges.fanned[axis]));
   return number + rank_in(edges.fanned[edge.axis], edge.sample);
 }
 

@@ -1,5 +1,5 @@
-// The polygons of each crossing edge of a lattice: a quad of the points of its four cells, or a fan (uniform_mesh.h says
-// why no two of them meet).
+// The polygons of each crossing edge of a lattice: a quad of the points of its four cells, or a fan
+// (uniform_mesh.h says why no two of them meet).
 #pragma once
 
 #include <array>
@@ -18,12 +18,12 @@ namespace hermesh {
 /// Edges of a lattice as bits: for each block and axis a bit for each first sample.
 using EdgeMasks = ByBlock<std::array<BlockMask, 3>>;
 
-/// What each crossing edge becomes, a quad or a fan, and the numbers of points and polygons that follow from it. Points
-/// are those of CellBlocks, and behind them one for each fanned edge, at its crossing.
+/// What each crossing edge becomes, a quad or a fan, and the numbers of points and polygons that follow from
+/// it. Points are those of CellBlocks, and behind them one for each fanned edge, at its crossing.
 class EdgePolygons {
  public:
-  /// Decides for each edge what it becomes, by the places of the cells' points. Points on fanned edges get the numbers
-  /// from cells.point_count() on. No cell is held yet.
+  /// Decides for each edge what it becomes, by the places of the cells' points. Points on fanned edges get
+  /// the numbers from cells.point_count() on. No cell is held yet.
   /// @param cells must outlive this
   /// @param points places of the cells' points, in index space relative to the placement's base
   /// @param only the crossing edges that have polygons here, all if null; must outlive this
@@ -39,11 +39,14 @@ class EdgePolygons {
 
   /// Whether the cell would have explicit faces of its own if it were held to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
-  /// Whether more than four cells that can be held are among the 27 about this one. There, as nearly everywhere in
-  /// noise, a point finds no room to move.
+  /// Whether more than four cells that can be held are among the 27 about this one. There, as nearly
+  /// everywhere in noise, a point finds no room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
-  bool is_held(const CellBlocks::Cell& cell) const { return test(held_[static_cast<std::size_t>(cell.block)], cell.cell); }
-  /// Holds cells to their segments, and decides anew for the edges around them. Throws as the constructor does.
+  bool is_held(const CellBlocks::Cell& cell) const {
+    return test(held_[static_cast<std::size_t>(cell.block)], cell.cell);
+  }
+  /// Holds cells to their segments, and decides anew for the edges around them. Throws as the constructor
+  /// does.
   void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
 
@@ -76,12 +79,13 @@ class EdgePolygons {
   /// The number of the point on a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
-  /// Calls quad(Quad) or triangle(Triangle) for the polygons of an edge, counter-clockwise seen from outside (at a cut
-  /// from the edge's second sample). Where two fanned edges share a segment, only the one that comes first
-  /// (CellBlocks::comes_first()) has the two triangles beside it. `near` has the points about the edge's block, or is
-  /// null where they are not at hand.
+  /// Calls quad(Quad) or triangle(Triangle) for the polygons of an edge, counter-clockwise seen from outside
+  /// (at a cut from the edge's second sample). Where two fanned edges share a segment, only the one that
+  /// comes first (CellBlocks::comes_first()) has the two triangles beside it. `near` has the points about the
+  /// edge's block, or is null where they are not at hand.
   template <class OnQuad, class OnTriangle>
-  void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle, const PlainPoints* near = nullptr) const {
+  void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle,
+                   const PlainPoints* near = nullptr) const {
     const bool outwards = test(cells_.source(edge.block).inside, edge.sample);  // along the axis
     if (!is_fanned(edge)) {
       std::array<std::uint32_t, 4> p;
@@ -118,7 +122,8 @@ class EdgePolygons {
   };
 
   bool is_explicit(const CellBlocks::Around& around, int i) const {
-    return cells_.can_be_explicit(around, i) && (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
+    return cells_.can_be_explicit(around, i) &&
+           (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
   }
   const BlockEdges& of(std::int32_t block) const { return edges_[static_cast<std::size_t>(block)]; }
   BlockEdges& of(std::int32_t block) { return edges_.at(static_cast<std::size_t>(block)); }
@@ -133,7 +138,8 @@ class EdgePolygons {
   const CellBlocks& cells_;
   const EdgeMasks* const only_;
   ByBlock<BlockEdges> edges_;
-  ByBlock<BlockMask> held_;  ///< held cells; apart from `edges_`, for this is read across blocks while those are made
+  ByBlock<BlockMask>
+      held_;  ///< held cells; apart from `edges_`, for this is read across blocks while those are made
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
   ByBlock<BlockMask> centred_;  ///< centred cells
 };

@@ -48,8 +48,8 @@ EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
   if (!heights[0] && !heights[1]) return {.height = hit};
   const auto cut = [&](int d) { return EnvelopeCut{false, d, *heights[d]}; };
   if (!heights[0] || !heights[1]) return cut(heights[1] ? 1 : 0);
-  // The split must follow a crease. The crossing itself lies on the surface, so the diagonal is right whose triangles
-  // pass nearer to it; where both do, the shorter one makes the better triangles.
+  // The split must follow a crease. The crossing itself lies on the surface, so the diagonal is right whose
+  // triangles pass nearer to it; where both do, the shorter one makes the better triangles.
   constexpr double kAlike = 1e-4;
   const double off[2] = {std::abs(*heights[0] - hit), std::abs(*heights[1] - hit)};
   if (std::abs(off[0] - off[1]) > kAlike) return cut(off[1] < off[0]);

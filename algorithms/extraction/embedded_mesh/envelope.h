@@ -5,9 +5,9 @@
 
 namespace hermesh {
 
-/// A corner of the polygon in the edge's own frame, whose unit is the edge's length: `u` along axis (axis + 1) % 3, `v`
-/// along (axis + 2) % 3 and `h` along the axis, from the edge's start. Corners go around the edge counter-clockwise
-/// seen against its axis.
+/// A corner of the polygon in the edge's own frame, whose unit is the edge's length: `u` along axis (axis +
+/// 1) % 3, `v` along (axis + 2) % 3 and `h` along the axis, from the edge's start. Corners go around the edge
+/// counter-clockwise seen against its axis.
 struct EnvelopeCorner {
   double u, v, h;
 };
@@ -19,13 +19,13 @@ struct EnvelopeCut {
   double height = 0.0;  ///< where the edge passes through the polygon, in lengths of the edge
 };
 
-/// Cuts a quad. Among the diagonals that keep both triangles in the envelope it takes the one that passes nearer to the
-/// crossing, or the shorter one where both are as near (Ju & Udeshi 2006); where neither keeps them there the quad is
-/// fanned. `hit` is where the surface crosses the edge, in lengths of the edge.
+/// Cuts a quad. Among the diagonals that keep both triangles in the envelope it takes the one that passes
+/// nearer to the crossing, or the shorter one where both are as near (Ju & Udeshi 2006); where neither keeps
+/// them there the quad is fanned. `hit` is where the surface crosses the edge, in lengths of the edge.
 EnvelopeCut cut_quad(const std::array<EnvelopeCorner, 4>& corners, double hit);
 
-/// Tests the triangle of an edge that three cells are around: fanned where the edge does not pass through it. `hit` is
-/// as for cut_quad().
+/// Tests the triangle of an edge that three cells are around: fanned where the edge does not pass through it.
+/// `hit` is as for cut_quad().
 EnvelopeCut cut_triangle(const std::array<EnvelopeCorner, 3>& corners, double hit);
 
 }  // namespace hermesh

@@ -18,7 +18,8 @@ TEST(Envelope, FlatQuadIsCutAlongAnyDiagonal) {
 
 TEST(Envelope, DiagonalThatPassesNearerToTheCrossingIsTaken) {
   // Corners 0 and 2 are high, 1 and 3 low: the two diagonals pass the edge at 0.7 and at 0.3.
-  const EnvelopeCut high = cut_quad(around(0.7, 0.3, 0.7, 0.3), 0.65), low = cut_quad(around(0.7, 0.3, 0.7, 0.3), 0.35);
+  const EnvelopeCut high = cut_quad(around(0.7, 0.3, 0.7, 0.3), 0.65),
+                    low = cut_quad(around(0.7, 0.3, 0.7, 0.3), 0.35);
   EXPECT_FALSE(high.fanned);
   EXPECT_FALSE(low.fanned);
   EXPECT_NEAR(high.height, 0.7, 1e-9);

@@ -1,6 +1,6 @@
-// Points as the file will hold them, seen from index space: PolygonMesh::world(), the sum in double precision of the
-// placement's origin and of single precision about it. Far from the world's zero that sum rounds, too; about zero itself
-// it is single precision (STL).
+// Points as the file will hold them, seen from index space: PolygonMesh::world(), the sum in double precision
+// of the placement's origin and of single precision about it. Far from the world's zero that sum rounds, too;
+// about zero itself it is single precision (STL).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,15 +27,19 @@ class FilePoints {
     }
   }
 
-  /// The coordinates that the file holds for a place of index space: world units, relative to the placement's origin.
-  Eigen::Vector3f in_file(const Eigen::Vector3d& index) const { return placement_.local(index).cast<float>(); }
+  /// The coordinates that the file holds for a place of index space: world units, relative to the placement's
+  /// origin.
+  Eigen::Vector3f in_file(const Eigen::Vector3d& index) const {
+    return placement_.local(index).cast<float>();
+  }
   /// Returns the index coordinates, relative to the placement's base, of the point nearest to the place that
   /// the file can hold, after the place was moved into the caps. A place in a cell stays in the cell: each
   /// cell of the surface has a part within the caps.
   Eigen::Vector3d rounded(const Eigen::Vector3d& index) const {
     const Eigen::Vector3d within = index.cwiseMax(lower_).cwiseMin(upper_);
     const Eigen::Vector3d written = placement_.origin + in_file(within).cast<double>();
-    // The difference is exact, for the origin is zero or several times as far from zero as points are from it.
+    // The difference is exact, for the origin is zero or several times as far from zero as points are from
+    // it.
     return to_index_ * ((written - placement_.origin) - placement_.offset);
   }
   const IndexToWorld& placement() const { return placement_; }

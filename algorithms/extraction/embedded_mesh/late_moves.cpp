@@ -22,7 +22,8 @@ constexpr double kLeastArea = 1e-4;
 /// A point this near to where it would rather be, in voxels, is not worth a move.
 constexpr double kFulfilled = 1e-3;
 
-/// More than rounding to the file's precision may move a place, in voxels: a place is tried as the file will hold it.
+/// More than rounding to the file's precision may move a place, in voxels: a place is tried as the file will
+/// hold it.
 constexpr double kBoxMargin = 0.05;
 
 /// How often all points are tried: one move makes room for another.
@@ -95,7 +96,8 @@ class Star {
     return true;
   }
 
-  /// Whether the star meets no triangle around it. Those nearby are only looked for where a place has got so far.
+  /// Whether the star meets no triangle around it. Those nearby are only looked for where a place has got so
+  /// far.
   bool meets_nothing() {
     if (!nearby_) {
       nearby_.emplace();
@@ -169,8 +171,9 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
                  UniformPoints& points, RunContext& context) {
   Stage stage(context, "move points");
   const PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
-  // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most six samples away,
-  // and have their points in cells at most seven away. So blocks of one parity, eight apart, do not see one another's moves.
+  // A point's polygons end two voxels from its cell. Those that might meet them belong to edges at most six
+  // samples away, and have their points in cells at most seven away. So blocks of one parity, eight apart, do
+  // not see one another's moves.
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells.size(), context, [&](std::size_t b) {
@@ -181,11 +184,13 @@ void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
         Star star(cells, mesh, points);
         for (const PointTarget& target : targets[b]) {
           const Vector3d from = points[cells.point(block, target.cell, 0)];
-          if ((target.place - from).norm() < kFulfilled || polygons.is_crowded({block, target.cell})) continue;
+          if ((target.place - from).norm() < kFulfilled || polygons.is_crowded({block, target.cell}))
+            continue;
           star.gather(block, target.cell, {target.place, target.nearer});
-          const Vector3d between = 0.5 * (target.place + target.nearer), halfway = 0.5 * (from + target.nearer);
-          // From the best place to the least move: the target, half way from it to the nearer place, that, and the way
-          // there by halves.
+          const Vector3d between = 0.5 * (target.place + target.nearer),
+                         halfway = 0.5 * (from + target.nearer);
+          // From the best place to the least move: the target, half way from it to the nearer place, that,
+          // and the way there by halves.
           for (const Vector3d& place :
                {target.place, between, target.nearer, halfway, Vector3d(0.5 * (from + halfway))}) {
             if ((place - from).norm() < kFulfilled) break;

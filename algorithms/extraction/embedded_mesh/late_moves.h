@@ -1,5 +1,5 @@
-// Points of the finest mesh that could not leave their cells by the rule of tetrahedra (uniform_mesh.h), moved one by one
-// where the mesh as it is shows that nothing meets.
+// Points of the finest mesh that could not leave their cells by the rule of tetrahedra (uniform_mesh.h),
+// moved one by one where the mesh as it is shows that nothing meets.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,8 @@
 
 namespace hermesh {
 
-/// Where the point of a cell of one sheet, or of a joint, would rather be, outside of its cell; index space relative to
-/// the placement's base.
+/// Where the point of a cell of one sheet, or of a joint, would rather be, outside of its cell; index space
+/// relative to the placement's base.
 struct PointTarget {
   int cell;
   Eigen::Vector3d place;

@@ -9,8 +9,8 @@
 
 namespace hermesh {
 
-/// The points of the plain cells in and just below a block: cells with one sheet, no ambiguous face and no cut. One
-/// object serves many blocks, one after another.
+/// The points of the plain cells in and just below a block: cells with one sheet, no ambiguous face and no
+/// cut. One object serves many blocks, one after another.
 class PlainPoints {
  public:
   /// Looks up the points for the edges of a block.
@@ -31,8 +31,8 @@ class PlainPoints {
         }
     }
   }
-  /// Sets `points` as CellBlocks::plain_points() does, for a crossing edge of the block that was read; false where one
-  /// of the four cells is not plain.
+  /// Sets `points` as CellBlocks::plain_points() does, for a crossing edge of the block that was read; false
+  /// where one of the four cells is not plain.
   bool around(const CellBlocks::Edge& edge, std::array<std::uint32_t, 4>& points) const {
     constexpr std::size_t kStep[3] = {81, 9, 1};
     const std::size_t first = at(edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7);
@@ -46,8 +46,8 @@ class PlainPoints {
   static std::size_t at(int x, int y, int z) {
     return static_cast<std::size_t>(81 * (x + 1) + 9 * (y + 1) + z + 1);
   }
-  std::array<std::uint32_t, 729>
-      point_;  ///< points of cells from −1 to 7 along each axis; only those about crossing edges mean something
+  std::array<std::uint32_t, 729> point_;  ///< points of cells from −1 to 7 along each axis; only those about
+                                          ///< crossing edges mean something
 };
 
 }  // namespace hermesh

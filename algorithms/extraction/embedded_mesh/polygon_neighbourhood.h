@@ -11,19 +11,19 @@
 #include <span>
 #include <vector>
 
-#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/contact/triangle_contact.h"
 #include "algorithms/extraction/contact/triangle_grid.h"
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
 
-/// How far any point may be from its cell along an axis, in voxels. It bounds where the polygons near a place may
-/// start, so that they are found through the lattice.
+/// How far any point may be from its cell along an axis, in voxels. It bounds where the polygons near a place
+/// may start, so that they are found through the lattice.
 inline constexpr double kFarthestFromCell = 1.0;
 
-/// The triangles of the finest mesh by the block of their edge. A block's triangles are listed when somebody first asks
-/// for one of them, from any thread.
+/// The triangles of the finest mesh by the block of their edge. A block's triangles are listed when somebody
+/// first asks for one of them, from any thread.
 class PolygonNeighbourhood {
  public:
   /// All arguments by reference must outlive this.
@@ -52,9 +52,9 @@ class PolygonNeighbourhood {
     for (const Triangle& t : list_of(edge.block).triangles_of(number_of(edge))) f(t);
   }
 
-  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than three
-  /// voxels out of the block. The triangles of an edge lie in the box of its four cells and `farthest` around it, so
-  /// their edges begin at most five samples below the block or six above its last.
+  /// Calls f(edge, triangle) for all triangles whose boxes overlap this one, which must not reach more than
+  /// three voxels out of the block. The triangles of an edge lie in the box of its four cells and `farthest`
+  /// around it, so their edges begin at most five samples below the block or six above its last.
   template <class F>
   void for_each_near(std::int32_t block, const Bounds& box, F&& f) const {
     const Eigen::Vector3d origin = cells_.corner(block, 0);
@@ -120,8 +120,8 @@ class PolygonNeighbourhood {
     return *before;  // another thread has made the same meanwhile
   }
 
-  /// Calls f(edge, triangle) for the crossing edges that begin at samples from z to `end` of one row of a block: eight
-  /// bits of a mask.
+  /// Calls f(edge, triangle) for the crossing edges that begin at samples from z to `end` of one row of a
+  /// block: eight bits of a mask.
   template <class F>
   void for_each_in_row(std::int32_t block, int x, int y, int z, int end, const Bounds& box, F&& f) const {
     const CellBlocks::Cell row = cells_.locate(block, x, y, z & ~7);
@@ -135,14 +135,16 @@ class PolygonNeighbourhood {
       std::uint32_t number = number_of({row.block, row.cell + std::countr_zero(bits), axis});
       for (; bits != 0; bits &= bits - 1, ++number)
         for (const Triangle& t : list.triangles_of(number))
-          if (box.overlaps(box_of(t))) f(CellBlocks::Edge{row.block, row.cell + std::countr_zero(bits), axis}, t);
+          if (box.overlaps(box_of(t)))
+            f(CellBlocks::Edge{row.block, row.cell + std::countr_zero(bits), axis}, t);
     }
   }
 
   const CellBlocks& cells_;
   const EdgePolygons& polygons_;
   const UniformPoints& points_;
-  const double reach_;  ///< how far the triangles of an edge may be from its first sample along an axis, voxels
+  const double
+      reach_;  ///< how far the triangles of an edge may be from its first sample along an axis, voxels
   mutable std::vector<std::atomic<const List*>> lists_;  ///< one per block; null until it is asked for
 };
 

@@ -25,8 +25,8 @@ bool operator<(const CellBlocks::Edge& a, const CellBlocks::Edge& b) {
   return std::tie(a.block, a.axis, a.sample) < std::tie(b.block, b.axis, b.sample);
 }
 
-/// The edges that are yet to be tested, and the cells that may be held for them. Its loops over blocks are parallel,
-/// and each step writes only what belongs to its own block.
+/// The edges that are yet to be tested, and the cells that may be held for them. Its loops over blocks are
+/// parallel, and each step writes only what belongs to its own block.
 class Trials {
  public:
   Trials(const CellBlocks& cells, EdgePolygons& polygons, const FilePoints& file, UniformPoints& points,
@@ -49,8 +49,8 @@ class Trials {
     for (const CellBlocks::Cell& cell : tried_) mark_edges(cell);
   }
 
-  /// The cells that can be held and have a pinched face, across which there is a joint: held to their segments, they
-  /// leave no edge with four polygons.
+  /// The cells that can be held and have a pinched face, across which there is a joint: held to their
+  /// segments, they leave no edge with four polygons.
   Cells pinched() const {
     Cells found;
     std::ranges::copy_if(tried_, std::back_inserter(found), [&](const CellBlocks::Cell& cell) {
@@ -162,17 +162,20 @@ class Trials {
       if (is_wanted(cell)) found.push_back(cell);
     };
     for (const CellBlocks::Cell& cell : at_edge)
-      if (std::ranges::any_of(at_other, [&](const CellBlocks::Cell& c) { return c.block == cell.block && c.cell == cell.cell; }))
+      if (std::ranges::any_of(at_other, [&](const CellBlocks::Cell& c) {
+            return c.block == cell.block && c.cell == cell.cell;
+          }))
         add(cell);
     for (const auto* cells : {&at_edge, &at_other})
       if (found.size() == before) std::ranges::for_each(*cells, add);
     for (int steps = 1; found.size() == before && steps <= 2; ++steps)
-      for (const CellBlocks::Edge& at : {edge, other}) cells_.for_each_about({at.block, at.sample}, steps, add);
+      for (const CellBlocks::Edge& at : {edge, other})
+        cells_.for_each_about({at.block, at.sample}, steps, add);
     return found.size() > before;
   }
 
-  /// Whether a polygon of the edge meets another one; adds the tried cells near the first that does. Of two edges that
-  /// are to be tested the first one asks.
+  /// Whether a polygon of the edge meets another one; adds the tried cells near the first that does. Of two
+  /// edges that are to be tested the first one asks.
   bool meets(const CellBlocks::Edge& edge, Cells& found) const {
     bool any = false;
     mesh_.for_each_triangle(edge, [&](const Triangle& t) {
@@ -180,7 +183,8 @@ class Trials {
       bool itself = false;
       mesh_.for_each_near(edge.block, mesh_.box_of(t), [&](const CellBlocks::Edge& other, const Triangle& u) {
         if (any || (other < edge && test(untested_[other.block][other.axis], other.sample))) return;
-        // The search finds the triangle itself, once; a second one with the same corners is another and meets it.
+        // The search finds the triangle itself, once; a second one with the same corners is another and meets
+        // it.
         if (t == u && !itself) {
           itself = true;
         } else if (!mesh_.apart(t, u)) {

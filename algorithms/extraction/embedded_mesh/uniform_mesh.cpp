@@ -20,14 +20,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and root mean
-/// square: next to a feature that passes outside.
+/// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and
+/// root mean square: next to a feature that passes outside.
 constexpr double kWorthLeavingCell = 0.03;
 
 /// A place within the cell that is as near to the planes as this will do, in voxels and root mean square.
 constexpr double kGoodEnough = 0.005;
 
-/// What a determinant whose terms are of the order of one must exceed to be called positive: far above rounding.
+/// What a determinant whose terms are of the order of one must exceed to be called positive: far above
+/// rounding.
 constexpr double kLeastVolume = 1e-5;
 
 /// Six times the signed volume of a tetrahedron, voxels cubed.
@@ -39,8 +40,8 @@ double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 /// (leaf_kernels::RecordCube). One object serves many blocks, one after another.
 class CellRecords {
  public:
-  /// Reads the crossings of a block and of the lower layers of those above. False where a normal is none, as in data
-  /// without normals.
+  /// Reads the crossings of a block and of the lower layers of those above. False where a normal is none, as
+  /// in data without normals.
   bool read(const CellBlocks& cells, std::int32_t block) {
     // The cube is large and mostly empty: only what the block before has written is cleared.
     for (const int number : written_) std::fill_n(records_[static_cast<std::size_t>(number)].data(), 4, 0.0f);
@@ -48,8 +49,8 @@ class CellRecords {
     bool all_unit = true;
     cells.grid().crossings(block, own_.data());
     const EdgeCrossing* next = own_.data();
-    // Slot 0 is the block itself. From a block above, its cells have edges that start in the layer next to it, and none
-    // along an axis by which that block lies above: those begin beyond the cells.
+    // Slot 0 is the block itself. From a block above, its cells have edges that start in the layer next to
+    // it, and none along an axis by which that block lies above: those begin beyond the cells.
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
       const std::int32_t there =
@@ -110,8 +111,9 @@ class UniformContourer {
   const UniformCounts& counts() const { return counts_; }
 
   UniformMesh run(RunContext& context) {
-    // The proof of the header speaks of points that lie within their cells or whose tetrahedra stay positive: those of
-    // the first two steps. Polygons are made by these. Late moves keep the polygons and change places alone.
+    // The proof of the header speaks of points that lie within their cells or whose tetrahedra stay positive:
+    // those of the first two steps. Polygons are made by these. Late moves keep the polygons and change
+    // places alone.
     place_all_points(context);
     let_points_leave(context);
     const EdgePolygons polygons = connect(nullptr, context);
@@ -129,10 +131,12 @@ class UniformContourer {
   /// Places the points of all active cells, in place of whatever points there are.
   void place_all_points(RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
-    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active_mask(); }, context);
+    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active_mask(); },
+                    context);
   }
 
-  /// Places the points of the cells in `wanted`: active ones, a mask per block, whose points are not there yet.
+  /// Places the points of the cells in `wanted`: active ones, a mask per block, whose points are not there
+  /// yet.
   void place_points(std::span<const BlockMask> wanted, RunContext& context) {
     parallel_blocks(wanted.size(), context, [&](std::size_t b) {
       for_each_bit(wanted[b], [&](int cell) {
@@ -145,14 +149,15 @@ class UniformContourer {
     place_points_of([&](std::size_t b) { return wanted[b]; }, context);
   }
 
-  /// Makes the polygons of `edges`, all crossing ones if null. The points of fanned edges come behind those of cells.
+  /// Makes the polygons of `edges`, all crossing ones if null. The points of fanned edges come behind those
+  /// of cells.
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, points_, edges, context);
     }();
-    // A later call is for more edges of the same cells: to hold others than the first time would make other polygons
-    // where there are some already.
+    // A later call is for more edges of the same cells: to hold others than the first time would make other
+    // polygons where there are some already.
     if (held_) {
       polygons.centre(centred_);
       if (!held_->empty()) polygons.hold(*held_, points_, context);
@@ -199,8 +204,8 @@ class UniformContourer {
     for (const std::uint32_t found : several) counts_.several_sheets += found;
   }
 
-  /// Places most of a block's wanted cells by vector code: plain ones, and in optimal placement only those whose planes
-  /// are nearly parallel. Returns which; all others are left to the code for single cells.
+  /// Places most of a block's wanted cells by vector code: plain ones, and in optimal placement only those
+  /// whose planes are nearly parallel. Returns which; all others are left to the code for single cells.
   BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted) {
     BlockMask placed{};
     const bool average = options_.placement == DualContouringOptions::Placement::average;
@@ -218,7 +223,8 @@ class UniformContourer {
       point[found] = cells_.point(block, at, 0);
       cell[found++] = static_cast<std::uint16_t>(at);
     });
-    // The last vector reads on: what it finds there must be cells, and what it makes of them is not looked at.
+    // The last vector reads on: what it finds there must be cells, and what it makes of them is not looked
+    // at.
     for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
     float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
     const leaf_kernels::PlainCells plain{records.data(), cell.data(), static_cast<int>(found)};
@@ -226,15 +232,16 @@ class UniformContourer {
       kernels_.place_mean(plain, out);
       is_placed.fill(1);
     } else {
-      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the target. Where
-      // they may not, any error will do.
-      kernels_.place_flat(plain,
-                          {.truncation = static_cast<float>(options_.truncation),
-                           .smooth_share = static_cast<float>(options_.smooth_share()),
-                           .margin = static_cast<float>(cells_.margin()),
-                           .most_error = static_cast<float>(reach_ > 0 ? kWorthLeavingCell * kWorthLeavingCell : 1e6),
-                           .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
-                          out, is_placed.data());
+      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the
+      // target. Where they may not, any error will do.
+      kernels_.place_flat(
+          plain,
+          {.truncation = static_cast<float>(options_.truncation),
+           .smooth_share = static_cast<float>(options_.smooth_share()),
+           .margin = static_cast<float>(cells_.margin()),
+           .most_error = static_cast<float>(reach_ > 0 ? kWorthLeavingCell * kWorthLeavingCell : 1e6),
+           .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
+          out, is_placed.data());
     }
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
@@ -260,8 +267,9 @@ class UniformContourer {
     return best_place(block, cell, qef, corner);
   }
 
-  /// The place of a sheet's point, within the cell, and noted if it would be better off outside. With several sheets it
-  /// is the mean of the loop's crossings: in their hull, which no other loop's hull meets (cell_sheets.h).
+  /// The place of a sheet's point, within the cell, and noted if it would be better off outside. With several
+  /// sheets it is the mean of the loop's crossings: in their hull, which no other loop's hull meets
+  /// (cell_sheets.h).
   Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
     const CellSheets& loops = cells_.sheets(block, cell);
     const Vector3d corner = cells_.corner(block, cell);
@@ -271,7 +279,8 @@ class UniformContourer {
     for (int edge = 0; edge < 12; ++edge) {
       if (sheets > 1 && loops.sheet_of[edge] != sheet) continue;
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
-      // A joint of one point has all crossing edges of its cell, its cuts included, of which sheet_of does not tell.
+      // A joint of one point has all crossing edges of its cell, its cuts included, of which sheet_of does
+      // not tell.
       if (sheets == 1 && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
       const Vector3d point = cells_.crossing_point(at, crossing);
@@ -284,19 +293,22 @@ class UniformContourer {
     return best_place(block, cell, qef, corner);
   }
 
-  /// The place within the cell, margin() off its faces, with the least error, drawn back on smooth surfaces. If even that is
-  /// far from the planes, as beside a sharp feature that passes outside, or if these meet elsewhere, the free minimiser is
-  /// aimed at.
+  /// The place within the cell, margin() off its faces, with the least error, drawn back on smooth surfaces.
+  /// If even that is far from the planes, as beside a sharp feature that passes outside, or if these meet
+  /// elsewhere, the free minimiser is aimed at.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
-    const Vector3d free = qef.minimiser(options_.truncation), mass = qef.mass_point().cwiseMax(lower).cwiseMin(upper);
+    const Vector3d free = qef.minimiser(options_.truncation),
+                   mass = qef.mass_point().cwiseMax(lower).cwiseMin(upper);
     const double share = qef.share_of_minimiser(options_.smooth_share(), options_.truncation);
-    // To clamp the minimiser is cheap, and mostly good enough; the search over faces, edges and corners is not.
+    // To clamp the minimiser is cheap, and mostly good enough; the search over faces, edges and corners is
+    // not.
     const Vector3d nearest = free.cwiseMax(lower).cwiseMin(upper);
     // From a level set planes never meet exactly, and whether they nearly do is chance.
     const bool meet = reach_ > 0 && !options_.linear_crossings && qef.planes_meet(free, nearest);
-    if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) return mass + share * (nearest - mass);
+    if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes())
+      return mass + share * (nearest - mass);
     const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
     if (reach_ > 0 && (qef.error(held) > kWorthLeavingCell * kWorthLeavingCell * qef.planes() ||
                        (meet && qef.planes_meet(free, held)))) {
@@ -310,8 +322,9 @@ class UniformContourer {
     return mass + share * (held - mass);
   }
 
-  /// Lets points leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their points move
-  /// independently of one another: eight rounds, with the same result whatever the order within each.
+  /// Lets points leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their
+  /// points move independently of one another: eight rounds, with the same result whatever the order within
+  /// each.
   void let_points_leave(RunContext& context) {
     Stage stage(context, "let points leave");
     for (int parity = 0; parity < 8; ++parity)
@@ -323,7 +336,8 @@ class UniformContourer {
       });
   }
 
-  /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather be outside.
+  /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather
+  /// be outside.
   template <class F>
   void for_each_with_target(F&& f) const {
     for (std::size_t b = 0; b < cells_.size(); ++b)
@@ -335,8 +349,9 @@ class UniformContourer {
       }
   }
 
-  /// Moves the point of one cell as far towards its target as its 24 tetrahedra stay positive. Cells with explicit faces,
-  /// and those beside such, keep to their cells: the cones over their segments need it (uniform_mesh.h).
+  /// Moves the point of one cell as far towards its target as its 24 tetrahedra stay positive. Cells with
+  /// explicit faces, and those beside such, keep to their cells: the cones over their segments need it
+  /// (uniform_mesh.h).
   void leave(std::int32_t block, const PointTarget& target) {
     if (cells_.has_explicit_face(block, target.cell)) return;
     Vector3d& point = points_[cells_.point(block, target.cell, 0)];
@@ -359,8 +374,8 @@ class UniformContourer {
     }
   }
 
-  /// The point of the cell beyond a face, the middle of one that the surface does not pass through (no polygon uses it,
-  /// but the tetrahedra do), or none if that cell has an explicit face.
+  /// The point of the cell beyond a face, the middle of one that the surface does not pass through (no
+  /// polygon uses it, but the tetrahedra do), or none if that cell has an explicit face.
   std::optional<Vector3d> point_beside(std::int32_t block, int cell, int face) const {
     int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
     const int step = face & 1 ? 1 : -1;
@@ -420,12 +435,13 @@ class UniformContourer {
     });
   }
 
-  /// Writes the number of each polygon's edge. Blocks count their crossing edges in the order in which fill() makes the
-  /// polygons.
+  /// Writes the number of each polygon's edge. Blocks count their crossing edges in the order in which fill()
+  /// makes the polygons.
   void number_polygons(const EdgePolygons& polygons, const UniformMesh& mesh, RunContext& context) {
     std::vector<std::uint64_t> first(cells_.size());
     for (std::size_t b = 0; b < cells_.size(); ++b)
-      for (const BlockMask& edges : cells_.grid().blocks()[b].crossing) first[b] += static_cast<std::uint64_t>(count(edges));
+      for (const BlockMask& edges : cells_.grid().blocks()[b].crossing)
+        first[b] += static_cast<std::uint64_t>(count(edges));
     exclusive_scan(first, "edge crossings");
     numbers_->quads.resize(mesh.quads.size());
     numbers_->triangles.resize(mesh.triangles.size());
@@ -451,8 +467,8 @@ class UniformContourer {
   std::vector<std::vector<PointTarget>> targets_;  ///< one list per block, ascending by cell
   UniformPoints points_;
   UniformCounts counts_;
-  /// The cells held, found when polygons are made first: all edges that the answer depends on are among those asked for
-  /// then, and ever after.
+  /// The cells held, found when polygons are made first: all edges that the answer depends on are among those
+  /// asked for then, and ever after.
   std::optional<std::vector<CellBlocks::Cell>> held_;
   std::vector<CellBlocks::Cell> centred_;  ///< likewise
 };
@@ -474,8 +490,8 @@ class HermiteCells : public CellGrid {
 
 }  // namespace
 
-UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
-                         RunContext& context) {
+UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options,
+                         const FilePoints& file, RunContext& context) {
   return uniform_mesh(HermiteCells(grid), options, file, context);
 }
 

@@ -38,12 +38,12 @@
 //                  edge, let p be at (p₁, p₂) and q at (−q₁, q₂), all four at least 7/8 of the margin. Before
 //                  rounding, six times the volume of either part is (p₁q₂ + p₂q₁)/2 ≥ 7/16 margin · s, where
 //                  s = max(p₁ + q₁, p₂ + q₂). An eighth of the margin off the edge along both axes, x changes
-//                  it by 1/4 margin · s at most. In mean placement a point may be at 5/24 of the margin; there
-//                  rounding must be below a nineteenth of the margin, which is not checked. A point leaves its
-//                  cell only if enough room remains. The step is at most twice as long as necessary, or 1/2048
-//                  voxel; therefore x is in the hull of
-//                  the crossing and the four points, or as near to it as that. Fans around cells of several
-//                  sheets or with ambiguous faces are tested instead.
+//                  it by 1/4 margin · s at most. In mean placement a point may be at 5/24 of the margin;
+//                  there rounding must be below a nineteenth of the margin, which is not checked. A point
+//                  leaves its cell only if enough room remains. The step is at most twice as long as
+//                  necessary, or 1/2048 voxel; therefore x is in the hull of the crossing and the four
+//                  points, or as near to it as that. Fans around cells of several sheets or with ambiguous
+//                  faces are tested instead.
 //   explicit face  The polygons of held cells are tested, too. A held cell whose polygons still meet others
 //   is
 //                  *centred*: its crossings move to the middles of their edges, and the points of all sheets
@@ -67,8 +67,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
-#include <utility>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
@@ -89,8 +89,8 @@ struct UniformCounts {
   std::uint64_t held = 0;            ///< cells coned over explicit segments, the last resort
   std::uint64_t fanned_edges = 0;    ///< crossing edges that became four triangles or more
   std::uint64_t escaped = 0;         ///< points outside their cells
-  /// Joints of several sheets, by block and cell, whose polygons may meet others: that no two polygons meet is promised
-  /// only if there are none.
+  /// Joints of several sheets, by block and cell, whose polygons may meet others: that no two polygons meet
+  /// is promised only if there are none.
   std::vector<std::pair<std::int32_t, int>> meeting_joints;
 };
 
@@ -103,13 +103,14 @@ struct UniformMesh {
   UniformCounts counts;
 };
 
-/// The uniform mesh of Hermite data: one point for each sheet of a cell. Creases and corners are kept as far as the QEF
-/// sees them and a point may leave its cell: by kFarthestFromCell at most, whatever the options' reach. The same bytes
-/// for every number of threads.
-/// @throws Error if there are more points or polygons than 32 bits can number, or if a file cannot hold the points
+/// The uniform mesh of Hermite data: one point for each sheet of a cell. Creases and corners are kept as far
+/// as the QEF sees them and a point may leave its cell: by kFarthestFromCell at most, whatever the options'
+/// reach. The same bytes for every number of threads.
+/// @throws Error if there are more points or polygons than 32 bits can number, or if a file cannot hold the
+/// points
 ///   (CellBlocks); Cancelled
-UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options, const FilePoints& file,
-                         RunContext& context);
+UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options,
+                         const FilePoints& file, RunContext& context);
 
 /// The uniform mesh of points that keep to their cells (`reach` is 0), made only where it is asked for.
 class UniformCells {
@@ -123,14 +124,16 @@ class UniformCells {
   const UniformPoints& points() const;
   /// Counts of what was made so far.
   const UniformCounts& counts() const;
-  /// Places the points of the active cells in `wanted`, a mask per block, that are not there yet. @throws Cancelled
+  /// Places the points of the active cells in `wanted`, a mask per block, that are not there yet. @throws
+  /// Cancelled
   void place(std::span<const BlockMask> wanted, RunContext& context);
-  /// Places the points of all cells, which takes less time than if they were asked for one by one. Nothing may have
-  /// been placed before. @throws Cancelled
+  /// Places the points of all cells, which takes less time than if they were asked for one by one. Nothing
+  /// may have been placed before. @throws Cancelled
   void place_all(RunContext& context);
-  /// Makes the polygons of crossing edges all of whose cells have their points, and the points on the edges that are
-  /// fanned.
-  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must be among
+  /// Makes the polygons of crossing edges all of whose cells have their points, and the points on the edges
+  /// that are fanned.
+  /// @param edges which; all if null. All edges of cells that have several sheets or an ambiguous face must
+  /// be among
   ///   them, and those within two cells of one: else nothing is promised. They must outlive the result.
   /// @param context told of progress, and asked whether to stop
   /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled
@@ -141,14 +144,15 @@ class UniformCells {
   std::unique_ptr<Made> made_;
 };
 
-/// The edge that each polygon belongs to, by its number among the crossing edges: ascending by block, axis and sample.
+/// The edge that each polygon belongs to, by its number among the crossing edges: ascending by block, axis
+/// and sample.
 struct PolygonEdges {
   std::vector<std::uint32_t> quads, triangles;
 };
 
-/// The uniform mesh of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the edge's
-/// second sample. `edges`, where it is not null, is told of the edge that each polygon belongs to. Throws as the
-/// function for Hermite data does.
+/// The uniform mesh of a lattice that may have cuts. A polygon at a cut is counter-clockwise seen from the
+/// edge's second sample. `edges`, where it is not null, is told of the edge that each polygon belongs to.
+/// Throws as the function for Hermite data does.
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context, PolygonEdges* edges = nullptr);
 

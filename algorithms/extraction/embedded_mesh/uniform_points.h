@@ -11,9 +11,9 @@
 
 namespace hermesh {
 
-/// Places of points by number, those of cells first and then those on fanned edges (uniform_mesh.h); index space
-/// relative to the placement's base. Where few are wanted there is memory only for these, a run of eight numbers at a
-/// time: what merges needs no point, but what does not lies scattered among it.
+/// Places of points by number, those of cells first and then those on fanned edges (uniform_mesh.h); index
+/// space relative to the placement's base. Where few are wanted there is memory only for these, a run of
+/// eight numbers at a time: what merges needs no point, but what does not lies scattered among it.
 class UniformPoints {
  public:
   /// Room for all of `count` points, in one piece.
@@ -45,8 +45,8 @@ class UniformPoints {
     const std::atomic_ref asked(asked_[run / 64]);
     if (!(asked.load(std::memory_order_relaxed) & bit)) asked.fetch_or(bit, std::memory_order_relaxed);
   }
-  /// Makes room for all points that were asked for, in ascending order of their numbers, so that the outcome does not
-  /// depend on who asked first. Places that are there keep their values, but move in memory.
+  /// Makes room for all points that were asked for, in ascending order of their numbers, so that the outcome
+  /// does not depend on who asked first. Places that are there keep their values, but move in memory.
   void make_room() {
     std::size_t runs = 0, slot = places_.size();
     for (const std::uint64_t asked : asked_) runs += static_cast<std::size_t>(std::popcount(asked));

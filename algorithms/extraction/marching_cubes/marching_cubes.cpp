@@ -33,9 +33,9 @@ class Leaves {
   const LeafTable& table() const { return table_; }
 
   /// Calls f(x, y, z, pattern) for each active cell that the leaf owns, with its first corner relative to the
-  /// leaf. A leaf owns the cells that start in it. The surface may also pass through cells that start beside the
-  /// leaves and reach into one; of all leaves that the block of such cells touches above, the first in the order
-  /// of is_first_above() owns them.
+  /// leaf. A leaf owns the cells that start in it. The surface may also pass through cells that start beside
+  /// the leaves and reach into one; of all leaves that the block of such cells touches above, the first in
+  /// the order of is_first_above() owns them.
   template <class F>
   void for_each_active_cell(std::size_t leaf, F&& f) const {
     for_each_active_cell_of_block(leaf, {0, 0, 0}, f);
@@ -46,17 +46,19 @@ class Leaves {
     }
   }
 
-  /// The sample at (x, y, z) from a leaf's first, each 0 to 8; negative inside, in units of the volume's values.
+  /// The sample at (x, y, z) from a leaf's first, each 0 to 8; negative inside, in units of the volume's
+  /// values.
   double signed_value(std::size_t leaf, int x, int y, int z) const {
     const std::int32_t there = table_.neighbour(leaf, x >> 3, y >> 3, z >> 3);
     // An edge that ends in a tile is rare, so that a search through the tree is no matter.
-    const float value = there < 0 ? table_.value_at(leaf, x, y, z)
-                                  : table_.values(there)[sample_index(x & 7, y & 7, z & 7)];
+    const float value =
+        there < 0 ? table_.value_at(leaf, x, y, z) : table_.values(there)[sample_index(x & 7, y & 7, z & 7)];
     return double(table_.rule().scale) * (double(value) - isovalue_);
   }
 
  private:
-  /// Signs of the eight corners of the cells that start in the block at `offset` (in blocks, each 0 or −1) from a leaf.
+  /// Signs of the eight corners of the cells that start in the block at `offset` (in blocks, each 0 or −1)
+  /// from a leaf.
   std::array<BlockMask, 8> corner_signs(std::size_t leaf, const std::array<int, 3>& offset) const {
     std::array<BlockMask, 8> corner;
     for (int c = 0; c < 8; ++c)
@@ -71,7 +73,8 @@ class Leaves {
   /// Whether `leaf` comes first among the leaves in the blocks above the block at `offset`.
   bool is_first_above(std::size_t leaf, const std::array<int, 3>& offset) const {
     for (int above = 1; above < 8; ++above) {
-      const int dx = offset[0] + (above & 1), dy = offset[1] + (above >> 1 & 1), dz = offset[2] + (above >> 2);
+      const int dx = offset[0] + (above & 1), dy = offset[1] + (above >> 1 & 1),
+                dz = offset[2] + (above >> 2);
       if (dx == 0 && dy == 0 && dz == 0) return true;
       if (table_.neighbour(leaf, dx, dy, dz) >= 0) return false;
     }
@@ -91,7 +94,8 @@ class Leaves {
     for_each_bit(active, [&](int sample) {
       int pattern = 0;
       for (int c = 0; c < 8; ++c) pattern |= static_cast<int>(test(corner[c], sample)) << c;
-      f(8 * offset[0] + (sample >> 6), 8 * offset[1] + (sample >> 3 & 7), 8 * offset[2] + (sample & 7), pattern);
+      f(8 * offset[0] + (sample >> 6), 8 * offset[1] + (sample >> 3 & 7), 8 * offset[2] + (sample & 7),
+        pattern);
     });
   }
 
@@ -100,10 +104,10 @@ class Leaves {
   const double isovalue_;
 };
 
-/// Where the surface meets an edge of a leaf, 0 to 1 along it: by linear interpolation of the samples, or, where there
-/// are crossings, theirs, which are in the order of the edges.
-void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* hermite, const LeafOutput& output,
-                  PolygonMesh& mesh) {
+/// Where the surface meets an edge of a leaf, 0 to 1 along it: by linear interpolation of the samples, or,
+/// where there are crossings, theirs, which are in the order of the edges.
+void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* hermite,
+                  const LeafOutput& output, PolygonMesh& mesh) {
   const IndexToWorld& placement = leaves.placement();
   const std::array<std::int32_t, 3> lower = leaves.table().lower(leaf);
   const SignLeaf* signs = hermite ? hermite->find(lower) : nullptr;
@@ -126,7 +130,8 @@ void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* he
 void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<LeafOutput>& outputs,
                      PolygonMesh& mesh) {
   const bool mirrors = leaves.placement().mirrors();
-  // Points of neighbouring leaves are known by number alone, from their ranks, whether or not they are written yet.
+  // Points of neighbouring leaves are known by number alone, from their ranks, whether or not they are
+  // written yet.
   Triangle* next = mesh.triangles.data() + outputs[leaf].first_triangle;
   leaves.for_each_active_cell(leaf, [&](int x, int y, int z, int pattern) {
     const CellTriangles& cell = kTriangulation[pattern];
@@ -134,15 +139,16 @@ void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<L
       for (int corner = 0; corner < 3; ++corner) {
         const CellEdge edge = kCellEdges[cell.triangles[t][mirrors ? 2 - corner : corner]];
         // An edge that changes sign starts in a leaf, as the table promises.
-        const LatticePlace at = leaves.table().locate(
-            leaf, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1), z + (edge.first_corner >> 2));
+        const LatticePlace at =
+            leaves.table().locate(leaf, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1),
+                                  z + (edge.first_corner >> 2));
         (*next)[corner] = outputs[static_cast<std::size_t>(at.block)].point_on(edge.axis, at.sample);
       }
   });
 }
 
-/// Exact crossings through the representation that needs no more than offsets (§2.7), or none if the samples are to be
-/// interpolated.
+/// Exact crossings through the representation that needs no more than offsets (§2.7), or none if the samples
+/// are to be interpolated.
 std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
   if (input.options.text("crossings") == "samples") return std::nullopt;
   const auto sampled = [&] {
@@ -164,8 +170,8 @@ PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const Flo
     Stage stage(context, "read signs");
     return Leaves(level_set, isovalue, context);
   }();
-  // Count, scan, fill (core/parallel.h): a leaf writes its own entry, then its own range of points and triangles. The
-  // order of the mesh is that of the leaves, whatever the threads do.
+  // Count, scan, fill (core/parallel.h): a leaf writes its own entry, then its own range of points and
+  // triangles. The order of the mesh is that of the leaves, whatever the threads do.
   std::vector<LeafOutput> outputs(leaves.size());
   std::vector<std::uint64_t> points(leaves.size()), triangles(leaves.size());
   {
@@ -183,7 +189,8 @@ PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const Flo
   mesh.origin = leaves.placement().origin;
   mesh.points.resize(exclusive_scan(points, "points"));
   mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
-  // From here on point_on() gives numbers of the mesh. The fill reads the outputs of other leaves and changes none.
+  // From here on point_on() gives numbers of the mesh. The fill reads the outputs of other leaves and changes
+  // none.
   for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
     outputs[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
     outputs[leaf].first_triangle = static_cast<std::uint32_t>(triangles[leaf]);
@@ -202,11 +209,12 @@ PolygonMesh marching_cubes(const ExtractionInput& input) {
 }
 
 std::vector<OptionSpec> marching_cubes_options() {
-  return {{"crossings",
-           "samples",
-           "where points go: 'samples' interpolates the level set, 'exact' takes the polygons' hits as directed "
-           "distances",
-           {"samples", "exact"}}};
+  return {
+      {"crossings",
+       "samples",
+       "where points go: 'samples' interpolates the level set, 'exact' takes the polygons' hits as directed "
+       "distances",
+       {"samples", "exact"}}};
 }
 
 }  // namespace hermesh

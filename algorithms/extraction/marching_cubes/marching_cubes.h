@@ -16,8 +16,8 @@ inline constexpr double kCrossingMargin = 1.0 / 1024.0;
 /// neighbouring surface sheets within one cell may touch. No triangle degenerates: three points inside three
 /// edges of a cell lie on a line only if one edge holds two of them.
 ///
-/// Points interpolate the samples along their edges, or, if there are `crossings`, which must be those of the same level
-/// set and isovalue, take their offsets (directed distances, Aldén 2011, §2.7).
+/// Points interpolate the samples along their edges, or, if there are `crossings`, which must be those of the
+/// same level set and isovalue, take their offsets (directed distances, Aldén 2011, §2.7).
 PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const FloatHermite* crossings,
                            RunContext& context);
 

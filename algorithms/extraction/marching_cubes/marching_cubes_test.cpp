@@ -93,7 +93,8 @@ TEST(MarchingCubes, ASampleAtTheIsovalueIsOutside) {
 TEST(MarchingCubes, ABandOfOneVoxelIsEnough) {
   using namespace voxelize_for_tests;
   // Where a face lies on samples, the other end of its edges is a whole voxel away, and so beyond the band.
-  for (const PolygonMesh& solid : {sphere({0.3, -0.2, 0.1}, 9.7), sphere({0, 0, 0}, 5.0, 140), box({-8, -8, -8}, {8, 8, 8})}) {
+  for (const PolygonMesh& solid :
+       {sphere({0.3, -0.2, 0.1}, 9.7), sphere({0, 0, 0}, 5.0, 140), box({-8, -8, -8}, {8, 8, 8})}) {
     const auto mesh = [&](double band) {
       RunContext context;
       const Voxelization made = run(solid, {.exterior_band = band, .interior_band = band});

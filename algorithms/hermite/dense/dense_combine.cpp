@@ -25,14 +25,15 @@ namespace {
 using openvdb::Coord;
 using openvdb::Index;
 
-/// Calls f(slot) for every slot of an internal node, in parallel. 64 slots share a word of the masks of the node, so a
-/// task gets whole words: no two threads write to one.
+/// Calls f(slot) for every slot of an internal node, in parallel. 64 slots share a word of the masks of the
+/// node, so a task gets whole words: no two threads write to one.
 template <class Node, class F>
 void for_each_slot(const RunContext& context, F&& f) {
-  tbb::parallel_for(tbb::blocked_range<Index>(0, Node::NUM_VALUES / 64), [&](const tbb::blocked_range<Index>& words) {
-    context.check();
-    for (Index slot = 64 * words.begin(); slot < 64 * words.end(); ++slot) f(slot);
-  });
+  tbb::parallel_for(tbb::blocked_range<Index>(0, Node::NUM_VALUES / 64),
+                    [&](const tbb::blocked_range<Index>& words) {
+                      context.check();
+                      for (Index slot = 64 * words.begin(); slot < 64 * words.end(); ++slot) f(slot);
+                    });
 }
 
 template <class Node>
@@ -97,8 +98,8 @@ struct Operand {
   bool alone;
 
   explicit Operand(DenseHermite<Voxel>&& hermite) {
-    // The operand was passed by value: if it was moved in, and was the only one that held the tree, nobody else can
-    // see a change.
+    // The operand was passed by value: if it was moved in, and was the only one that held the tree, nobody
+    // else can see a change.
     const auto dense = std::move(hermite.tree);
     tree = dense->grid->treePtr();
     // The pointers here are counted, too.
@@ -154,15 +155,18 @@ class Merge {
   using Root = typename Tree::RootNodeType;
   using Leaf = typename Tree::LeafNodeType;
 
-  Merge(Boolean boolean, bool steals, const RunContext& context) : rule_(boolean), steals_(steals), context_(context) {}
+  Merge(Boolean boolean, bool steals, const RunContext& context)
+      : rule_(boolean), steals_(steals), context_(context) {}
 
   void merge_roots(Root& a, Root& b) const {
     using Upper = typename Root::ChildNodeType;
-    // One after the other: the root is a map that no two threads may change. There are few places, and what lies below
-    // each is merged in parallel.
+    // One after the other: the root is a map that no two threads may change. There are few places, and what
+    // lies below each is merged in parallel.
     for (const Coord& place : places(a, b)) {
-      Upper *const of_a = a.template probeNode<Upper>(place), *const of_b = b.template probeNode<Upper>(place);
-      const bool inside_a = !of_a && a.getValue(place).inside(), inside_b = !of_b && b.getValue(place).inside();
+      Upper *const of_a = a.template probeNode<Upper>(place), *const of_b =
+                                                                  b.template probeNode<Upper>(place);
+      const bool inside_a = !of_a && a.getValue(place).inside(),
+                 inside_b = !of_b && b.getValue(place).inside();
       if (of_a && of_b)
         merge(*of_a, *of_b);
       else if (of_b && rule_.keeps_b(inside_a))
@@ -196,8 +200,9 @@ class Merge {
     return result;
   }
 
-  /// Merges an internal node of `b` into one of `a`. Where one of them is uniform, its sign decides whether the other's
-  /// branch is kept or the result is uniform, too; in that case the sign that stands for the branch does not matter.
+  /// Merges an internal node of `b` into one of `a`. Where one of them is uniform, its sign decides whether
+  /// the other's branch is kept or the result is uniform, too; in that case the sign that stands for the
+  /// branch does not matter.
   template <class Node>
   void merge(Node& a, Node& b) const {
     for_each_slot<Node>(context_, [&](Index slot) {
@@ -218,7 +223,8 @@ class Merge {
       merge(of_a, of_b);
     } else {
       merge_leaves(of_a, of_b);
-      // Whether a leaf that lost crossings owns an edge can be told only when its neighbours are done; see Pruning.
+      // Whether a leaf that lost crossings owns an edge can be told only when its neighbours are done; see
+      // Pruning.
       if constexpr (!kLosesCrossings<Voxel>)
         if (const auto sign = uniform_sign(of_a)) set_tile(a, slot, *sign);
     }
@@ -233,7 +239,8 @@ class Merge {
     for (Index x = 0; x < 8; ++x) {
       std::uint64_t& word = active.template getWord<std::uint64_t>(x);
       const std::uint64_t either = word | b.getValueMask().template getWord<std::uint64_t>(x);
-      const std::uint64_t inside_a = signs(to + 64 * x), inside = rule_.inside(inside_a, signs(from + 64 * x));
+      const std::uint64_t inside_a = signs(to + 64 * x),
+                          inside = rule_.inside(inside_a, signs(from + 64 * x));
       // A voxel is active if an edge of it is still crossed.
       word = 0;
       for_each_bit_of_word(either, [&](Index i) {
@@ -252,8 +259,8 @@ class Merge {
   const RunContext& context_;
 };
 
-/// Turns nodes without leaves into tiles, so that what is left has one form only, which is that of a DenseHermite made
-/// from SparseHermite.
+/// Turns nodes without leaves into tiles, so that what is left has one form only, which is that of a
+/// DenseHermite made from SparseHermite.
 template <class Tree>
 class Pruning {
  public:
@@ -283,10 +290,11 @@ class Pruning {
   }
 
  private:
-  /// Turns leaves that own no crossing edge into tiles. All are judged before the first is removed, since the voxels
-  /// beyond them matter.
+  /// Turns leaves that own no crossing edge into tiles. All are judged before the first is removed, since the
+  /// voxels beyond them matter.
   void prune_leaves() {
-    // Lowest internal nodes in parallel, each with a list of its own; the tree is changed when all lists are complete.
+    // Lowest internal nodes in parallel, each with a list of its own; the tree is changed when all lists are
+    // complete.
     std::vector<Lower*> nodes;
     tree_.getNodes(nodes);
     std::vector<std::vector<std::pair<Index, bool>>> tiles(nodes.size());
@@ -325,13 +333,15 @@ void with_rules(NormalCodeId id, F&& f) {
 template <class Voxel>
 DenseHermite<Voxel> with_tree(const IndexToWorld& placement, NormalCodeId code,
                               typename DenseGrid<Voxel>::TreeType::Ptr tree) {
-  return {placement, code, std::make_shared<const DenseTree<Voxel>>(DenseTree<Voxel>{DenseGrid<Voxel>::create(tree)})};
+  return {placement, code,
+          std::make_shared<const DenseTree<Voxel>>(DenseTree<Voxel>{DenseGrid<Voxel>::create(tree)})};
 }
 
 }  // namespace
 
 template <DenseVoxel Voxel>
-DenseHermite<Voxel> combine(Boolean boolean, DenseHermite<Voxel> a, DenseHermite<Voxel> b, RunContext& context) {
+DenseHermite<Voxel> combine(Boolean boolean, DenseHermite<Voxel> a, DenseHermite<Voxel> b,
+                            RunContext& context) {
   if (!same_lattice(a.placement, b.placement))
     throw Error("Hermite data on different lattices cannot be combined; sample both with the same voxels");
   // Only FixedVoxel has a choice of codes; the other layouts have none or always the same one.

@@ -11,8 +11,8 @@
 #include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/dense/dense_tree.h"
 #include "algorithms/hermite/dense/dense_voxel_rules.h"
-#include "algorithms/hermite/test_lattice.h"
 #include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/test_lattice.h"
 
 namespace hermesh {
 namespace {
@@ -25,12 +25,14 @@ template <class Node>
 bool same_nodes(const Node& a, const Node& b) {
   if constexpr (Node::LEVEL == 0) {
     return a.getValueMask() == b.getValueMask() &&
-           std::memcmp(a.buffer().data(), b.buffer().data(), Node::SIZE * sizeof(typename Node::ValueType)) == 0;
+           std::memcmp(a.buffer().data(), b.buffer().data(), Node::SIZE * sizeof(typename Node::ValueType)) ==
+               0;
   } else {
     if (a.getChildMask() != b.getChildMask() || a.getValueMask() != b.getValueMask()) return false;
     for (openvdb::Index slot = 0; slot < Node::NUM_VALUES; ++slot) {
       const auto &in_a = a.getTable()[slot], &in_b = b.getTable()[slot];
-      if (a.isChildMaskOn(slot) ? !same_nodes(*in_a.getChild(), *in_b.getChild()) : in_a.getValue() != in_b.getValue())
+      if (a.isChildMaskOn(slot) ? !same_nodes(*in_a.getChild(), *in_b.getChild())
+                                : in_a.getValue() != in_b.getValue())
         return false;
     }
     return true;
@@ -40,8 +42,10 @@ bool same_nodes(const Node& a, const Node& b) {
 template <class Voxel>
 testing::AssertionResult same(const DenseHermite<Voxel>& a, const DenseHermite<Voxel>& b) {
   const auto &root_a = a.tree->grid->tree().root(), &root_b = b.tree->grid->tree().root();
-  if (root_a.background() != root_b.background()) return testing::AssertionFailure() << "infinity differs in sign";
-  if (root_a.getTableSize() != root_b.getTableSize()) return testing::AssertionFailure() << "roots differ in size";
+  if (root_a.background() != root_b.background())
+    return testing::AssertionFailure() << "infinity differs in sign";
+  if (root_a.getTableSize() != root_b.getTableSize())
+    return testing::AssertionFailure() << "roots differ in size";
   if (a.leaves() != b.leaves())
     return testing::AssertionFailure() << "leaves differ, " << a.leaves() << " and " << b.leaves();
   auto tile_b = root_b.cbeginValueAll();
@@ -115,8 +119,8 @@ TYPED_TEST(DenseCombine, TheSameAsSparseForRandomVoxels) {
   for (int trial = 0; trial < 3; ++trial) {
     const FloatHermite a = random_voxels(random, 32), b = random_voxels(random, 32);
     for (const Boolean boolean : kBooleans)
-      EXPECT_TRUE(
-          same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)), expected<TypeParam>(boolean, a, b)));
+      EXPECT_TRUE(same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)),
+                       expected<TypeParam>(boolean, a, b)));
   }
 }
 
@@ -126,8 +130,8 @@ TYPED_TEST(DenseCombine, TheSameAsSparseForSolids) {
     const FloatHermite a = to_sparse(sample_solid(random_blobs(random))),
                        b = to_sparse(sample_solid(random_blobs(random)));
     for (const Boolean boolean : kBooleans)
-      EXPECT_TRUE(
-          same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)), expected<TypeParam>(boolean, a, b)));
+      EXPECT_TRUE(same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)),
+                       expected<TypeParam>(boolean, a, b)));
   }
 }
 
@@ -135,7 +139,8 @@ TYPED_TEST(DenseCombine, LawsHold) {
   std::mt19937 random(23);
   for (int trial = 0; trial < 4; ++trial) {
     const auto make = [&] {
-      return dense<TypeParam>(trial % 2 ? random_voxels(random, 24) : to_sparse(sample_solid(random_blobs(random))));
+      return dense<TypeParam>(trial % 2 ? random_voxels(random, 24)
+                                        : to_sparse(sample_solid(random_blobs(random))));
     };
     const auto a = make(), b = make(), c = make(), not_a = this->turned(a), not_b = this->turned(b);
     const auto unite = [&](const auto& p, const auto& q) { return this->run(Boolean::unite, p, q); };
@@ -174,12 +179,13 @@ TYPED_TEST(DenseCombine, BranchesInDifferentNodesOfTheRoot) {
   for (const int axis : {0, 2}) {
     FloatHermite there = here;
     for (SignLeaf& leaf : there.leaves) leaf.lower[axis] += 10000;
-    const FloatHermite not_here = complement(here, context), both = combine(Boolean::unite, here, there, context);
+    const FloatHermite not_here = complement(here, context),
+                       both = combine(Boolean::unite, here, there, context);
     for (const Boolean boolean : kBooleans) {
-      for (const auto& [a, b] : {std::pair(here, there), std::pair(there, not_here), std::pair(not_here, there),
-                                 std::pair(both, here), std::pair(there, both)})
-        EXPECT_TRUE(
-            same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)), expected<TypeParam>(boolean, a, b)));
+      for (const auto& [a, b] : {std::pair(here, there), std::pair(there, not_here),
+                                 std::pair(not_here, there), std::pair(both, here), std::pair(there, both)})
+        EXPECT_TRUE(same(this->run(boolean, dense<TypeParam>(a), dense<TypeParam>(b)),
+                         expected<TypeParam>(boolean, a, b)));
     }
   }
 }
@@ -204,7 +210,8 @@ TYPED_TEST(DenseCombine, OperandsMovedInGiveUpTheirNodesAndSharedOnesAreLeftAlon
   EXPECT_EQ(leaves(moved), before);
   EXPECT_TRUE(same(moved, shared));
   auto copy = moved;
-  EXPECT_TRUE(same(combine(Boolean::subtract, moved, std::move(copy), context), dense<TypeParam>(FloatHermite{})));
+  EXPECT_TRUE(
+      same(combine(Boolean::subtract, moved, std::move(copy), context), dense<TypeParam>(FloatHermite{})));
 }
 
 TYPED_TEST(DenseCombine, TheSameForEveryNumberOfThreads) {
@@ -212,7 +219,8 @@ TYPED_TEST(DenseCombine, TheSameForEveryNumberOfThreads) {
   const auto a = dense<TypeParam>(random_voxels(random, 64)), b = dense<TypeParam>(random_voxels(random, 64));
   const auto once = this->run(Boolean::subtract, a, b);
   for (const int threads : {1, 5}) {
-    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                              static_cast<std::size_t>(threads));
     EXPECT_TRUE(same(this->run(Boolean::subtract, a, b), once));
   }
 }
@@ -304,14 +312,16 @@ std::size_t differences(const ThesisDense& a, const ThesisDense& b, int lower = 
   const auto &tree_a = a.tree->grid->tree(), &tree_b = b.tree->grid->tree();
   for (int x = lower; x < lower + size; ++x)
     for (int y = lower; y < lower + size; ++y)
-      for (int z = lower; z < lower + size; ++z) result += tree_a.getValue({x, y, z}) != tree_b.getValue({x, y, z});
+      for (int z = lower; z < lower + size; ++z)
+        result += tree_a.getValue({x, y, z}) != tree_b.getValue({x, y, z});
   return result;
 }
 
 template <class Voxel>
 DenseHermite<Voxel> run(Boolean boolean, const Solid& a, const Solid& b) {
   RunContext context;
-  return combine(boolean, dense<Voxel>(to_sparse(sample_solid(a))), dense<Voxel>(to_sparse(sample_solid(b))), context);
+  return combine(boolean, dense<Voxel>(to_sparse(sample_solid(a))), dense<Voxel>(to_sparse(sample_solid(b))),
+                 context);
 }
 ThesisDense turned(const ThesisDense& a) {
   RunContext context;
@@ -335,8 +345,8 @@ Solid tilted_slab(double x0, double bottom, double top) {
 }
 
 TEST(ThesisCombine, IsTheRuleWhereNothingIsLostAndNothingMeets) {
-  // All normals are along the axes, those of edges along x and y in x and y, and no edge is crossed by both operands
-  // against each other.
+  // All normals are along the axes, those of edges along x and y in x and y, and no edge is crossed by both
+  // operands against each other.
   const Solid a = box(8.3, 9.2, 9.4, 6.1, 7.3, 5.2), b = box(14.2, 11.4, 10.7, 5.1, 8.6, 7.4);
   RunContext context;
   for (const Boolean boolean : kBooleans) {
@@ -372,8 +382,8 @@ TEST(ThesisCombine, SaysThatEdgesAreCrossedWhereFacesMeet) {
 }
 
 TEST(ThesisCombine, LosesCrossingsOfFacesNearlyAlongZ) {
-  // The upper face has normals near (0, 0, 1), which along x and y mean that there is no crossing (trap T2). It comes
-  // through z = 14 within the slab; the other operand is in a corner.
+  // The upper face has normals near (0, 0, 1), which along x and y mean that there is no crossing (trap T2).
+  // It comes through z = 14 within the slab; the other operand is in a corner.
   const Solid slab = tilted_slab(10.3, 3.5, 14.0), corner = ball(3.1, 3.2, 4.3, 3.3);
   for (const Boolean boolean : kBooleans) {
     const Violations printed = violations(run<ThesisVoxel>(boolean, slab, corner));
@@ -383,9 +393,10 @@ TEST(ThesisCombine, LosesCrossingsOfFacesNearlyAlongZ) {
 }
 
 TEST(ThesisCombine, BreaksDeMorganForFacesNearlyAlongMinusZ) {
-  // The lower face has normals near (0, 0, −1) in the negative octant, which the complement cannot turn about. Where it
-  // comes through z = 4, the other operand has a steep face that enters the same edges a little later. So the union has
-  // the slab's crossings, and its complement none; but of the two complements one has the steep face's left.
+  // The lower face has normals near (0, 0, −1) in the negative octant, which the complement cannot turn
+  // about. Where it comes through z = 4, the other operand has a steep face that enters the same edges a
+  // little later. So the union has the slab's crossings, and its complement none; but of the two complements
+  // one has the steep face's left.
   const Solid slab = tilted_slab(10.3, 4.0, 13.5), sides = box(10.3, 10.3, 10.3, 8.3, 8.3, 8.3);
   const Solid steep = [=](double x, double y, double z) {
     return std::max(sides(x, y, z), 0.1 - 0.8 * (x - 10) - 0.6 * (y - 10));

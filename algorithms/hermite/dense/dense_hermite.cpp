@@ -5,8 +5,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/dense/dense_tree.h"
-#include "algorithms/hermite/sign_tree.h"
 #include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/sign_tree.h"
 #include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
@@ -17,8 +17,9 @@ using TreeOf = typename DenseGrid<Voxel>::TreeType;
 template <class Voxel>
 using LeafOf = typename TreeOf<Voxel>::LeafNodeType;
 
-// Four ways of one crossing into a voxel and out of it, by what is stored on either side. `Code` is the code of
-// FixedVoxel's normals, or of the packed crossing; codes that both sides have are passed on without decoding.
+// Four ways of one crossing into a voxel and out of it, by what is stored on either side. `Code` is the code
+// of FixedVoxel's normals, or of the packed crossing; codes that both sides have are passed on without
+// decoding.
 
 template <NormalCode Code, class Voxel>
 void store(Voxel& voxel, int axis, const EdgeCrossing& crossing) {
@@ -58,8 +59,8 @@ Crossing substitute(int axis, bool inside) {
     return crossing;
 }
 
-/// Calls f(code) as with_normal_code() does, but with any code where it does not matter: then the compiler makes one
-/// copy of f and not five.
+/// Calls f(code) as with_normal_code() does, but with any code where it does not matter: then the compiler
+/// makes one copy of f and not five.
 template <bool kMatters, class F>
 auto with_code_if(NormalCodeId code, F&& f) {
   if constexpr (kMatters)
@@ -71,7 +72,8 @@ auto with_code_if(NormalCodeId code, F&& f) {
 template <class Voxel, NormalCode Code, class Crossing>
 LeafOf<Voxel>* make_leaf(const SparseHermite<Crossing>& hermite, std::size_t i) {
   const SignLeaf& signs = hermite.leaves[i];
-  // All voxels begin outside and without crossings. A voxel becomes active with its first crossing, and only then.
+  // All voxels begin outside and without crossings. A voxel becomes active with its first crossing, and only
+  // then.
   auto leaf = std::make_unique<LeafOf<Voxel>>(sign_tree::coord(signs.lower), uniform_voxel<Voxel>(false));
   Voxel* const voxels = leaf->buffer().data();
   // Voxels are outside until told otherwise, so only set bits are visited.
@@ -105,8 +107,8 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
   SparseHermite<Crossing> hermite;
   hermite.placement = dense.placement;
   if (std::is_same_v<Voxel, FixedVoxel>) hermite.normal_code = dense.normal_code;
-  // Signs first: they alone say which edges have a crossing and where its record goes. What voxels claim of their
-  // edges is asked only there.
+  // Signs first: they alone say which edges have a crossing and where its record goes. What voxels claim of
+  // their edges is asked only there.
   const auto sources = sign_tree::read_signs(dense.tree->grid->tree(), hermite, context,
                                              [](const Voxel& voxel) { return voxel.inside(); });
   std::atomic<std::size_t> missing = 0;
@@ -114,8 +116,8 @@ SparseHermite<Crossing> sparse_of(const DenseHermite<Voxel>& dense, RunContext& 
     using Code = decltype(chosen);
     parallel_blocks(sources.size(), context, [&](std::size_t i) {
       const Voxel* const voxels = sources[i]->buffer().data();
-      // Leaves write to ranges of their own, so that the order of threads does not matter; the one shared number is a
-      // sum.
+      // Leaves write to ranges of their own, so that the order of threads does not matter; the one shared
+      // number is a sum.
       std::size_t next = hermite.leaves[i].first, absent = 0;
       const std::array<BlockMask, 3> edges = crossing_edges(hermite.leaves[i]);
       for (int axis = 0; axis < 3; ++axis)
@@ -170,8 +172,9 @@ void check_voxels(const DenseHermite<Voxel>& dense) {
   for (auto it = dense.tree->grid->tree().cbeginValueAll(); it; ++it) {
     // Also in inactive voxels: their signs count, and their crossings would be read.
     if (!(remade(*it) == *it))
-      throw Error("the Hermite data hold a voxel that is none of theirs at " + std::to_string(it.getCoord().x()) +
-                  ", " + std::to_string(it.getCoord().y()) + ", " + std::to_string(it.getCoord().z()));
+      throw Error("the Hermite data hold a voxel that is none of theirs at " +
+                  std::to_string(it.getCoord().x()) + ", " + std::to_string(it.getCoord().y()) + ", " +
+                  std::to_string(it.getCoord().z()));
     if (!it.isVoxelValue() && crossings_of(*it) > 0)
       throw Error("the Hermite data have crossings in a region without surface");
   }
@@ -181,8 +184,8 @@ void check_voxels(const DenseHermite<Voxel>& dense) {
 
 openvdb::math::Transform::Ptr transform_of(const IndexToWorld& placement) {
   const Eigen::Vector3d base(placement.base[0], placement.base[1], placement.base[2]);
-  // The parts of a placement keep small numbers apart from large ones; a transform has one translation, in double
-  // precision.
+  // The parts of a placement keep small numbers apart from large ones; a transform has one translation, in
+  // double precision.
   const Eigen::Vector3d translation = placement.offset + placement.origin - placement.linear * base;
   openvdb::Mat4R matrix = openvdb::Mat4R::identity();  // OpenVDB multiplies rows from the left
   for (int row = 0; row < 3; ++row)
@@ -237,13 +240,15 @@ PackedHermite to_packed(const FixedDense& dense, RunContext& context, std::size_
 
 template <DenseVoxel Voxel>
 void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context) {
-  // From the small to the large: single voxels, then signs and crossings of leaves, then what lies between leaves.
+  // From the small to the large: single voxels, then signs and crossings of leaves, then what lies between
+  // leaves.
   check_voxels(dense);
   std::size_t lost = 0;
   const FloatHermite hermite = to_sparse(dense, context, &lost);
   check_consistent(hermite);
   sign_tree::check_columns(hermite);
-  sign_tree::check_tiles(dense.tree->grid->tree(), hermite, [](const Voxel& voxel) { return voxel.inside(); });
+  sign_tree::check_tiles(dense.tree->grid->tree(), hermite,
+                         [](const Voxel& voxel) { return voxel.inside(); });
   // Each crossing edge has one crossing or lacks it; any more belong to no crossing edge.
   if (lost > 0 && !std::is_same_v<Voxel, ThesisVoxel>)
     throw Error("the Hermite data lack " + std::to_string(lost) + " crossings where their signs change");

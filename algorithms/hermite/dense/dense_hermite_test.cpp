@@ -5,8 +5,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/dense/dense_tree.h"
-#include "algorithms/hermite/test_lattice.h"
 #include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/test_lattice.h"
 #include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
@@ -151,7 +151,8 @@ TEST_F(DenseHermiteTest, FixedVoxelsHoldThePackedCodes) {
 
 TEST_F(DenseHermiteTest, OtherVoxelsTakeWhatPackedCrossingsStandFor) {
   std::mt19937 random(8);
-  const PackedHermite packed = pack(to_sparse(sample_solid(random_blobs(random))), NormalCodeId::nearest, context_);
+  const PackedHermite packed =
+      pack(to_sparse(sample_solid(random_blobs(random))), NormalCodeId::nearest, context_);
   EXPECT_TRUE(same_bytes(to_sparse(to_dense<FloatVoxel>(packed, context_), context_).crossings,
                          unpack(packed, context_).crossings));
 }

@@ -4,8 +4,8 @@
 #include "algorithms/core/openvdb_trees.h"
 #include "algorithms/hermite/dense/dense_hermite.h"
 
-// OpenVDB calls these functions by their full names, so that they must be specialised type by type: an overload for
-// all voxel types would be declared too late to be found.
+// OpenVDB calls these functions by their full names, so that they must be specialised type by type: an
+// overload for all voxel types would be declared too late to be found.
 #define HERMESH_DECLARE_VDB_VALUE(Voxel)                                                               \
   template <>                                                                                          \
   inline const char* typeNameAsString<hermesh::Voxel>() {                                              \
@@ -61,8 +61,8 @@ struct DenseTree {
   typename DenseGrid<Voxel>::Ptr grid;
 };
 
-/// A placement as a grid's transform: the map of index coordinates, without the split into parts near the base and the
-/// origin.
+/// A placement as a grid's transform: the map of index coordinates, without the split into parts near the
+/// base and the origin.
 openvdb::math::Transform::Ptr transform_of(const IndexToWorld& placement);
 
 /// A voxel without crossings, which all tiles and the background are.

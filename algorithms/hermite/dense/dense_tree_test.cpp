@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algorithms/hermite/test_lattice.h"
 #include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/test_lattice.h"
 
 namespace hermesh {
 namespace {
@@ -64,8 +64,9 @@ TYPED_TEST(DenseTreeOf, TreesOfDisjointSolidsCombine) {
   EXPECT_EQ(tree.leafCount(), 2 * a.leaves());
   EXPECT_EQ(tree.activeVoxelCount(), 2 * tree_of(a).activeVoxelCount());
   auto other = b.tree->grid->deepCopy();
-  tree.combine(other->tree(),
-               [](const TypeParam& x, const TypeParam& y, TypeParam& result) { result = y == TypeParam{} ? x : y; });
+  tree.combine(other->tree(), [](const TypeParam& x, const TypeParam& y, TypeParam& result) {
+    result = y == TypeParam{} ? x : y;
+  });
   const auto both = replaced(a, sum);
   EXPECT_EQ(both.crossings(), 2 * a.crossings());
   EXPECT_NO_THROW(check_consistent(both, this->context_));
@@ -73,8 +74,8 @@ TYPED_TEST(DenseTreeOf, TreesOfDisjointSolidsCombine) {
   for (auto it = tree_of(b).cbeginValueOn(); it; ++it) ASSERT_TRUE(tree.getValue(it.getCoord()) == *it);
 }
 
-// merge() moves nodes that the other tree has not. It takes no inactive tiles, so that of two solids in one node the
-// inside of the second has to be filled anew; in separate nodes all is there.
+// merge() moves nodes that the other tree has not. It takes no inactive tiles, so that of two solids in one
+// node the inside of the second has to be filled anew; in separate nodes all is there.
 TYPED_TEST(DenseTreeOf, MergingMovesNodes) {
   const FloatHermite left = to_sparse(sample_solid(ball(12, 12, 12, 9.3)));
   for (const int distance : {64, 256}) {
@@ -106,8 +107,8 @@ std::array<std::size_t, 4> inside_samples_by_depth(const Tree& tree) {
   return sum;
 }
 
-// A ball that leaves of the surface do not fill: its middle is tiles of 8³ samples, 128³ not being possible at this
-// radius in a tree whose nodes start at multiples of 128 with the centre between four of them.
+// A ball that leaves of the surface do not fill: its middle is tiles of 8³ samples, 128³ not being possible
+// at this radius in a tree whose nodes start at multiples of 128 with the centre between four of them.
 TEST_F(DenseTiles, ABigBallIsFilledWithTiles) {
   const auto lattice = sample_solid(ball(0.3, 0.2, 0.1, 100), -112, 224);
   const FixedDense dense = to_dense<FixedVoxel>(to_sparse(lattice), context_);
@@ -125,9 +126,9 @@ TEST_F(DenseTiles, ABigBallIsFilledWithTiles) {
   EXPECT_EQ(sum[2] % 512, 0u);
 }
 
-/// Two walls, perpendicular to z, at z0 and z1 and 8 samples square, with what is between them inside: the wall's upper
-/// leaf is whole inside, so that the middle has to be filled from the leaves at the ends. Its sides are left out, which
-/// makes the data inconsistent, but says plainly what tiles there are.
+/// Two walls, perpendicular to z, at z0 and z1 and 8 samples square, with what is between them inside: the
+/// wall's upper leaf is whole inside, so that the middle has to be filled from the leaves at the ends. Its
+/// sides are left out, which makes the data inconsistent, but says plainly what tiles there are.
 FloatHermite column(int z0, int z1) {
   FloatHermite hermite;
   for (const int z : {z0, z1}) {
@@ -153,7 +154,8 @@ TEST_F(DenseTiles, TilesOfEveryLevelHaveTheirColumnsSign) {
   EXPECT_EQ(depth_and_sign(-9), std::pair(2, false));
   EXPECT_EQ(depth_and_sign(-8), std::pair(3, false));
   // The first node of the upper half is a root tile, four more follow; then the nodes of the last leaf begin.
-  for (int node = 0; node < 5; ++node) EXPECT_EQ(depth_and_sign(node * 4096 + 77), std::pair(0, true)) << node;
+  for (int node = 0; node < 5; ++node)
+    EXPECT_EQ(depth_and_sign(node * 4096 + 77), std::pair(0, true)) << node;
   EXPECT_EQ(depth_and_sign(5 * 4096), std::pair(1, true));
   EXPECT_EQ(depth_and_sign(5 * 4096 + 16 * 128 - 1), std::pair(1, true));
   EXPECT_EQ(depth_and_sign(5 * 4096 + 16 * 128), std::pair(3, true));

@@ -13,8 +13,8 @@ namespace hermesh {
 
 /// Layouts that keep the rule of boolean_rule.h. `Code` is a crossing code from there.
 ///
-/// No neighbour is needed: since an edge is crossed if and only if its ends differ in sign, a voxel knows the sign at
-/// the other end of each of its edges.
+/// No neighbour is needed: since an edge is crossed if and only if its ends differ in sign, a voxel knows the
+/// sign at the other end of each of its edges.
 template <class VoxelType, class Code>
 struct RuledVoxel {
   using Voxel = VoxelType;
@@ -55,10 +55,11 @@ struct RuledVoxel {
   }
 };
 
-/// Equation 7.1 as it is printed, on the codes. It does not say what a component without data is; here it is infinite,
-/// with the sign of the voxel, as the distances of a narrow band are where it ends. The thesis's author later published
-/// minima and maxima (openvdb/math/Hermite.cc of OpenVDB 2) that take it for 0, so that a union with a voxel outside
-/// loses each of the other's crossings that is entered there: that can hardly be meant by the equation.
+/// Equation 7.1 as it is printed, on the codes. It does not say what a component without data is; here it is
+/// infinite, with the sign of the voxel, as the distances of a narrow band are where it ends. The thesis's
+/// author later published minima and maxima (openvdb/math/Hermite.cc of OpenVDB 2) that take it for 0, so
+/// that a union with a voxel outside loses each of the other's crossings that is entered there: that can
+/// hardly be meant by the equation.
 struct PrintedVoxel {
   using Voxel = ThesisVoxel;
 
@@ -78,7 +79,8 @@ struct PrintedVoxel {
   static void turn(Voxel& voxel) {
     Codes codes(voxel);
     for (int axis = 0; axis < 3; ++axis)
-      if (voxel.crosses(axis)) codes.set_edge(axis, ThesisNormalCode::negate(voxel.normal(axis)), voxel.offset(axis));
+      if (voxel.crosses(axis))
+        codes.set_edge(axis, ThesisNormalCode::negate(voxel.normal(axis)), voxel.offset(axis));
     codes.set_inside(!voxel.inside());
     voxel = codes;
   }
@@ -97,7 +99,8 @@ struct PrintedVoxel {
   /// The signed distance in steps of the offset; inside, 0 becomes -1, as -0 comes before 0.
   static std::int32_t component(const Voxel& voxel, int axis) {
     if (!voxel.crosses(axis))
-      return voxel.inside() ? std::numeric_limits<std::int32_t>::min() : std::numeric_limits<std::int32_t>::max();
+      return voxel.inside() ? std::numeric_limits<std::int32_t>::min()
+                            : std::numeric_limits<std::int32_t>::max();
     return voxel.inside() ? -1 - voxel.offset(axis) : voxel.offset(axis);
   }
 };

@@ -1,8 +1,8 @@
 // What of ThesisVoxel packs normals and unpacks them: apart, so that voxels.h needs no normal code.
 #pragma once
 
-#include "algorithms/hermite/normal_codes/thesis.h"
 #include "algorithms/hermite/dense/voxels.h"
+#include "algorithms/hermite/normal_codes/thesis.h"
 
 namespace hermesh {
 

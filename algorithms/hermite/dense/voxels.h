@@ -1,5 +1,5 @@
-// Dense voxels: the sign of a sample and its three up-wind edges (towards the next sample along x, y and z), whether
-// the surface crosses them or not (Aldén 2011, §2.7, §2.8 and §4.2).
+// Dense voxels: the sign of a sample and its three up-wind edges (towards the next sample along x, y and z),
+// whether the surface crosses them or not (Aldén 2011, §2.7, §2.8 and §4.2).
 //
 //   FloatVoxel     52 bytes   table 2.2's twelve floats and the flags: loses nothing
 //   DirectedVoxel  12 bytes   §2.7: where edges are crossed, without normals
@@ -22,10 +22,10 @@
 
 namespace hermesh {
 
-/// What OpenVDB asks of every value type: that it can be compared for size, added, subtracted and negated. For Hermite
-/// data the sign is the only part for which that means anything. So the negative of an outside voxel without crossings
-/// is an inside one, which is what OpenVDB's files and its tools for level sets take it for: the two values that
-/// inactive voxels have, and that are stored as one bit.
+/// What OpenVDB asks of every value type: that it can be compared for size, added, subtracted and negated.
+/// For Hermite data the sign is the only part for which that means anything. So the negative of an outside
+/// voxel without crossings is an inside one, which is what OpenVDB's files and its tools for level sets take
+/// it for: the two values that inactive voxels have, and that are stored as one bit.
 template <class Voxel>
 struct VdbValue {
   friend bool operator<(const Voxel& a, const Voxel& b) { return a.inside() && !b.inside(); }
@@ -77,8 +77,8 @@ class FloatVoxel : public VdbValue<FloatVoxel> {
 };
 static_assert(sizeof(FloatVoxel) == 52);
 
-/// Signed distances along the three edges (§2.7): the sign bit, of a zero too, is set inside; the magnitude is the
-/// offset of the crossing, or 2 where there is none.
+/// Signed distances along the three edges (§2.7): the sign bit, of a zero too, is set inside; the magnitude
+/// is the offset of the crossing, or 2 where there is none.
 class DirectedVoxel : public VdbValue<DirectedVoxel> {
  public:
   static constexpr const char* type_name = "hermite_directed";
@@ -115,10 +115,11 @@ class DirectedVoxel : public VdbValue<DirectedVoxel> {
 };
 static_assert(sizeof(DirectedVoxel) == 12);
 
-/// Ten bytes: three normals of 16 bits and a word of 32, which is kept as two halves, because a whole one would be
-/// aligned to four bytes and make the voxel 12 bytes large (trap T3). The word has the fields of figure 4.2 in the
-/// order in which the thesis's author later published them (openvdb/math/Hermite.h of OpenVDB 2): from the lowest bit
-/// ten for the offset along z, ten for y and ten for x, then the validity of z and the sign.
+/// Ten bytes: three normals of 16 bits and a word of 32, which is kept as two halves, because a whole one
+/// would be aligned to four bytes and make the voxel 12 bytes large (trap T3). The word has the fields of
+/// figure 4.2 in the order in which the thesis's author later published them (openvdb/math/Hermite.h of
+/// OpenVDB 2): from the lowest bit ten for the offset along z, ten for y and ten for x, then the validity of
+/// z and the sign.
 class TenByteVoxel {
  public:
   bool inside() const { return (halves_[1] >> 15) != 0; }
@@ -149,16 +150,18 @@ class TenByteVoxel {
   std::array<std::uint16_t, 2> halves_;
 };
 
-/// The quantised Hermite data object of §4.2 as it is printed. Bit 30 says whether the edge along z has data; those
-/// along x and y have if their normal's code is not 0. But every normal of the positive octant within about 0.45° of
-/// +z has the code 0, and a surface nearly flat in z may well cross an edge along x: such crossings are lost (trap T2).
+/// The quantised Hermite data object of §4.2 as it is printed. Bit 30 says whether the edge along z has data;
+/// those along x and y have if their normal's code is not 0. But every normal of the positive octant within
+/// about 0.45° of +z has the code 0, and a surface nearly flat in z may well cross an edge along x: such
+/// crossings are lost (trap T2).
 class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
  public:
   static constexpr const char* type_name = "hermite_thesis";
   ThesisVoxel() : TenByteVoxel(0) {}
 
-  /// Code of an offset: 1023 levels, rounded down. Offsets must be below 1; one of 1 gets the last code, 1022/1023. So
-  /// the error is a whole level at most and half of one in the mean, towards the edge's first sample (trap T4).
+  /// Code of an offset: 1023 levels, rounded down. Offsets must be below 1; one of 1 gets the last code,
+  /// 1022/1023. So the error is a whole level at most and half of one in the mean, towards the edge's first
+  /// sample (trap T4).
   static std::uint16_t quantize(float offset) {
     const float held = offset > 0.0f ? offset : 0.0f;
     return held < 1.0f ? static_cast<std::uint16_t>(static_cast<int>(held * kLevels)) : std::uint16_t{1022};
@@ -181,9 +184,10 @@ class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
 };
 static_assert(sizeof(ThesisVoxel) == 10);
 
-/// The ten bytes of ThesisVoxel without its losses: an offset's code says whether there is a crossing (crossing.h), so
-/// all normals can be told from none, and offsets are rounded to the nearest of levels that include 0 and 1. The grid
-/// says what code its normals are in. Bit 30 is free. Combining grids works on the codes and needs no unpacking.
+/// The ten bytes of ThesisVoxel without its losses: an offset's code says whether there is a crossing
+/// (crossing.h), so all normals can be told from none, and offsets are rounded to the nearest of levels that
+/// include 0 and 1. The grid says what code its normals are in. Bit 30 is free. Combining grids works on the
+/// codes and needs no unpacking.
 class FixedVoxel : public TenByteVoxel, public VdbValue<FixedVoxel> {
  public:
   static constexpr const char* type_name = "hermite_fixed";
@@ -220,6 +224,7 @@ concept DenseVoxel = std::is_trivially_copyable_v<Voxel> && std::default_initial
   voxel.set_inside(true);
   voxel.clear(axis);
 };
-static_assert(DenseVoxel<FloatVoxel> && DenseVoxel<DirectedVoxel> && DenseVoxel<ThesisVoxel> && DenseVoxel<FixedVoxel>);
+static_assert(DenseVoxel<FloatVoxel> && DenseVoxel<DirectedVoxel> && DenseVoxel<ThesisVoxel> &&
+              DenseVoxel<FixedVoxel>);
 
 }  // namespace hermesh

@@ -1,16 +1,17 @@
-#include "algorithms/hermite/dense/thesis_voxel.h"
 #include "algorithms/hermite/dense/voxels.h"
-#include "algorithms/hermite/with_normal_code.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
+#include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/hermite/with_normal_code.h"
+
 namespace hermesh {
 namespace {
 
-// Tables 2.2 and §4.2: twelve floats and the flags; three floats; ten bytes, for which OpenVDB makes arrays without
-// gaps (trap T3).
+// Tables 2.2 and §4.2: twelve floats and the flags; three floats; ten bytes, for which OpenVDB makes arrays
+// without gaps (trap T3).
 static_assert(sizeof(FloatVoxel) == 12 * 4 + 4 && sizeof(DirectedVoxel) == 3 * 4);
 static_assert(sizeof(ThesisVoxel[2]) == 20 && sizeof(FixedVoxel[2]) == 20);
 static_assert(alignof(ThesisVoxel) == 2 && alignof(FixedVoxel) == 2);
@@ -136,7 +137,8 @@ TEST(ThesisVoxel, HasThePrintedLayout) {
   EXPECT_TRUE(voxel.crosses(2));
 }
 
-// Trap T2: the code of a normal within about 0.45° of +z is 0, which on the edges along x and y means no data.
+// Trap T2: the code of a normal within about 0.45° of +z is 0, which on the edges along x and y means no
+// data.
 TEST(ThesisVoxel, LosesCrossingsWithNormalsAlongZ) {
   const float angle = 0.3f * 3.14159265f / 180.0f;
   const EdgeCrossing nearly_z{0.5f, {std::sin(angle), 0.0f, std::cos(angle)}};

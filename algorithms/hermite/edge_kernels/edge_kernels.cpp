@@ -14,19 +14,20 @@ namespace {
 
 using namespace simd;
 // clang-format off: the order matters
-#include "algorithms/hermite/edge_kernels/leaf_ends.inc"
 #include "algorithms/hermite/edge_kernels/leaf_crossings.inc"
+#include "algorithms/hermite/edge_kernels/leaf_ends.inc"
 // clang-format on
 
-constexpr Kernels kKernels = {kLevel,
-                              crossed,
-                              sample,
-                              {sample_packed<ThesisNormalCode>, sample_packed<BaptistaNormalCode>,
-                               sample_packed<RoundedNormalCode>, sample_packed<OctahedralNormalCode>,
-                               sample_packed<NearestNormalCode>}};
+constexpr Kernels kKernels = {
+    kLevel,
+    crossed,
+    sample,
+    {sample_packed<ThesisNormalCode>, sample_packed<BaptistaNormalCode>, sample_packed<RoundedNormalCode>,
+     sample_packed<OctahedralNormalCode>, sample_packed<NearestNormalCode>}};
 // The array is in the order of the codes, and has one kernel for each.
-static_assert(kNormalCodes.size() == 5 && int(NormalCodeId::thesis) == 0 && int(NormalCodeId::baptista) == 1 &&
-              int(NormalCodeId::rounded) == 2 && int(NormalCodeId::octahedral) == 3 && int(NormalCodeId::nearest) == 4);
+static_assert(kNormalCodes.size() == 5 && int(NormalCodeId::thesis) == 0 &&
+              int(NormalCodeId::baptista) == 1 && int(NormalCodeId::rounded) == 2 &&
+              int(NormalCodeId::octahedral) == 3 && int(NormalCodeId::nearest) == 4);
 
 }  // namespace
 }  // namespace HERMESH_SIMD_LEVEL

@@ -6,9 +6,9 @@
 
 namespace hermesh {
 
-/// Code like ThesisNormalCode, but the third component is 126 - a - b, so that the three add up to what they were
-/// divided into; it is still 0 to 2 too much. 64 contents of the slots, of which none is ever packed, have a
-/// third component of -1.
+/// Code like ThesisNormalCode, but the third component is 126 - a - b, so that the three add up to what they
+/// were divided into; it is still 0 to 2 too much. 64 contents of the slots, of which none is ever packed,
+/// have a third component of -1.
 struct BaptistaNormalCode {
   static constexpr const char* name = "baptista";
   [[gnu::always_inline]] static std::uint16_t pack(const std::array<float, 3>& normal) {

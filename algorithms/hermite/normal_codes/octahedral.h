@@ -21,9 +21,10 @@ struct OctahedralNormalCode {
     return of_lattice(octant_slots::nearest_step(at.a), octant_slots::nearest_step(at.b), at.negative);
   }
 
-  /// The normal of a code, without a table. A table of weights, as the other codes have, is no faster; one of all
-  /// 65,536 normals is, by four times in a loop that does nothing else, but its 768 KiB drive everything else out of
-  /// the caches for a gain of 3 ns, where the equations that are solved with each normal take more than a hundred.
+  /// The normal of a code, without a table. A table of weights, as the other codes have, is no faster; one of
+  /// all 65,536 normals is, by four times in a loop that does nothing else, but its 768 KiB drive everything
+  /// else out of the caches for a gain of 3 ns, where the equations that are solved with each normal take
+  /// more than a hundred.
   static std::array<float, 3> unpack(std::uint16_t code) {
     const Lattice at = decode(code);
     const float weight = 1.0f / std::sqrt(float(at.x * at.x + at.y * at.y + at.z * at.z));
@@ -43,7 +44,9 @@ struct OctahedralNormalCode {
   };
 
   [[gnu::always_inline]] static int sign_mask(int value) { return octant_slots::sign_mask(value); }
-  [[gnu::always_inline]] static int negated_if(int mask, int value) { return octant_slots::negated_if(mask, value); }
+  [[gnu::always_inline]] static int negated_if(int mask, int value) {
+    return octant_slots::negated_if(mask, value);
+  }
   static int magnitude(int value) { return negated_if(sign_mask(value), value); }
 
   /// The code of a point by the magnitudes of x and y and all three signs. Magnitudes that add up to 128,

@@ -30,8 +30,9 @@ struct Projection {
   std::uint32_t negative;  ///< bits 15, 14, 13, as in a code
 };
 
-/// Steps 1 and 2 of §4.1, by one division. What has no direction is taken for +z. Negative zero counts as positive.
-/// Masks stand in for branches, with which compilers would not turn loops over normals into vector code.
+/// Steps 1 and 2 of §4.1, by one division. What has no direction is taken for +z. Negative zero counts as
+/// positive. Masks stand in for branches, with which compilers would not turn loops over normals into vector
+/// code.
 [[gnu::always_inline]] inline Projection project(const std::array<float, 3>& normal, int levels) {
   const float x = std::fabs(normal[0]), y = std::fabs(normal[1]), z = std::fabs(normal[2]);
   const float sum = x + y + z;

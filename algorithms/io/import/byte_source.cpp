@@ -64,8 +64,8 @@ void ByteSource::read(std::span<unsigned char> bytes, const RunContext& context)
     context.check();
     const std::size_t got = some(bytes.data(), bytes.size());
     if (got == 0)
-      fail("is truncated: it ends after " + std::to_string(position_) + " bytes, " + std::to_string(bytes.size()) +
-           " too early");
+      fail("is truncated: it ends after " + std::to_string(position_) + " bytes, " +
+           std::to_string(bytes.size()) + " too early");
     bytes = bytes.subspan(got);
   }
 }

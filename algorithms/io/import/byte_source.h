@@ -22,8 +22,8 @@ class ByteSource {
   ByteSource& operator=(const ByteSource&) = delete;
 
   bool gzipped() const { return gzipped_; }
-  /// Upper bound of the bytes that the file holds: its size, or where it is gzipped the most that so many bytes unpack
-  /// to.
+  /// Upper bound of the bytes that the file holds: its size, or where it is gzipped the most that so many
+  /// bytes unpack to.
   std::uint64_t at_most() const { return at_most_; }
   /// Bytes that were read so far, unpacked.
   std::uint64_t position() const { return position_; }
@@ -32,8 +32,8 @@ class ByteSource {
   void read(std::span<unsigned char> bytes, const RunContext& context);
   /// Reads bytes and drops them. @throws Error and Cancelled as read() does.
   void skip(std::uint64_t bytes, const RunContext& context);
-  /// Reads what is left and drops it, up to `limit` bytes; returns how many there were. @throws Error and Cancelled as
-  /// read() does.
+  /// Reads what is left and drops it, up to `limit` bytes; returns how many there were. @throws Error and
+  /// Cancelled as read() does.
   std::uint64_t count_rest(std::uint64_t limit, const RunContext& context);
 
  private:

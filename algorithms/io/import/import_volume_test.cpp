@@ -11,8 +11,8 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/value_range.h"
-#include "algorithms/io/vdb_file.h"
 #include "algorithms/io/import/files_for_tests.h"
+#include "algorithms/io/vdb_file.h"
 
 namespace hermesh {
 namespace {
@@ -72,8 +72,8 @@ NiftiBytes small(bool big_endian = false) {
 template <class T>
 void expect_type(const std::function<LevelSet(const std::string&)>& load, std::int16_t code) {
   for (const bool big_endian : {false, true}) {
-    const LevelSet volume =
-        load(NiftiBytes(big_endian).dims({3, 4, 5}).type(code, 8 * sizeof(T)).samples(counting<T>(60)).bytes());
+    const LevelSet volume = load(
+        NiftiBytes(big_endian).dims({3, 4, 5}).type(code, 8 * sizeof(T)).samples(counting<T>(60)).bytes());
     ASSERT_EQ(volume.dimensions(), (std::array<int, 3>{3, 4, 5})) << code;
     EXPECT_EQ(volume.active_voxels(), 60u);
     for (int i = 0; i < 60; ++i)
@@ -119,7 +119,8 @@ TEST_F(Import, HeaderAndSamplesInTwoFiles) {
   std::memcpy(header.data() + 344, "ni1", 4);
   write_bytes(folder / "b.hdr", header.substr(0, 348));
   write_gzipped(folder / "b.img.gz", header.substr(352));
-  for (const char* name : {"b.hdr", "b.img.gz"}) EXPECT_EQ(at(import_nifti(folder / name, {}, context), 2, 3, 4), 60.0f);
+  for (const char* name : {"b.hdr", "b.img.gz"})
+    EXPECT_EQ(at(import_nifti(folder / name, {}, context), 2, 3, 4), 60.0f);
   fs::remove(folder / "b.img.gz");
   EXPECT_THROW(import_nifti(folder / "b.hdr", {}, context), Error);
 }
@@ -149,7 +150,8 @@ TEST_F(Import, TakesOneFrameOfSeveral) {
   ASSERT_EQ(context.notes.size(), 1u);
   EXPECT_NE(context.notes[0].find("2 frames"), std::string::npos);
   EXPECT_EQ(at(nifti(file.bytes(), {.replacement = {}, .frame = 1}), 0, 0, 0), 61.0f);
-  EXPECT_NE(error_of(file.bytes(), {.replacement = {}, .frame = 2}).find("no frame 2; it has 2"), std::string::npos);
+  EXPECT_NE(error_of(file.bytes(), {.replacement = {}, .frame = 2}).find("no frame 2; it has 2"),
+            std::string::npos);
 }
 
 TEST_F(Import, EveryTruncationIsRefused) {
@@ -164,8 +166,9 @@ TEST_F(Import, EveryTruncationIsRefused) {
 }
 
 TEST_F(Import, LyingDimensionsAreRefusedBeforeAnythingIsAllocated) {
-  for (const std::vector<std::int16_t>& dims :
-       {std::vector<std::int16_t>{32767, 32767, 32767}, {3, 4, 6}, {32767, 32767, 32767, 32767, 32767, 32767, 32767}})
+  for (const std::vector<std::int16_t>& dims : {std::vector<std::int16_t>{32767, 32767, 32767},
+                                                {3, 4, 6},
+                                                {32767, 32767, 32767, 32767, 32767, 32767, 32767}})
     EXPECT_NE(error_of(small().dims(dims).bytes()).find("too short for"), std::string::npos);
   EXPECT_NE(error_of(small().dims({3, -4, 5}).bytes()).find("dimension 2 is -4"), std::string::npos);
   EXPECT_NE(error_of(small().dims({3, 0, 5}).bytes()).find("dimension 2 is 0"), std::string::npos);
@@ -184,11 +187,13 @@ TEST_F(Import, DamagedHeadersAreNamed) {
   EXPECT_NE(error_of(small().put<float>(108, nan).bytes()).find("offset of the samples"), std::string::npos);
   EXPECT_NE(error_of(small().put<float>(108, -352.0f).bytes()).find("cannot start at"), std::string::npos);
   EXPECT_NE(error_of(small().put<float>(108, 1e12f).bytes()).find("too short"), std::string::npos);
-  EXPECT_NE(error_of(small().put<float>(112, 2.0f).put<float>(116, nan).bytes()).find("scl_inter"), std::string::npos);
+  EXPECT_NE(error_of(small().put<float>(112, 2.0f).put<float>(116, nan).bytes()).find("scl_inter"),
+            std::string::npos);
   EXPECT_NE(error_of(small().put<float>(80, nan).bytes()).find("size of voxels"), std::string::npos);
   const NiftiBytes flat = small().put<std::int16_t>(254, 1).put<float>(280, 1.0f).put<float>(300, 1.0f);
   EXPECT_NE(error_of(flat.bytes()).find("singular"), std::string::npos);
-  EXPECT_NE(error_of(small().put<std::int16_t>(252, 1).put<float>(256, 2.0f).bytes()).find("quaternion"), std::string::npos);
+  EXPECT_NE(error_of(small().put<std::int16_t>(252, 1).put<float>(256, 2.0f).bytes()).find("quaternion"),
+            std::string::npos);
 }
 
 /// What programs write, and what every reader forgives.
@@ -196,7 +201,8 @@ TEST_F(Import, TheTypeDecidesHowManyBitsASampleHas) {
   const LevelSet volume = nifti(small().type(4, 8).bytes());
   EXPECT_EQ(at(volume, 2, 3, 4), 60.0f);
   ASSERT_EQ(context.notes.size(), 1u);
-  EXPECT_NE(context.notes[0].find("have 8 bits; the type decides: 16"), std::string::npos) << context.notes[0];
+  EXPECT_NE(context.notes[0].find("have 8 bits; the type decides: 16"), std::string::npos)
+      << context.notes[0];
 }
 
 TEST_F(Import, ASlopeThatIsNotFiniteScalesNothing) {
@@ -213,7 +219,8 @@ TEST_F(Import, AnEmptySformGivesWayToTheNextTransform) {
     const openvdb::Vec3d p = nifti(file.bytes()).grid().grid->indexToWorld(openvdb::Vec3d(1, 2, 3));
     return Eigen::Vector3d(p.x(), p.y(), p.z());
   };
-  NiftiBytes file = small().put<float>(80, 2.0f).put<float>(84, 3.0f).put<float>(88, 4.0f).put<std::int16_t>(254, 1);
+  NiftiBytes file =
+      small().put<float>(80, 2.0f).put<float>(84, 3.0f).put<float>(88, 4.0f).put<std::int16_t>(254, 1);
   EXPECT_LT((corner(file) - Eigen::Vector3d(2, 6, 12)).norm(), 1e-9);  // the sizes of voxels
   EXPECT_EQ(context.notes.size(), 1u);
   // A half turn about z: (x, y) to (−x, −y), then a shift.
@@ -274,7 +281,8 @@ TEST_F(Import, RawSamples) {
 
 TEST_F(Import, RoundTripThroughVdbKeepsAllOfIt) {
   std::vector<std::uint8_t> values(20 * 9 * 17);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = i % 20 < 16 ? 7 : static_cast<std::uint8_t>(i % 251);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = i % 20 < 16 ? 7 : static_cast<std::uint8_t>(i % 251);
   const LevelSet made = nifti(NiftiBytes().dims({20, 9, 17}).type(2, 8).samples(values).bytes());
   write_imported(folder / "a.vdb", made, context);
   const LevelSet back = read_level_set(folder / "a.vdb", "", context);
@@ -291,12 +299,13 @@ TEST_F(Import, RoundTripThroughVdbKeepsAllOfIt) {
 }
 
 TEST(SampleFormat, NamesAreReadBack) {
-  for (const char* name : {"uint8", "int8", "uint16le", "int16be", "uint32le", "int32be", "uint64le", "int64be",
-                           "float32le", "float64be"})
+  for (const char* name : {"uint8", "int8", "uint16le", "int16be", "uint32le", "int32be", "uint64le",
+                           "int64be", "float32le", "float64be"})
     EXPECT_EQ(name_of(parse_sample_format(name)), name);
   EXPECT_EQ(parse_sample_format("float32"), (hermesh::SampleFormat{SampleType::float32, false}));
-    for (const char* name : {"uint8le", "uint8be"}) EXPECT_EQ(name_of(parse_sample_format(name)), "uint8");
-  for (const char* name : {"", "int", "int16xe", "float16"}) EXPECT_THROW(parse_sample_format(name), Error) << name;
+  for (const char* name : {"uint8le", "uint8be"}) EXPECT_EQ(name_of(parse_sample_format(name)), "uint8");
+  for (const char* name : {"", "int", "int16xe", "float16"})
+    EXPECT_THROW(parse_sample_format(name), Error) << name;
 }
 
 }  // namespace

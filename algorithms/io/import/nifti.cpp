@@ -1,5 +1,5 @@
-// NIfTI-1; see import_volume.h. The format: Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004, and
-// the comments of nifti1.h. Numbers below are offsets into its header.
+// NIfTI-1; see import_volume.h. The format: Cox et al., "A (sort of) new image data format standard:
+// NIfTI-1", 2004, and the comments of nifti1.h. Numbers below are offsets into its header.
 #include <Eigen/LU>
 #include <algorithm>
 #include <bit>
@@ -20,21 +20,22 @@ constexpr std::size_t kHeaderBytes = 348;
 std::pair<fs::path, std::string> unpacked_name(const fs::path& path) {
   const auto lower_extension = [](const fs::path& of) {
     std::string extension = of.extension().string();
-    std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    std::ranges::transform(extension, extension.begin(),
+                           [](unsigned char c) { return char(std::tolower(c)); });
     return extension;
   };
   const fs::path name = lower_extension(path) == ".gz" ? fs::path(path).replace_extension() : path;
   return {name, lower_extension(name)};
 }
 
-/// The header as it lies in the file; numbers are turned to the order of bytes of this machine when they are asked
-/// for.
+/// The header as it lies in the file; numbers are turned to the order of bytes of this machine when they are
+/// asked for.
 class Header {
  public:
   Header(ByteSource& source, std::string file, const RunContext& context) : file_(std::move(file)) {
     source.read(bytes_, context);
-    // The first number is the length of the header, 348, or 540 in NIfTI-2: read in both orders of bytes, it tells the
-    // file's.
+    // The first number is the length of the header, 348, or 540 in NIfTI-2: read in both orders of bytes, it
+    // tells the file's.
     const auto own = number<std::int32_t>(0);
     swap_ = true;
     const auto swapped = number<std::int32_t>(0);
@@ -78,15 +79,15 @@ SampleFormat format_of(const Header& header, RunContext& context) {
   const int code = header.number<std::int16_t>(70), bits = header.number<std::int16_t>(72);
   // Codes of nifti1.h.
   constexpr std::array<std::pair<int, SampleType>, 10> kCodes = {{{2, SampleType::uint8},
-                                                                 {4, SampleType::int16},
-                                                                 {8, SampleType::int32},
-                                                                 {16, SampleType::float32},
-                                                                 {64, SampleType::float64},
-                                                                 {256, SampleType::int8},
-                                                                 {512, SampleType::uint16},
-                                                                 {768, SampleType::uint32},
-                                                                 {1024, SampleType::int64},
-                                                                 {1280, SampleType::uint64}}};
+                                                                  {4, SampleType::int16},
+                                                                  {8, SampleType::int32},
+                                                                  {16, SampleType::float32},
+                                                                  {64, SampleType::float64},
+                                                                  {256, SampleType::int8},
+                                                                  {512, SampleType::uint16},
+                                                                  {768, SampleType::uint32},
+                                                                  {1024, SampleType::int64},
+                                                                  {1280, SampleType::uint64}}};
   const auto found = std::ranges::find(kCodes, code, &std::pair<int, SampleType>::first);
   if (found == kCodes.end())
     header.fail("holds samples of the NIfTI type " + std::to_string(code) +
@@ -102,11 +103,13 @@ SampleFormat format_of(const Header& header, RunContext& context) {
 /// Sets the box's dimensions; axes beyond the third are frames. @returns how many boxes there are.
 std::int64_t read_dims(const Header& header, StoredSamples& stored) {
   const int axes = header.number<std::int16_t>(40);
-  if (axes < 1 || axes > 7) header.fail("is damaged: it says that it has " + std::to_string(axes) + " dimensions");
+  if (axes < 1 || axes > 7)
+    header.fail("is damaged: it says that it has " + std::to_string(axes) + " dimensions");
   std::int64_t frames = 1;
   for (int axis = 0; axis < axes; ++axis) {
     const std::int64_t dim = header.number<std::int16_t>(42 + 2 * static_cast<std::size_t>(axis));
-    if (dim < 1) header.fail("is damaged: its dimension " + std::to_string(axis + 1) + " is " + std::to_string(dim));
+    if (dim < 1)
+      header.fail("is damaged: its dimension " + std::to_string(axis + 1) + " is " + std::to_string(dim));
     if (axis < 3)
       stored.dims[axis] = dim;
     else
@@ -140,8 +143,8 @@ std::array<double, 3> voxel_sizes(const Header& header, RunContext& context) {
   return sizes;
 }
 
-/// The qform: a rotation as the last three numbers of a unit quaternion, times the sizes of voxels (method 2 of
-/// nifti1.h).
+/// The qform: a rotation as the last three numbers of a unit quaternion, times the sizes of voxels (method 2
+/// of nifti1.h).
 Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3>& sizes) {
   const double b = header.real(256, "qform"), c = header.real(260, "qform"), d = header.real(264, "qform");
   // What single precision rounds beyond a length of 1 is forgiven.
@@ -156,7 +159,8 @@ Eigen::Matrix4d quaternion_form(const Header& header, const std::array<double, 3
   const double hand = header.number<float>(76) < 0.0f ? -1.0 : 1.0;
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
   form.topLeftCorner<3, 3>() = turn * Eigen::Vector3d(sizes[0], sizes[1], hand * sizes[2]).asDiagonal();
-  for (std::size_t axis = 0; axis < 3; ++axis) form(Eigen::Index(axis), 3) = header.real(268 + 4 * axis, "qform");
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    form(Eigen::Index(axis), 3) = header.real(268 + 4 * axis, "qform");
   return form;
 }
 
@@ -176,8 +180,9 @@ bool is_singular(const Eigen::Matrix4d& form) {
   return !(scale > 0.0) || !(std::fabs(linear.determinant()) > 1e-6 * scale);
 }
 
-/// Index coordinates to millimeters by the sform, else the qform, else the sizes of voxels alone. Programs write an
-/// sform of zeros, or one that is not finite, with a code that says that it counts; then the next one does.
+/// Index coordinates to millimeters by the sform, else the qform, else the sizes of voxels alone. Programs
+/// write an sform of zeros, or one that is not finite, with a code that says that it counts; then the next
+/// one does.
 Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
   const bool has_qform = header.number<std::int16_t>(252) > 0;
   Eigen::Matrix4d form = Eigen::Matrix4d::Identity();
@@ -207,15 +212,17 @@ Eigen::Matrix4d transform_of(const Header& header, RunContext& context) {
 }
 
 /// Moves the box on to the frame that is asked for. @throws Error where there is none.
-void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame_bytes, const ImportOptions& options,
-                  StoredSamples& stored, RunContext& context) {
+void choose_frame(const Header& header, std::int64_t frames, std::uint64_t frame_bytes,
+                  const ImportOptions& options, StoredSamples& stored, RunContext& context) {
   const std::int64_t frame = options.frame.value_or(0);
   if (frame < 0 || frame >= frames)
-    header.fail("has no frame " + std::to_string(frame) + "; it has " + std::to_string(frames) + ", numbered from 0");
+    header.fail("has no frame " + std::to_string(frame) + "; it has " + std::to_string(frames) +
+                ", numbered from 0");
   // In double precision, since the product of a number of the user and a size may overflow 64 bits.
   if (double(frame) * double(frame_bytes) > 0x1p62) header.fail("is truncated: that frame cannot be in it");
   if (frames > 1 && !options.frame)
-    context.note(header.file() + " holds " + std::to_string(frames) + " frames; the first was taken (--frame N takes another)");
+    context.note(header.file() + " holds " + std::to_string(frames) +
+                 " frames; the first was taken (--frame N takes another)");
   stored.offset += static_cast<std::uint64_t>(frame) * frame_bytes;
 }
 
@@ -225,7 +232,8 @@ fs::path companion(const fs::path& path, const char* extension) {
   fs::path beside = unpacked_name(path).first;
   beside.replace_extension(extension);
   std::error_code ignored;
-  if (!fs::exists(beside, ignored) && fs::exists(beside.string() + ".gz", ignored)) return beside.string() + ".gz";
+  if (!fs::exists(beside, ignored) && fs::exists(beside.string() + ".gz", ignored))
+    return beside.string() + ".gz";
   return beside;
 }
 
@@ -249,11 +257,13 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const fs::path header_path = unpacked_name(path).second == ".img" ? companion(path, ".hdr") : path;
   ByteSource first(header_path);
   const Header header(first, header_path.string(), context);
-  StoredSamples stored{.file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
+  StoredSamples stored{
+      .file = header_path.string(), .format = format_of(header, context), .offset = samples_offset(header)};
   const std::int64_t frames = read_dims(header, stored);
   // scl_slope and scl_inter: value = slope · stored + intercept.
   const double slope = header.number<float>(112);
-  if (!std::isfinite(slope)) context.note(header.file() + " has a scl_slope that is not finite; its samples were not scaled");
+  if (!std::isfinite(slope))
+    context.note(header.file() + " has a scl_slope that is not finite; its samples were not scaled");
   if (std::isfinite(slope) && slope != 0.0) {  // 0: the samples are not scaled
     stored.slope = slope;
     stored.intercept = header.real(116, "scl_inter");
@@ -266,7 +276,8 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
     second.emplace(stored.file);
   }
   ByteSource& source = second ? *second : first;
-  // Twice: the first time for one frame, whose size the offset of the frame needs, the second time with that offset.
+  // Twice: the first time for one frame, whose size the offset of the frame needs, the second time with that
+  // offset.
   const std::uint64_t frame_bytes = check_stored(stored, source.at_most());
   choose_frame(header, frames, frame_bytes, options, stored, context);
   check_stored(stored, source.at_most());

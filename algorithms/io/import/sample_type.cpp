@@ -55,8 +55,8 @@ DecodeCounts decode(std::span<const unsigned char> bytes, bool swap, double slop
     // Rounded once, from the scaled number in double precision; too large a number becomes infinite here.
     values[i] = static_cast<float>(scaled ? slope * number + intercept : number);
     counts.not_finite += !std::isfinite(values[i]);
-    // What the file says is compared, not the scaled value: a slope that rounds is no loss of the conversion. NaN
-    // differs from itself and is counted as not finite alone.
+    // What the file says is compared, not the scaled value: a slope that rounds is no loss of the conversion.
+    // NaN differs from itself and is counted as not finite alone.
     if (static_cast<double>(static_cast<float>(number)) != number) counts.rounded += !std::isnan(number);
   }
   return counts;
@@ -85,8 +85,8 @@ SampleFormat parse_sample_format(const std::string& name) {
               ", with le or be behind for the order of the bytes");
 }
 
-DecodeCounts decode_samples(std::span<const unsigned char> bytes, SampleFormat format, double slope, double intercept,
-                            std::span<float> values) {
+DecodeCounts decode_samples(std::span<const unsigned char> bytes, SampleFormat format, double slope,
+                            double intercept, std::span<float> values) {
   // Bytes are swapped where the order of the file is not that of the machine.
   const bool swap = format.big_endian != (std::endian::native == std::endian::big);
   // The type is chosen once for many samples, so that the loop over them has no branch on it.

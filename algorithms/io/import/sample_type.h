@@ -18,11 +18,11 @@ struct SampleFormat {
   bool operator==(const SampleFormat&) const = default;
 };
 
-std::size_t size_of(SampleType type);  ///< bytes of a sample
+std::size_t size_of(SampleType type);      ///< bytes of a sample
 std::string name_of(SampleFormat format);  ///< "int16le", "uint8"
 
-/// Parses uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le (least significant
-/// byte first; also where nothing follows) or be behind. @throws Error that lists what there is.
+/// Parses uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le (least
+/// significant byte first; also where nothing follows) or be behind. @throws Error that lists what there is.
 SampleFormat parse_sample_format(const std::string& name);
 
 /// What became of samples on their way into single precision.
@@ -31,9 +31,9 @@ struct DecodeCounts {
   std::uint64_t rounded = 0;     ///< stored numbers that are no single precision
 };
 
-/// Decodes samples: value = slope · stored + intercept, in double precision, then rounded. `bytes` holds as many
-/// samples as `values`. @returns counts over these samples.
-DecodeCounts decode_samples(std::span<const unsigned char> bytes, SampleFormat format, double slope, double intercept,
-                            std::span<float> values);
+/// Decodes samples: value = slope · stored + intercept, in double precision, then rounded. `bytes` holds as
+/// many samples as `values`. @returns counts over these samples.
+DecodeCounts decode_samples(std::span<const unsigned char> bytes, SampleFormat format, double slope,
+                            double intercept, std::span<float> values);
 
 }  // namespace hermesh

@@ -1,4 +1,5 @@
-// What the importers share: from where samples lie in a file to a grid. Heavy (Eigen): private to algorithms/io/import.
+// What the importers share: from where samples lie in a file to a grid. Heavy (Eigen): private to
+// algorithms/io/import.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,16 +17,18 @@ struct StoredSamples {
   SampleFormat format;
   std::uint64_t offset = 0;  ///< place of the first sample in the file, unpacked bytes
   double slope = 1.0, intercept = 0.0;
-  Eigen::Matrix4d to_world = Eigen::Matrix4d::Identity();  ///< index coordinates to millimeters, applied to columns
+  Eigen::Matrix4d to_world =
+      Eigen::Matrix4d::Identity();  ///< index coordinates to millimeters, applied to columns
 };
 
-/// Bytes that the samples take. @throws Error for dimensions below 1 or beyond what a grid's index can be, for more than
-/// `at_most` bytes in all, and for more memory than there is; nothing is allocated.
+/// Bytes that the samples take. @throws Error for dimensions below 1 or beyond what a grid's index can be,
+/// for more than `at_most` bytes in all, and for more memory than there is; nothing is allocated.
 std::uint64_t check_stored(const StoredSamples& stored, std::uint64_t at_most);
 
-/// Reads the samples from the source, which stands at or before the first, into a grid as import_volume.h describes
-/// it. @throws Error for a source that ends early or is damaged, for samples that are not finite unless they are
-/// replaced, and for a transform that OpenVDB does not take. @throws Cancelled.
-LevelSet read_stored(ByteSource& source, const StoredSamples& stored, const ImportOptions& options, RunContext& context);
+/// Reads the samples from the source, which stands at or before the first, into a grid as import_volume.h
+/// describes it. @throws Error for a source that ends early or is damaged, for samples that are not finite
+/// unless they are replaced, and for a transform that OpenVDB does not take. @throws Cancelled.
+LevelSet read_stored(ByteSource& source, const StoredSamples& stored, const ImportOptions& options,
+                     RunContext& context);
 
 }  // namespace hermesh

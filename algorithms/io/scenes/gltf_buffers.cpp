@@ -140,7 +140,8 @@ std::string bytes_of_uri(std::string_view uri, const MeshBuilder& builder) {
   const std::filesystem::path root = std::filesystem::canonical(folder, error);
   const std::filesystem::path inside = std::filesystem::canonical(path, error).lexically_relative(root);
   if (!stays_below(inside))
-    builder.fail("its buffer " + name + " is a symbolic link that leads out of the folder of the file; copy it there");
+    builder.fail("its buffer " + name +
+                 " is a symbolic link that leads out of the folder of the file; copy it there");
   try {
     return read_whole(path);
   } catch (const Error&) {

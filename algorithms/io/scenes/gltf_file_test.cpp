@@ -130,17 +130,17 @@ TEST_F(GltfFileTest, PointsMayBeWholeNumbersAndInterleaved) {
 
 TEST_F(GltfFileTest, SparseAccessorsReplaceWhatTheyList) {
   Gltf gltf;
-  gltf.accessors =
-      R"([{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
-      R"("indices":{"bufferView":1,"byteOffset":4,"componentType":5123},"values":{"bufferView":0,"byteOffset":12}}},)"
-      R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}])";
+  gltf.accessors = R"([{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
+                   R"("indices":{"bufferView":1,"byteOffset":4,"componentType":5123},)"
+                   R"("values":{"bufferView":0,"byteOffset":12}}},)"
+                   R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}])";
   // The index at byte 4 is 2, and the value at byte 12 is that of point 1.
   gltf.primitives = R"([{"attributes":{"POSITION":0}}])";
   EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {1, 0, 0}}));
   // Without a view all the other values are 0.
-  gltf.accessors =
-      R"([{"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
-      R"("indices":{"bufferView":1,"byteOffset":2,"componentType":5121},"values":{"bufferView":0,"byteOffset":12}}}])";
+  gltf.accessors = R"([{"componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,)"
+                   R"("indices":{"bufferView":1,"byteOffset":2,"componentType":5121},)"
+                   R"("values":{"bufferView":0,"byteOffset":12}}}])";
   EXPECT_EQ(read(gltf).points, (Points{{0, 0, 0}, {1, 0, 0}}));
 }
 
@@ -214,8 +214,8 @@ TEST_F(GltfFileTest, SaysWhatItLeavesOut) {
   Gltf gltf;
   gltf.head = R"("asset":{"version":"2.0"},"scene":1,"scenes":[{"nodes":[]},{"nodes":[0,1]}])";
   gltf.nodes = R"([{"mesh":0,"skin":0,"translation":[9,9,9]},{"mesh":0,"scale":[1,0,1]}])";
-  gltf.primitives =
-      R"([{"attributes":{"POSITION":0},"mode":1},{"attributes":{"POSITION":0},"indices":1,"targets":[{"POSITION":0}]}])";
+  gltf.primitives = R"([{"attributes":{"POSITION":0},"mode":1},)"
+                    R"({"attributes":{"POSITION":0},"indices":1,"targets":[{"POSITION":0}]}])";
   EXPECT_EQ(read(gltf).points[0], Vector3d(0, 0, 0));
   std::string notes;
   for (const std::string& note : context.notes) notes += note + "\n";

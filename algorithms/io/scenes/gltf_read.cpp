@@ -31,8 +31,8 @@ bool leaves_shapes_alone(std::string_view extension) {
   return false;
 }
 
-/// Reads one file: parses the JSON, goes through the nodes of the scene, decodes the meshes that they show, and adds a copy of
-/// the mesh for each of them to the builder.
+/// Reads one file: parses the JSON, goes through the nodes of the scene, decodes the meshes that they show,
+/// and adds a copy of the mesh for each of them to the builder.
 class GltfReader {
  public:
   GltfReader(std::string_view json, std::string_view binary, MeshBuilder& builder)
@@ -54,7 +54,8 @@ class GltfReader {
   }
 
  private:
-  /// Parses the JSON. The library needs no recursion for it, so that brackets may be nested as deeply as they like.
+  /// Parses the JSON. The library needs no recursion for it, so that brackets may be nested as deeply as they
+  /// like.
   void parse() {
     try {
       root_ = Json::parse(json_.begin(), json_.end());
@@ -130,8 +131,8 @@ class GltfReader {
     return result;
   }
 
-  /// Refuses what the file itself says cannot be read without more knowledge. What it merely uses has a fallback, by the rules
-  /// of the format.
+  /// Refuses what the file itself says cannot be read without more knowledge. What it merely uses has a
+  /// fallback, by the rules of the format.
   void check_extensions() const {
     for (const Json& required : list(root_, "extensionsRequired")) {
       const std::string name = required.is_string() ? required.get<std::string>() : "?";
@@ -151,7 +152,8 @@ class GltfReader {
 
   // ---- Buffers and accessors.
 
-  /// The bytes of a buffer. Those from elsewhere than the second chunk are fetched once, and kept while the file is read.
+  /// The bytes of a buffer. Those from elsewhere than the second chunk are fetched once, and kept while the
+  /// file is read.
   std::string_view buffer(std::size_t index) {
     const Json& description = entry("buffers", index);
     const std::size_t length = count(description, "byteLength");
@@ -177,7 +179,8 @@ class GltfReader {
                     std::size_t number) {
     const Json& description = entry("bufferViews", view);
     const std::string_view whole = buffer(count(description, "buffer"));
-    // All of these are as large as the file likes, so that sums may overflow; each is held against what is left instead.
+    // All of these are as large as the file likes, so that sums may overflow; each is held against what is
+    // left instead.
     const std::size_t start = count_if_any(description, "byteOffset").value_or(0),
                       length = count(description, "byteLength");
     const auto beyond = [&](const std::string& what) {
@@ -413,7 +416,8 @@ class GltfReader {
     if (!(length > 0.0 && std::isfinite(length)))
       builder_.fail("the rotation of a node has the length 0; the file is damaged");
     x /= length, y /= length, z /= length, w /= length;
-    // The usual formula, in double precision; a rotation about an axis of the lattice leaves zeros that are exact.
+    // The usual formula, in double precision; a rotation about an axis of the lattice leaves zeros that are
+    // exact.
     Eigen::Matrix3d m;
     m << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),  //
         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),   //

@@ -114,7 +114,8 @@ std::optional<Eigen::Vector3d> stated_origin(const PolygonMesh& mesh) {
 }
 
 void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file) {
-  // By hand and not by a library: the text is short, and its bytes must not change with a version of somebody else's.
+  // By hand and not by a library: the text is short, and its bytes must not change with a version of somebody
+  // else's.
   std::string json = json_of(mesh);
   if (!binary) {
     out(json);

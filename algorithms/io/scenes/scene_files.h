@@ -36,11 +36,12 @@ void read_three_mf(std::string_view bytes, MeshBuilder& builder);
 /// @throws Error where a .glb file, whose lengths have 32 bits, has no room.
 void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file);
 
-/// Writes a mesh as 3MF; `unit` is the format's word for the unit of the coordinates. Quads become two triangles; triangles with a corner twice, which the
-/// format forbids, are left out with a note. Numbers are the shortest text of the double; the origin of the
-/// mesh is the translation of the build's item. The packed file waits in memory until it is whole.
-void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit, const std::string& file,
-                    RunContext& context);
+/// Writes a mesh as 3MF; `unit` is the format's word for the unit of the coordinates. Quads become two
+/// triangles; triangles with a corner twice, which the format forbids, are left out with a note. Numbers are
+/// the shortest text of the double; the origin of the mesh is the translation of the build's item. The packed
+/// file waits in memory until it is whole.
+void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit,
+                    const std::string& file, RunContext& context);
 
 /// The origin that a file of these formats has to state, since a reader would choose another; none where it
 /// need not.

@@ -199,7 +199,8 @@ TEST_F(ThreeMfFileTest, TheArchiveIsChecked) {
   EXPECT_NE(changed(24, char(whole[entry + 24] + 1)).find("does not unpack"), std::string::npos);
   EXPECT_NE(changed(27, 127).find("a length that it cannot have"), std::string::npos);
   EXPECT_NE(changed(44, 127).find("is not where"), std::string::npos);
-  // Marks of an end in a comment: a few are passed over, thousands are refused before the directory is read for each.
+  // Marks of an end in a comment: a few are passed over, thousands are refused before the directory is read
+  // for each.
   const auto with_marks = [&](int count) {
     std::string bytes = whole, comment;
     for (int i = 0; i < count; ++i) comment += "PK\5\6 some comment of 22";
@@ -263,7 +264,8 @@ TEST_F(ThreeMfFileTest, WritingCanBeCancelled) {
   EXPECT_TRUE(files().empty());
 }
 
-/// A directory that declares 400 MB: what is packed could hold them, but no text of a mesh packs to a thousandth.
+/// A directory that declares 400 MB: what is packed could hold them, but no text of a mesh packs to a
+/// thousandth.
 TEST_F(ThreeMfFileTest, ArchivesMadeToDoHarmAreRefused) {
   std::string noise;
   std::mt19937 random(1);
@@ -279,7 +281,8 @@ TEST_F(ThreeMfFileTest, TheUnitIsTheMillimetreUnlessItIsKnown) {
   const PolygonMesh mesh = random_mesh(1, {1, 2, 3});
   write_mesh(folder / "a.3mf", mesh, context);
   const PolygonMesh read_back = read_mesh(folder / "a.3mf", context);
-  EXPECT_TRUE(std::ranges::none_of(context.notes, [](const auto& note) { return note.find("unit") != note.npos; }));
+  EXPECT_TRUE(
+      std::ranges::none_of(context.notes, [](const auto& note) { return note.find("unit") != note.npos; }));
   write_mesh_in_metres(folder / "b.3mf", mesh, context);
   EXPECT_EQ(read_mesh(folder / "b.3mf", context), read_back);
   EXPECT_NE(context.notes.back().find("'meter'"), std::string::npos);

@@ -7,13 +7,18 @@ namespace hermesh::mesh_formats {
 namespace {
 
 constexpr std::string_view kContentTypes =
-    R"(<?xml version="1.0" encoding="UTF-8"?>
-<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>
-)";
+    R"(<?xml version="1.0" encoding="UTF-8"?>)"
+    "\n"
+    R"(<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">)"
+    R"(<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>)"
+    R"(<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>)"
+    "</Types>\n";
 constexpr std::string_view kRelationships =
-    R"(<?xml version="1.0" encoding="UTF-8"?>
-<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/3dmodel.model"/></Relationships>
-)";
+    R"(<?xml version="1.0" encoding="UTF-8"?>)"
+    "\n"
+    R"(<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">)"
+    R"(<Relationship Id="model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel")"
+    " Target=\"/3D/3dmodel.model\"/></Relationships>\n";
 // The format has one unit for all; its own default is what slicers take the numbers of other formats for.
 constexpr std::string_view kHeadToUnit =
     R"(<?xml version="1.0" encoding="UTF-8"?>
@@ -108,8 +113,8 @@ class ModelText {
 
 }  // namespace
 
-void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit, const std::string& file,
-                    RunContext& context) {
+void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit,
+                    const std::string& file, RunContext& context) {
   ModelText model(mesh, unit);
   const auto next = [&] {
     context.check();

@@ -27,8 +27,8 @@ std::string words_of(zip_error_t& error) {
   return zip_error_strerror(&error);
 }
 
-/// Marks of an archive's end where one may lie: before a comment of up to 65,535 bytes. The library reads the whole directory
-/// for each of them.
+/// Marks of an archive's end where one may lie: before a comment of up to 65,535 bytes. The library reads the
+/// whole directory for each of them.
 std::size_t marks_of_end(std::string_view bytes) {
   constexpr std::size_t kReach = 22 + 65'535;
   bytes.remove_prefix(bytes.size() - std::min(bytes.size(), kReach));

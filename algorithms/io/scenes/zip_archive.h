@@ -63,8 +63,8 @@ class ZipArchive {
   zip_int64_t find(std::string name) const;
   void check(const zip_stat_t& entry, const std::string& shown);
 
-  std::uint64_t bytes_;        ///< of the whole file
-  std::uint64_t opened_ = 0;   ///< unpacked length of the members that were opened
+  std::uint64_t bytes_;       ///< of the whole file
+  std::uint64_t opened_ = 0;  ///< unpacked length of the members that were opened
   const MeshBuilder& builder_;
   Zip archive_;
 };

@@ -16,7 +16,8 @@ bool is_available(SimdLevel level) {
     case SimdLevel::avx2:
       return __builtin_cpu_supports("avx2") != 0;
     case SimdLevel::avx512:
-      // All five extensions that sources of this level are compiled for, VBMI2 for lists of set bits (bit_numbers.inc).
+      // All five extensions that sources of this level are compiled for, VBMI2 for lists of set bits
+      // (bit_numbers.inc).
       return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
              __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
              __builtin_cpu_supports("avx512vbmi2") != 0;
@@ -29,7 +30,8 @@ bool is_available(SimdLevel level) {
 
 std::string names_of_available() {
   std::string text;
-  for (const SimdLevel level : available_simd_levels()) text += (text.empty() ? "" : ", ") + std::string(name(level));
+  for (const SimdLevel level : available_simd_levels())
+    text += (text.empty() ? "" : ", ") + std::string(name(level));
   return text;
 }
 
@@ -51,14 +53,15 @@ std::vector<SimdLevel> available_simd_levels() {
 SimdLevel parse_simd_level(std::string_view text) {
   for (const SimdLevel level : kAll) {
     if (name(level) != text) continue;
-    // Refused and not replaced by the next lower one: who forces a level (a test, a measurement) must not get another.
+    // Refused and not replaced by the next lower one: who forces a level (a test, a measurement) must not get
+    // another.
     if (!is_available(level))
       throw Error("HERMESH_SIMD=" + std::string(text) +
                   " asks for vector code that this machine cannot run; it has " + names_of_available() + ".");
     return level;
   }
-  throw Error("HERMESH_SIMD is '" + std::string(text) + "', which is no level of vector code; this machine has " +
-              names_of_available() + ".");
+  throw Error("HERMESH_SIMD is '" + std::string(text) +
+              "', which is no level of vector code; this machine has " + names_of_available() + ".");
 }
 
 SimdLevel chosen_simd_level() {

@@ -26,8 +26,8 @@ struct Families {
     for (int i = 0; i < kCount; ++i) EXPECT_TRUE(chosen[i]) << "family " << i << " at " << name(level);
   }
 };
-using All = Families<SignReader, kernels::Kernels, winding::Kernels, qef_kernels::Kernels, leaf_kernels::Kernels,
-                     shell_kernels::Kernels, edge_kernels::Kernels>;
+using All = Families<SignReader, kernels::Kernels, winding::Kernels, qef_kernels::Kernels,
+                     leaf_kernels::Kernels, shell_kernels::Kernels, edge_kernels::Kernels>;
 static_assert(All::kCount == HERMESH_SIMD_FAMILIES, "a source of hermesh_simd_sources() is not tested here");
 
 TEST(SimdLevel, EveryFamilyOfKernelsIsOfTheLevelThatIsAskedFor) {

@@ -1,13 +1,15 @@
-// Several numbers at once, in registers as wide as the level that a source is compiled for has, and fixed numbers of
-// them in as many registers as it takes. The compiler's own vector types: operators are elementwise, a comparison gives
-// −1 or 0 in each lane, and `mask ? a : b` chooses lane by lane. What these types lack is here.
+// Several numbers at once, in registers as wide as the level that a source is compiled for has, and fixed
+// numbers of them in as many registers as it takes. The compiler's own vector types: operators are
+// elementwise, a comparison gives −1 or 0 in each lane, and `mask ? a : b` chooses lane by lane. What these
+// types lack is here.
 //
-// For kernels alone, which are compiled once a level (see simd_level.h). Nothing here has external linkage, for what
-// two levels share the linker may take from either; so kernels call none of the standard library's functions, either.
-// Every operation is elementwise and rounded once, as IEEE 754 says, so all levels give the same bytes.
+// For kernels alone, which are compiled once a level (see simd_level.h). Nothing here has external linkage,
+// for what two levels share the linker may take from either; so kernels call none of the standard library's
+// functions, either. Every operation is elementwise and rounded once, as IEEE 754 says, so all levels give
+// the same bytes.
 //
-// With AVX-512, too, vectors are of eight floats, but where HERMESH_WIDEST_VECTORS is defined: of the few dozen edges
-// of a single leaf along an axis sixteen lanes would leave more idle than they gain.
+// With AVX-512, too, vectors are of eight floats, but where HERMESH_WIDEST_VECTORS is defined: of the few
+// dozen edges of a single leaf along an axis sixteen lanes would leave more idle than they gain.
 #pragma once
 
 #include <immintrin.h>
@@ -67,7 +69,9 @@ inline Doubles load(const double* at) {
 }
 inline void store(float* at, Floats x) { __builtin_memcpy(at, &x, sizeof x); }
 inline void store(std::int32_t* at, Ints x) { __builtin_memcpy(at, &x, sizeof x); }
-inline void store(double* at, Doubles x) { __builtin_memcpy(__builtin_assume_aligned(at, sizeof x), &x, sizeof x); }
+inline void store(double* at, Doubles x) {
+  __builtin_memcpy(__builtin_assume_aligned(at, sizeof x), &x, sizeof x);
+}
 inline Ints widened(const std::uint16_t* at) {
   Shorts shorts;
   __builtin_memcpy(&shorts, at, sizeof shorts);
@@ -84,8 +88,8 @@ inline __m128 two_pairs(const float* first, const float* second) {
   return _mm_loadh_pi(_mm_castsi128_ps(low), reinterpret_cast<const __m64*>(second));
 }
 
-// Of each width: smaller and larger are b where either is no number, as the machine has them; less gives a bit a lane;
-// kept_unless_negative() x where `test` is not below 0, and 0 where it is.
+// Of each width: smaller and larger are b where either is no number, as the machine has them; less gives a
+// bit a lane; kept_unless_negative() x where `test` is not below 0, and 0 where it is.
 #if defined(HERMESH_SIXTEEN_LANES)
 constexpr Ints kLaneBits{1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768};
 inline Floats smaller(Floats a, Floats b) { return (Floats)_mm512_min_ps((__m512)a, (__m512)b); }
@@ -98,14 +102,17 @@ inline unsigned less(Floats a, Floats b) { return _mm512_cmp_ps_mask((__m512)a, 
 inline unsigned less(Doubles a, Doubles b) { return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ); }
 inline bool any(Ints mask) { return _mm512_test_epi32_mask((__m512i)mask, (__m512i)mask) != 0; }
 inline Floats kept_unless_negative(Floats test, Floats x) {
-  return (Floats)_mm512_maskz_mov_ps(_mm512_cmp_ps_mask((__m512)test, _mm512_setzero_ps(), _CMP_NLT_UQ), (__m512)x);
+  return (Floats)_mm512_maskz_mov_ps(_mm512_cmp_ps_mask((__m512)test, _mm512_setzero_ps(), _CMP_NLT_UQ),
+                                     (__m512)x);
 }
 inline Doubles load_widened(const float* at) { return (Doubles)_mm512_cvtps_pd(_mm256_loadu_ps(at)); }
 inline void store_rounded(float* at, Doubles x) { _mm256_storeu_ps(at, _mm512_cvtpd_ps((__m512d)x)); }
 inline Floats low_pairs(Floats a, Floats b) { return (Floats)_mm512_unpacklo_ps((__m512)a, (__m512)b); }
 inline Floats high_pairs(Floats a, Floats b) { return (Floats)_mm512_unpackhi_ps((__m512)a, (__m512)b); }
 inline Floats low_halves(Floats a, Floats b) { return (Floats)_mm512_shuffle_ps((__m512)a, (__m512)b, 0x44); }
-inline Floats high_halves(Floats a, Floats b) { return (Floats)_mm512_shuffle_ps((__m512)a, (__m512)b, 0xee); }
+inline Floats high_halves(Floats a, Floats b) {
+  return (Floats)_mm512_shuffle_ps((__m512)a, (__m512)b, 0xee);
+}
 template <class Row>
 inline Floats joined(Row&& row) {
   const __m512 two = _mm512_insertf32x4(_mm512_castps128_ps512(row(0)), row(1), 1);
@@ -130,12 +137,16 @@ inline void store_rounded(float* at, Doubles x) { _mm_storeu_ps(at, _mm256_cvtpd
 inline Floats low_pairs(Floats a, Floats b) { return (Floats)_mm256_unpacklo_ps((__m256)a, (__m256)b); }
 inline Floats high_pairs(Floats a, Floats b) { return (Floats)_mm256_unpackhi_ps((__m256)a, (__m256)b); }
 inline Floats low_halves(Floats a, Floats b) { return (Floats)_mm256_shuffle_ps((__m256)a, (__m256)b, 0x44); }
-inline Floats high_halves(Floats a, Floats b) { return (Floats)_mm256_shuffle_ps((__m256)a, (__m256)b, 0xee); }
+inline Floats high_halves(Floats a, Floats b) {
+  return (Floats)_mm256_shuffle_ps((__m256)a, (__m256)b, 0xee);
+}
 template <class Row>
 inline Floats joined(Row&& row) {
   return (Floats)_mm256_insertf128_ps(_mm256_castps128_ps256(row(0)), row(1), 1);
 }
-inline Floats gather(const float* base, Ints index) { return (Floats)_mm256_i32gather_ps(base, (__m256i)index, 4); }
+inline Floats gather(const float* base, Ints index) {
+  return (Floats)_mm256_i32gather_ps(base, (__m256i)index, 4);
+}
 inline void gather_pairs(const float* base, Ints index, Floats& first, Floats& second) {
   // Two loads of pairs and a shuffle are cheaper than two gathers of single numbers.
   std::int32_t at[8];
@@ -144,7 +155,9 @@ inline void gather_pairs(const float* base, Ints index, Floats& first, Floats& s
   const __m256 a = _mm256_setr_m128(two(0, 1), two(4, 5)), b = _mm256_setr_m128(two(2, 3), two(6, 7));
   first = (Floats)_mm256_shuffle_ps(a, b, 0x88), second = (Floats)_mm256_shuffle_ps(a, b, 0xdd);
 }
-inline Ints gather(const int* base, Ints index) { return (Ints)_mm256_i32gather_epi32(base, (__m256i)index, 4); }
+inline Ints gather(const int* base, Ints index) {
+  return (Ints)_mm256_i32gather_epi32(base, (__m256i)index, 4);
+}
 #else
 constexpr Ints kLaneBits{1, 2, 4, 8};
 inline Floats smaller(Floats a, Floats b) { return (Floats)_mm_min_ps((__m128)a, (__m128)b); }
@@ -187,7 +200,8 @@ inline Ints gather(const int* base, Ints index) {
 /// −1 in the lanes whose bits are set.
 inline Ints mask_of(unsigned bits) { return (all(int(bits)) & kLaneBits) == kLaneBits; }
 
-/// Rows of eight floats, their first samples `stride` apart: as many as a vector holds, or a vector's worth of one.
+/// Rows of eight floats, their first samples `stride` apart: as many as a vector holds, or a vector's worth
+/// of one.
 constexpr int kRows = kLanes < 8 ? 1 : kLanes / 8;
 inline Floats load_rows(const float* first, std::size_t stride) {
 #if defined(HERMESH_SIXTEEN_LANES)
@@ -261,7 +275,8 @@ struct Rows4 {
 
 template <class Register, int registers>
 struct Several {
-  static constexpr int kRegisters = registers, kLanesEach = sizeof(Register) / sizeof(decltype(Register{}[0] + 0));
+  static constexpr int kRegisters = registers,
+                       kLanesEach = sizeof(Register) / sizeof(decltype(Register{}[0] + 0));
   Register r[registers];
 };
 using Floats16 = Several<Floats, 16 / kLanes>;

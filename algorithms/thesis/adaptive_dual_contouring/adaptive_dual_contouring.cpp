@@ -5,20 +5,21 @@
 #include <numeric>
 #include <sstream>
 
-#include "algorithms/core/option_table.h"
 #include "algorithms/core/large_array.h"
+#include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/thesis/adaptive_dual_contouring/block_regions.h"
 #include "algorithms/extraction/hermite_input.h"
+#include "algorithms/thesis/adaptive_dual_contouring/block_regions.h"
 
 namespace hermesh {
 namespace {
 
-/// The mask grid of §6.4 in its last state: the point of each active cell. Numbers within blocks are half as many
-/// bytes to touch as those of the mesh, and touching fresh memory is what the grid costs.
+/// The mask grid of §6.4 in its last state: the point of each active cell. Numbers within blocks are half as
+/// many bytes to touch as those of the mesh, and touching fresh memory is what the grid costs.
 struct MaskGrid {
-  LargeArray<std::uint16_t> numbers;  ///< by block and cell; of cells that are not active whatever the memory held
-  std::vector<std::uint64_t> first;   ///< first point of each block
+  LargeArray<std::uint16_t>
+      numbers;  ///< by block and cell; of cells that are not active whatever the memory held
+  std::vector<std::uint64_t> first;  ///< first point of each block
 };
 
 /// The points of the four cells around a tagged edge, of which each has a block (EdgeSource::blocks()).
@@ -32,10 +33,13 @@ PointsAround points_of(const MaskGrid& mask, const std::array<LatticePlace, 4>& 
   PointsAround result;
   std::uint16_t n[4];
   for (int i = 0; i < 4; ++i) {
-    n[i] = mask.numbers[512 * static_cast<std::size_t>(cells[i].block) + static_cast<std::size_t>(cells[i].sample)];
-    result.points[i] = static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(cells[i].block)]) + point_of(n[i]);
+    n[i] = mask.numbers[512 * static_cast<std::size_t>(cells[i].block) +
+                        static_cast<std::size_t>(cells[i].sample)];
+    result.points[i] =
+        static_cast<std::uint32_t>(mask.first[static_cast<std::size_t>(cells[i].block)]) + point_of(n[i]);
   }
-  const auto [finest, coarsest] = std::minmax({level_of(n[0]), level_of(n[1]), level_of(n[2]), level_of(n[3])});
+  const auto [finest, coarsest] =
+      std::minmax({level_of(n[0]), level_of(n[1]), level_of(n[2]), level_of(n[3])});
   result.step = coarsest - finest;
   result.complete = n[0] != kNoPoint && n[1] != kNoPoint && n[2] != kNoPoint && n[3] != kNoPoint;
   return result;
@@ -61,7 +65,8 @@ class AdaptiveContourer {
     merge();
     number_points(mesh);
     connect(mesh);
-    // A region may hold a whole component of the surface where a topology test is left out; no polygon uses its point.
+    // A region may hold a whole component of the surface where a topology test is left out; no polygon uses
+    // its point.
     if (field_.leaves_out_outside() || options_.topology_tests != AdaptiveOptions::TopologyTests::both)
       drop_unused_points(mesh);
     report();
@@ -72,8 +77,8 @@ class AdaptiveContourer {
   /// Blocks of a task. Groups depend on the data alone, and so does the order of points and polygons.
   static constexpr std::size_t kGroup = 64;
 
-  /// Merges the cells of every block by itself, as §6.4 does. Groups of blocks keep their points until it is known
-  /// how many there are before them: far fewer than active cells.
+  /// Merges the cells of every block by itself, as §6.4 does. Groups of blocks keep their points until it is
+  /// known how many there are before them: far fewer than active cells.
   void merge() {
     Stage stage(context_, "merge cells");
     mask_.numbers.resize(512 * blocks_);
@@ -84,15 +89,16 @@ class AdaptiveContourer {
       std::array<Eigen::Vector3f, 512> points;
       for_each_block(g, [&](std::size_t b) {
         std::uint16_t* mask = mask_.numbers.data() + 512 * b;
-        if (field_.leaves_out_outside()) std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
+        if (field_.leaves_out_outside())
+          std::fill_n(mask, 512, kNoPoint);  // without it every cell asked for is active
         results_[b] = merge_block(input_, static_cast<std::int32_t>(b), mask, points.data());
         places_[g].insert(places_[g].end(), points.begin(), points.begin() + results_[b].points);
       });
     });
   }
 
-  /// Gives every block its range of the shared array of points (§6.4), and moves the points from voxels to the mesh's
-  /// space.
+  /// Gives every block its range of the shared array of points (§6.4), and moves the points from voxels to
+  /// the mesh's space.
   void number_points(PolygonMesh& mesh) {
     Stage stage(context_, "number points");
     mask_.first.resize(blocks_);
@@ -111,8 +117,8 @@ class AdaptiveContourer {
     places_ = {};
   }
 
-  /// Connects points to polygons. Groups of blocks keep them until it is known how many come before: far fewer than
-  /// crossing edges.
+  /// Connects points to polygons. Groups of blocks keep them until it is known how many come before: far
+  /// fewer than crossing edges.
   void connect(PolygonMesh& mesh) {
     Stage stage(context_, "connect");
     std::vector<std::vector<Quad>> quads(groups_);
@@ -137,7 +143,8 @@ class AdaptiveContourer {
     mesh.quads.resize(exclusive_scan(first_quad, "quads"));
     mesh.triangles.resize(exclusive_scan(first_triangle, "triangles"));
     parallel_blocks(groups_, context_, [&](std::size_t g) {
-      std::copy(quads[g].begin(), quads[g].end(), mesh.quads.begin() + static_cast<std::ptrdiff_t>(first_quad[g]));
+      std::copy(quads[g].begin(), quads[g].end(),
+                mesh.quads.begin() + static_cast<std::ptrdiff_t>(first_quad[g]));
       std::copy(triangles[g].begin(), triangles[g].end(),
                 mesh.triangles.begin() + static_cast<std::ptrdiff_t>(first_triangle[g]));
     });
@@ -148,19 +155,23 @@ class AdaptiveContourer {
   void for_each_polygon(std::size_t b, F&& f) const {
     const HermiteView::Block& block = edges_.blocks()[b];
     const bool mirrors = placement_.mirrors();
-    for_each_edge_with_cells(edges_.blocks(), b, [&](int, int sample, const std::array<LatticePlace, 4>& cells) {
-      auto [polygon, step, complete] = points_of(mask_, cells);
-      if (!complete) return;
-      int corners = 0;
-      // Points that are alike are dropped where they follow one another: cells of one region around an edge do, for
-      // it is a cube. With fewer than three left the edge lies within a region, or between two, and gives nothing.
-      for (int i = 0; i < 4; ++i)
-        if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
-      if (corners < 3) return;
-      // The sign at the edge's first sample orients the polygon; a placement that mirrors turns all of them about.
-      if (test(block.inside, sample) == mirrors) std::swap(polygon[1], polygon[corners - 1]);
-      f(polygon, corners, step);
-    });
+    for_each_edge_with_cells(edges_.blocks(), b,
+                             [&](int, int sample, const std::array<LatticePlace, 4>& cells) {
+                               auto [polygon, step, complete] = points_of(mask_, cells);
+                               if (!complete) return;
+                               int corners = 0;
+                               // Points that are alike are dropped where they follow one another: cells of
+                               // one region around an edge do, for it is a cube. With fewer than three left
+                               // the edge lies within a region, or between two, and gives nothing.
+                               for (int i = 0; i < 4; ++i)
+                                 if (polygon[i] != polygon[(i + 1) & 3]) polygon[corners++] = polygon[i];
+                               if (corners < 3) return;
+                               // The sign at the edge's first sample orients the polygon; a placement that
+                               // mirrors turns all of them about.
+                               if (test(block.inside, sample) == mirrors)
+                                 std::swap(polygon[1], polygon[corners - 1]);
+                               f(polygon, corners, step);
+                             });
   }
 
   template <class F>
@@ -234,23 +245,33 @@ const OptionTable<AdaptiveOptions>& adaptive_option_table() {
   static const auto table =
       OptionTable<Options>()
           .number("threshold", &Options::threshold, {},
-                  "square voxels: cells are merged while the sum of the squared distances to their planes is less; larger "
+                  "square voxels: cells are merged while the sum of the squared distances to their planes is "
+                  "less; larger "
                   "merges more, 0 nothing")
-          .choice("placement", &Options::placement, {{"optimal", Placement::optimal}, {"average", Placement::average}},
-                  "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, 'average' takes the "
+          .choice("placement", &Options::placement,
+                  {{"optimal", Placement::optimal}, {"average", Placement::average}},
+                  "where a region's point goes: 'optimal' minimises the QEF and keeps sharp features, "
+                  "'average' takes the "
                   "mean of its crossings")
           .number("truncation", &Options::truncation, {.maximum = 1.0},
-                  "singular values below this share of the largest are dropped; larger is smoother and keeps fewer "
+                  "singular values below this share of the largest are dropped; larger is smoother and keeps "
+                  "fewer "
                   "features, 0 drops none that can be told from 0",
                   {"placement=optimal"})
-          .choice("minimiser", &Options::nearest, {{"mass-point", Nearest::mass_point}, {"corner", Nearest::corner}},
-                  "where singular values are dropped, the minimiser nearest to the 'mass-point' of the crossings, or to "
+          .choice("minimiser", &Options::nearest,
+                  {{"mass-point", Nearest::mass_point}, {"corner", Nearest::corner}},
+                  "where singular values are dropped, the minimiser nearest to the 'mass-point' of the "
+                  "crossings, or to "
                   "the first 'corner' of the cell or region (the pseudo-inverse alone)",
                   {"placement=optimal"})
-          .choice("topology_tests", &Options::topology_tests,
-                  {{"both", Tests::both}, {"table", Tests::table}, {"signs", Tests::signs}, {"none", Tests::none}},
-                  "what a region must pass to be merged: the look-up 'table', the 'signs' of middles, 'both' (as "
-                  "printed), or 'none'; without one the topology may change");
+          .choice(
+              "topology_tests", &Options::topology_tests,
+              {{"both", Tests::both},
+               {"table", Tests::table},
+               {"signs", Tests::signs},
+               {"none", Tests::none}},
+              "what a region must pass to be merged: the look-up 'table', the 'signs' of middles, 'both' (as "
+              "printed), or 'none'; without one the topology may change");
   return table;
 }
 
@@ -277,8 +298,10 @@ PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveO
   context.figure("lost_crossings", static_cast<double>(edges.lost()));
   context.figure("needless_crossings", static_cast<double>(edges.needless()));
   if (edges.lost() > 0)
-    context.note(std::to_string(edges.lost()) + " of " + std::to_string(edges.lost() + edges.tagged() - edges.needless()) +
-                 " edge crossings were lost by the 10 bytes of §4.2 and leave holes; -o lost_crossings=repaired closes "
+    context.note(std::to_string(edges.lost()) + " of " +
+                 std::to_string(edges.lost() + edges.tagged() - edges.needless()) +
+                 " edge crossings were lost by the 10 bytes of §4.2 and leave holes; -o "
+                 "lost_crossings=repaired closes "
                  "them, other representations lose none");
   return mesh;
 }
@@ -287,10 +310,11 @@ PolygonMesh adaptive_dual_contouring(const ExtractionInput& input) {
   const AdaptiveOptions options = adaptive_option_table().read(input.options);
   // As printed: what is meshed are the 10 bytes themselves, with the edges that they say have data.
   if (input.options.is("representation", "thesis") && input.options.is("lost_crossings", "kept"))
-    return adaptive_dual_contouring(thesis_hermite_input(input, "adaptive-dual-contouring"), options, input.field,
-                                    input.context);
+    return adaptive_dual_contouring(thesis_hermite_input(input, "adaptive-dual-contouring"), options,
+                                    input.field, input.context);
   // Means of crossings that are never merged need no planes.
-  const bool needs_normals = options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
+  const bool needs_normals =
+      options.placement == AdaptiveOptions::Placement::optimal || options.threshold > 0;
   const FloatHermite hermite = hermite_input(input, "adaptive-dual-contouring", needs_normals);
   return adaptive_dual_contouring(hermite, options, input.field, input.context);
 }
@@ -304,12 +328,13 @@ std::vector<OptionSpec> adaptive_dual_contouring_options() {
   for (OptionSpec& option : of_hermite)
     if (option.name == "representation") option.fallback = "thesis";
   options.insert(options.end(), of_hermite.begin(), of_hermite.end());
-  options.push_back({.name = "lost_crossings",
-                     .fallback = "kept",
-                     .help = "crossings along x and y whose normal has the code 0, which the print takes for none: 'kept' "
-                             "lost, so that the mesh has holes there, or 'repaired' by the middle of their edge",
-                     .choices = {"kept", "repaired"},
-                     .only_with = {"representation=thesis"}});
+  options.push_back(
+      {.name = "lost_crossings",
+       .fallback = "kept",
+       .help = "crossings along x and y whose normal has the code 0, which the print takes for none: 'kept' "
+               "lost, so that the mesh has holes there, or 'repaired' by the middle of their edge",
+       .choices = {"kept", "repaired"},
+       .only_with = {"representation=thesis"}});
   return options;
 }
 

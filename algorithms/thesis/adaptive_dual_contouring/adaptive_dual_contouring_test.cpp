@@ -43,7 +43,8 @@ struct Result {
   std::map<std::string, double> figures;
 };
 
-Result contour(const LevelSet& level_set, const AdaptiveOptions& options, const AdaptivityField* field = nullptr) {
+Result contour(const LevelSet& level_set, const AdaptiveOptions& options,
+               const AdaptivityField* field = nullptr) {
   RunContext context;
   const FloatHermite hermite = sample_level_set(level_set, 0.0, context);
   Result result{adaptive_dual_contouring(hermite, options, field, context), {}};
@@ -85,11 +86,12 @@ TEST(AdaptiveDualContouring, ThresholdZeroIsUniformDualContouring) {
   const LevelSet volume = sphere(20.3);
   RunContext context;
   const FloatHermite hermite = sample_level_set(volume, 0.0, context);
-  const PolygonMesh uniform =
-      dual_contouring(view_of(hermite, context), {.placement = DualContouringOptions::Placement::average}, context);
+  const PolygonMesh uniform = dual_contouring(
+      view_of(hermite, context), {.placement = DualContouringOptions::Placement::average}, context);
   const PolygonMesh mesh = contour(volume, {.placement = Placement::average, .threshold = 0.0}).mesh;
   ASSERT_EQ(mesh.points.size(), uniform.points.size());
-  for (std::size_t i = 0; i < mesh.points.size(); ++i) ASSERT_LT((mesh.points[i] - uniform.points[i]).norm(), 1e-5f);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    ASSERT_LT((mesh.points[i] - uniform.points[i]).norm(), 1e-5f);
   EXPECT_EQ(polygons(mesh), polygons(uniform));
   EXPECT_TRUE(mesh.triangles.empty());
   EXPECT_TRUE(is_closed_and_oriented(mesh));
@@ -109,7 +111,8 @@ AnalyticSurface cube(const Vector3d& centre, double half) {
 }
 
 TEST(AdaptiveDualContouring, APlaneIsOnePointABlock) {
-  // The top of a box at z = 35.5, and 8×8 blocks of 64 active cells of which those at the rim have other faces, too.
+  // The top of a box at z = 35.5, and 8×8 blocks of 64 active cells of which those at the rim have other
+  // faces, too.
   const AnalyticSurface box = cube(Vector3d::Constant(31.5), 31.0);
   RunContext context;
   const FloatHermite hermite = sample_function(box, {}, {-8, -8, -8}, {71, 71, 71}, 1e-6, context);
@@ -133,7 +136,9 @@ TEST(AdaptiveDualContouring, TheThresholdBoundsTheDistanceToThePlanes) {
       EXPECT_TRUE(is_closed_and_oriented(result.mesh));
       EXPECT_TRUE(uses_all_points(result.mesh));
       EXPECT_LE(result.figures.at("largest_plane_distance"), std::sqrt(threshold) + 1e-6);
-      EXPECT_GT(result.figures.at("regions_1") + result.figures.at("regions_2") + result.figures.at("regions_3"), 0.0);
+      EXPECT_GT(
+          result.figures.at("regions_1") + result.figures.at("regions_2") + result.figures.at("regions_3"),
+          0.0);
       if (placement == Placement::average) continue;
       EXPECT_LT(result.mesh.points.size(), before);
       EXPECT_TRUE(threshold != 0.1 || !result.mesh.triangles.empty());
@@ -164,12 +169,14 @@ TEST(AdaptiveDualContouring, SameBytesAtAnyNumberOfThreads) {
   EXPECT_THROW(contour(volume, {}, &field), Error);  // a level set is no scale: it has negative values
 }
 
-/// A ball within a hollow: its own surface lies wholly within one block, whose corners are all outside of the shell.
+/// A ball within a hollow: its own surface lies wholly within one block, whose corners are all outside of the
+/// shell.
 LevelSet small_ball() {
   initialize_openvdb();
   auto grid = openvdb::FloatGrid::create(1.0f);
   auto access = grid->getAccessor();
-  // Inside at one sample, in the middle of the region of 4³ cells from (0, 0, 0), and in a large ball far away.
+  // Inside at one sample, in the middle of the region of 4³ cells from (0, 0, 0), and in a large ball far
+  // away.
   access.setValue({2, 2, 2}, -1.0f);
   for (int x = 20; x < 60; ++x)
     for (int y = 0; y < 40; ++y)
@@ -190,17 +197,21 @@ TEST(TopologyTests, EachKeepsWhatTheOtherLetsGo) {
     return result.mesh;
   };
   const auto near_ball = [](const PolygonMesh& mesh) {
-    return std::any_of(mesh.points.begin(), mesh.points.end(), [](const auto& point) { return point.x() < 10.0f; });
+    return std::any_of(mesh.points.begin(), mesh.points.end(),
+                       [](const auto& point) { return point.x() < 10.0f; });
   };
-  // The corners around the single sample are all outside: the table refuses them, and so do the signs of the middles.
+  // The corners around the single sample are all outside: the table refuses them, and so do the signs of the
+  // middles.
   EXPECT_TRUE(near_ball(made(small_ball(), Tests::both)));
   EXPECT_TRUE(near_ball(made(small_ball(), Tests::table)));
   EXPECT_TRUE(near_ball(made(small_ball(), Tests::signs)));
   EXPECT_FALSE(near_ball(made(small_ball(), Tests::none)));
   // On noise each test refuses regions that the other lets pass, so that both together leave the most points.
   const LevelSet volume = noise(33, 4);
-  const std::size_t both = made(volume, Tests::both).points.size(), table = made(volume, Tests::table).points.size(),
-                    signs = made(volume, Tests::signs).points.size(), none = made(volume, Tests::none).points.size();
+  const std::size_t both = made(volume, Tests::both).points.size(),
+                    table = made(volume, Tests::table).points.size(),
+                    signs = made(volume, Tests::signs).points.size(),
+                    none = made(volume, Tests::none).points.size();
   EXPECT_GT(both, table);
   EXPECT_GT(both, signs);
   EXPECT_GT(table, none);
@@ -208,8 +219,8 @@ TEST(TopologyTests, EachKeepsWhatTheOtherLetsGo) {
 }
 
 TEST(AdaptiveDualContouring, TrianglesLieWhereLevelsMeet) {
-  // A polygon has as many corners as there are different cells and regions around its edge. Around an edge with regions
-  // of one level there are one, two or four of them, so that a triangle needs two levels.
+  // A polygon has as many corners as there are different cells and regions around its edge. Around an edge
+  // with regions of one level there are one, two or four of them, so that a triangle needs two levels.
   for (const LevelSet& volume : {sphere(40.0), noise(41, 6)}) {
     const Result result = contour(volume, {.threshold = 0.05});
     const auto figure = [&](const std::string& name) { return result.figures.at(name); };
@@ -251,9 +262,11 @@ TEST(AdaptiveDualContouring, EscapesAreCountedByTheirDistance) {
 }
 
 TEST(AdaptiveDualContouring, TheBarePseudoInverseLeansTowardsTheCorner) {
-  // On a plane every point of it is a minimiser: one lies below the mean of the crossings, one below the cell's corner.
+  // On a plane every point of it is a minimiser: one lies below the mean of the crossings, one below the
+  // cell's corner.
   RunContext context;
-  const FloatHermite hermite = sample_function(cube({3.5, 3.5, -0.75}, 4.0), {}, {-8, -8, -8}, {15, 15, 15}, 1e-6, context);
+  const FloatHermite hermite =
+      sample_function(cube({3.5, 3.5, -0.75}, 4.0), {}, {-8, -8, -8}, {15, 15, 15}, 1e-6, context);
   AdaptiveOptions options{.threshold = 0.0};
   const PolygonMesh mean = adaptive_dual_contouring(hermite, options, nullptr, context);
   options.nearest = AdaptiveOptions::Nearest::corner;
@@ -263,15 +276,20 @@ TEST(AdaptiveDualContouring, TheBarePseudoInverseLeansTowardsTheCorner) {
   for (std::size_t i = 0; i < mean.points.size(); ++i) {
     // Cells at the rim have other faces, too.
     const Eigen::Vector3f& at = mean.points[i];
-    if (at.x() < 1.0f || at.y() < 1.0f || at.x() > 6.0f || at.y() > 6.0f || std::fabs(at.z() - 3.25f) > 1e-3f) continue;
-    EXPECT_LT((at - Eigen::Vector3f(std::floor(at.x()) + 0.5f, std::floor(at.y()) + 0.5f, 3.25f)).norm(), 1e-4f);
-    EXPECT_LT((corner.points[i] - Eigen::Vector3f(std::floor(at.x()), std::floor(at.y()), 3.25f)).norm(), 1e-4f);
+    if (at.x() < 1.0f || at.y() < 1.0f || at.x() > 6.0f || at.y() > 6.0f || std::fabs(at.z() - 3.25f) > 1e-3f)
+      continue;
+    EXPECT_LT((at - Eigen::Vector3f(std::floor(at.x()) + 0.5f, std::floor(at.y()) + 0.5f, 3.25f)).norm(),
+              1e-4f);
+    EXPECT_LT((corner.points[i] - Eigen::Vector3f(std::floor(at.x()), std::floor(at.y()), 3.25f)).norm(),
+              1e-4f);
     ++cells;
   }
   EXPECT_EQ(cells, 25);
 }
 
-TEST(AdaptiveDualContouring, AnEmptyVolumeGivesAnEmptyMesh) { EXPECT_TRUE(contour(noise(0, 1), {}).mesh.empty()); }
+TEST(AdaptiveDualContouring, AnEmptyVolumeGivesAnEmptyMesh) {
+  EXPECT_TRUE(contour(noise(0, 1), {}).mesh.empty());
+}
 
 Vector3d middle_of(const PolygonMesh& mesh, const std::vector<std::uint32_t>& polygon) {
   Vector3d sum = Vector3d::Zero();
@@ -303,10 +321,12 @@ const Vector3d kMaskCentre(45.0, 0.0, 0.0);
 TEST(AdaptivityMasks, NothingIsMadeOutside) {
   const LevelSet volume = sphere(45.0);
   for (const double voxel : {1.0, 2.5, 12.0}) {
-    const AdaptivityField field{sphere(kMaskRadius, kMaskCentre, voxel), AdaptivityField::Outside::nothing, {}};
+    const AdaptivityField field{
+        sphere(kMaskRadius, kMaskCentre, voxel), AdaptivityField::Outside::nothing, {}};
     const PolygonMesh whole = contour(volume, {Placement::average, 0.0, 0.1}).mesh;
     const PolygonMesh part = contour(volume, {Placement::average, 0.0, 0.1}, &field).mesh;
-    // A point of a cell is at most half the cell's diagonal from its centre, which is inside the mask as interpolated.
+    // A point of a cell is at most half the cell's diagonal from its centre, which is inside the mask as
+    // interpolated.
     const double slack = 0.5 * std::sqrt(3.0) + (voxel < 10 ? 0.1 * voxel : 0.5 * voxel);
     for (std::size_t i = 0; i < part.points.size(); ++i)
       EXPECT_LT((part.world(i) - kMaskCentre).norm(), kMaskRadius + slack);

@@ -36,20 +36,22 @@ Plane plane_of(const EdgeCrossing& crossing, int axis, const int (&at)[3]) {
   return plane;
 }
 
-/// Collects the tagged edges along an axis that a block owns and the cells of the merged block share; the owner lies
-/// (d[0], d[1], d[2]) blocks above the merged one, each 0 or 1. Returns the end.
+/// Collects the tagged edges along an axis that a block owns and the cells of the merged block share; the
+/// owner lies (d[0], d[1], d[2]) blocks above the merged one, each 0 or 1. Returns the end.
 Plane* gather_owned(const EdgeSource& edges, std::int32_t owner, int axis, const int (&d)[3], Plane* plane) {
   // Of an upper neighbour the first layers count.
   const std::uint64_t layer = first_layers(d[1], d[2]);
   BlockMask wanted{};
   std::uint64_t some = 0;
-  for (int x = 0; x < (d[0] ? 1 : 8); ++x) some |= wanted[x] = edges.blocks()[owner].crossing[axis][x] & layer;
+  for (int x = 0; x < (d[0] ? 1 : 8); ++x)
+    some |= wanted[x] = edges.blocks()[owner].crossing[axis][x] & layer;
   if (some == 0) return plane;
   std::array<EdgeCrossing, 512> data;
   edges.read(owner, axis, wanted, data.data());
   const EdgeCrossing* next = data.data();
   for_each_bit(wanted, [&](int sample) {
-    *plane++ = plane_of(*next++, axis, {(sample >> 6) + 8 * d[0], (sample >> 3 & 7) + 8 * d[1], (sample & 7) + 8 * d[2]});
+    *plane++ = plane_of(*next++, axis,
+                        {(sample >> 6) + 8 * d[0], (sample >> 3 & 7) + 8 * d[1], (sample & 7) + 8 * d[2]});
   });
   return plane;
 }
@@ -61,8 +63,8 @@ int gather_planes(const EdgeSource& edges, const HermiteView::Block& block, Plan
     for (int part = 0; part < 8; ++part) {
       const int d[3] = {part >> 2, (part >> 1) & 1, part & 1};
       const std::int32_t number = block.neighbours[neighbour_slot(d[0], d[1], d[2])];
-      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells. A block
-      // without a leaf owns none.
+      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells. A
+      // block without a leaf owns none.
       if (d[axis] || number < 0 || edges.blocks()[number].leaf < 0) continue;
       end = gather_owned(edges, number, axis, d, end);
     }
@@ -79,8 +81,8 @@ void for_each_cell_around(const Plane& plane, F&& f) {
     for (int j = plane.at[v] == 8; j < (plane.at[v] == 0 ? 1 : 2); ++j) f(cell - i * kStep[u] - j * kStep[v]);
 }
 
-/// Numbers of the regions by level (regions of 2³, 4³ and 8³ cells) and cell: region (i, j, k) of n³ has the number
-/// n²i + nj + k.
+/// Numbers of the regions by level (regions of 2³, 4³ and 8³ cells) and cell: region (i, j, k) of n³ has the
+/// number n²i + nj + k.
 constexpr std::array<std::array<std::uint8_t, 512>, 3> region_numbers() {
   std::array<std::array<std::uint8_t, 512>, 3> table{};
   for (int level = 0; level < 3; ++level)
@@ -97,7 +99,8 @@ constexpr std::array<std::array<std::uint8_t, 512>, 3> kRegion = region_numbers(
 constexpr std::array<std::array<std::uint16_t, 64>, 3> first_cells() {
   std::array<std::array<std::uint16_t, 64>, 3> table{};
   for (int level = 0; level < 3; ++level)
-    for (int cell = 511; cell >= 0; --cell) table[level][kRegion[level][cell]] = static_cast<std::uint16_t>(cell);
+    for (int cell = 511; cell >= 0; --cell)
+      table[level][kRegion[level][cell]] = static_cast<std::uint16_t>(cell);
   return table;
 }
 constexpr std::array<std::array<std::uint16_t, 64>, 3> kFirstCell = first_cells();
@@ -124,7 +127,8 @@ class BlockMerger {
         plane_count_(gather_planes(input.edges, block_, planes_.data())) {
     // Step 1 of §6.4: the mask holds the cells around tagged edges.
     for (int i = 0; i < plane_count_; ++i)
-      for_each_cell_around(planes_[i], [&](int cell) { active_[cell >> 6] |= std::uint64_t{1} << (cell & 63); });
+      for_each_cell_around(planes_[i],
+                           [&](int cell) { active_[cell >> 6] |= std::uint64_t{1} << (cell & 63); });
     if (input.field.leaves_out_outside()) active_ = input.field.inside(block_.lower, active_);
   }
 
@@ -159,8 +163,8 @@ class BlockMerger {
     }
   }
 
-  /// Sets what E may be in each region: the least that one of its cells allows. Cells where the field says so allow
-  /// any.
+  /// Sets what E may be in each region: the least that one of its cells allows. Cells where the field says so
+  /// allow any.
   void set_limits() {
     const auto threshold = static_cast<float>(input_.options.threshold);
     for (Level& level : levels_) level.limits.fill(kNoLimit);
@@ -224,8 +228,8 @@ class BlockMerger {
     return tests == Tests::none || region_topology::middles_agree(signs);
   }
 
-  /// Tries the regions of a level, topology first: it costs a few operations, and the minimisers of those that pass
-  /// are found together.
+  /// Tries the regions of a level, topology first: it costs a few operations, and the minimisers of those
+  /// that pass are found together.
   void merge_level(int number) {
     Level& level = levels_[number];
     int candidates = 0;
@@ -251,8 +255,8 @@ class BlockMerger {
     }
   }
 
-  /// Places of points by the chosen placement, relative to the block's middle; `cells` holds the first cell of each
-  /// sum's cell or region.
+  /// Places of points by the chosen placement, relative to the block's middle; `cells` holds the first cell
+  /// of each sum's cell or region.
   void place(std::span<const QefSum* const> sums, const std::uint16_t* cells, Vector3d* places) {
     if (input_.options.placement == AdaptiveOptions::Placement::average) {
       for (std::size_t i = 0; i < sums.size(); ++i) places[i] = sums[i]->mass_point();
@@ -298,7 +302,8 @@ class BlockMerger {
       mask[cell] = entry(level.points[region], number + 1);
     });
     place({lone_sums_.data(), static_cast<std::size_t>(alone)}, lone_cells_.data(), lone_places_.data());
-    for (int i = 0; i < alone; ++i) put(points[point_of(mask[lone_cells_[i]])], lone_places_[i], lone_cells_[i], 1);
+    for (int i = 0; i < alone; ++i)
+      put(points[point_of(mask[lone_cells_[i]])], lone_places_[i], lone_cells_[i], 1);
   }
 
   /// An entry of the mask, of which point_of() and level_of() give the parts back.
@@ -306,16 +311,18 @@ class BlockMerger {
     return static_cast<std::uint16_t>(point | static_cast<std::uint32_t>(level) << 9);
   }
 
-  /// Writes the point of the region of that side that begins at the cell, and counts it if it is outside: nothing
-  /// holds it there (trap T7).
+  /// Writes the point of the region of that side that begins at the cell, and counts it if it is outside:
+  /// nothing holds it there (trap T7).
   void put(Eigen::Vector3f& out, const Vector3d& place, int cell, int side) {
     out = (place + Vector3d::Constant(kMiddle)).cast<float>();
     const int corner[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
     float escape = 0.0f;
     for (int a = 0; a < 3; ++a)
-      escape = std::max({escape, static_cast<float>(corner[a]) - out[a], out[a] - static_cast<float>(corner[a] + side)});
+      escape = std::max(
+          {escape, static_cast<float>(corner[a]) - out[a], out[a] - static_cast<float>(corner[a] + side)});
     if (escape == 0.0f) return;
-    const auto range = std::lower_bound(kEscapeRanges.begin(), kEscapeRanges.end(), escape) - kEscapeRanges.begin();
+    const auto range =
+        std::lower_bound(kEscapeRanges.begin(), kEscapeRanges.end(), escape) - kEscapeRanges.begin();
     ++result_.escaped[static_cast<std::size_t>(range)];
     result_.largest_escape = std::max(result_.largest_escape, escape);
   }
@@ -351,7 +358,7 @@ class BlockMerger {
   std::array<std::uint16_t, 512> slots_;  ///< where the sum of each cell is
   std::array<QefSum, 513> sums_;
   std::array<std::uint8_t, 512> merged_into_;  ///< region of each cell, plus 64 times its level
-  std::array<Level, 3> levels_;              ///< of regions of 2³, 4³ and 8³ cells
+  std::array<Level, 3> levels_;                ///< of regions of 2³, 4³ and 8³ cells
   std::array<std::uint16_t, 512> lone_cells_;
   std::array<const QefSum*, 512> lone_sums_;
   std::array<Vector3d, 512> lone_places_, starts_;
@@ -359,7 +366,8 @@ class BlockMerger {
 
 }  // namespace
 
-BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask, Eigen::Vector3f* points) {
+BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask,
+                        Eigen::Vector3f* points) {
   return BlockMerger(input, block).merge(mask, points);
 }
 

@@ -26,8 +26,8 @@ std::array<BlockMask, 3> tagged_edges(const ThesisVoxel* voxels) {
   return tags;
 }
 
-/// Adds the places of the blocks that hold a cell around a tagged edge: the leaf's own, and where the edge lies in a
-/// first layer the one below along each axis that is not the edge's.
+/// Adds the places of the blocks that hold a cell around a tagged edge: the leaf's own, and where the edge
+/// lies in a first layer the one below along each axis that is not the edge's.
 void add_blocks_around(const Lower& lower, const std::array<BlockMask, 3>& tags, std::vector<Lower>& out) {
   for (int axis = 0; axis < 3; ++axis)
     for (int down = 1; down < 8; ++down) {
@@ -35,15 +35,17 @@ void add_blocks_around(const Lower& lower, const std::array<BlockMask, 3>& tags,
       const std::uint64_t bits = first_layers(down & 2, down & 4);
       bool touches = false;
       for (int x = 0; x < (down & 1 ? 1 : 8); ++x) touches |= (tags[axis][x] & bits) != 0;
-      if (touches) out.push_back({lower[0] - 8 * (down & 1), lower[1] - 8 * (down >> 1 & 1), lower[2] - 8 * (down >> 2)});
+      if (touches)
+        out.push_back(
+            {lower[0] - 8 * (down & 1), lower[1] - 8 * (down >> 1 & 1), lower[2] - 8 * (down >> 2)});
     }
 }
 
 }  // namespace
 
 std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
-  // A block that is not there owns no crossing edge: none of its edges changes the sign, so all its samples have that of the
-  // sample before them.
+  // A block that is not there owns no crossing edge: none of its edges changes the sign, so all its samples
+  // have that of the sample before them.
   const HermiteView::Block& block = blocks()[number];
   std::array<SignLattice::Part, 8> parts;
   std::array<std::int32_t, 8> leaf;
@@ -54,7 +56,8 @@ std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
       parts[part].inside = &blocks()[there].inside;
       continue;
     }
-    // One step down from the part, along the lowest of its axes; that part has been looked at already, and part 0 is there.
+    // One step down from the part, along the lowest of its axes; that part has been looked at already, and
+    // part 0 is there.
     const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
     parts[part].uniform = leaf[before] >= 0      ? hermite_.leaves[leaf[before]].beyond[axis] & 1
                           : parts[before].inside ? (*parts[before].inside)[0] & 1
@@ -65,8 +68,10 @@ std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
 
 void SparseEdges::read(std::int32_t number, int axis, const BlockMask& wanted, EdgeCrossing* out) const {
   const HermiteView::Block& block = blocks()[number];
-  // Crossings are stored by axis and then by sample, so that those that are wanted are found by counting bits.
-  const EdgeCrossing* next = hermite_.crossings.data() + hermite_.leaves[block.leaf].first + block.before[axis][0];
+  // Crossings are stored by axis and then by sample, so that those that are wanted are found by counting
+  // bits.
+  const EdgeCrossing* next =
+      hermite_.crossings.data() + hermite_.leaves[block.leaf].first + block.before[axis][0];
   for (int x = 0; x < 8; ++x) {
     const std::uint64_t word = block.crossing[axis][x];
     if (!(word & wanted[x])) {
@@ -99,7 +104,8 @@ PackedEdges::PackedEdges(ThesisDense hermite, RunContext& context) : hermite_(st
     HermiteView::Block& block = blocks_[b];
     block = {};
     block.lower = places[b];
-    const auto at = std::ranges::lower_bound(leaves, block.lower, {}, [](const Leaf* leaf) { return lower_of(leaf->origin()); });
+    const auto at = std::ranges::lower_bound(leaves, block.lower, {},
+                                             [](const Leaf* leaf) { return lower_of(leaf->origin()); });
     const bool found = at != leaves.end() && lower_of((*at)->origin()) == block.lower;
     block.leaf = found ? static_cast<std::int32_t>(at - leaves.begin()) : -1;
     voxels_[b] = found ? (*at)->buffer().data() : nullptr;
@@ -131,8 +137,8 @@ std::array<SignLattice::Part, 8> PackedEdges::signs(std::int32_t number) const {
     if (there >= 0)
       parts[part].inside = &blocks_[there].inside;
     else
-      parts[part].uniform =
-          sign_without_block({block.lower[0] + 8 * d[0], block.lower[1] + 8 * d[1], block.lower[2] + 8 * d[2]});
+      parts[part].uniform = sign_without_block(
+          {block.lower[0] + 8 * d[0], block.lower[1] + 8 * d[1], block.lower[2] + 8 * d[2]});
   }
   return parts;
 }
@@ -151,7 +157,9 @@ void PackedEdges::count_edges(RunContext& context) {
     constexpr int kPart[3] = {4, 2, 1};  // the neighbour one block up the axis
     for (int axis = 0; axis < 3; ++axis) {
       const SignLattice::Part& next = parts[kPart[axis]];
-      leaf.beyond[axis] = next.inside ? first_layer(*next.inside, axis) : next.uniform ? ~std::uint64_t{0} : 0;
+      leaf.beyond[axis] = next.inside    ? first_layer(*next.inside, axis)
+                          : next.uniform ? ~std::uint64_t{0}
+                                         : 0;
     }
     const std::array<BlockMask, 3> changing = crossing_edges(leaf);
     std::size_t all = 0, missing = 0, more = 0;

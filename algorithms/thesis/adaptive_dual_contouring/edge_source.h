@@ -1,8 +1,9 @@
 // Hermite data as chapter 6 reads them: signs at samples, and edges that are "tagged with data".
 //
-// Two forms have this. Of ours (FloatHermite) the tagged edges are those whose ends differ in sign. Of the thesis's 10
-// bytes (ThesisDense) they are those whose voxel says so, which §4.2 reads off the normal's code: it misses some whose
-// ends differ in sign (trap T2), and after eq. 7.1 it has some whose ends do not (trap T11).
+// Two forms have this. Of ours (FloatHermite) the tagged edges are those whose ends differ in sign. Of the
+// thesis's 10 bytes (ThesisDense) they are those whose voxel says so, which §4.2 reads off the normal's code:
+// it misses some whose ends differ in sign (trap T2), and after eq. 7.1 it has some whose ends do not (trap
+// T11).
 #pragma once
 
 #include <array>
@@ -21,13 +22,14 @@ class EdgeSource {
   EdgeSource(const EdgeSource&) = delete;
   EdgeSource& operator=(const EdgeSource&) = delete;
 
-  /// Blocks in ascending order with their neighbours: one for each cell around a tagged edge, and for its owner. All of
-  /// a block is set; `crossing` are the tagged edges that it owns, and a block without a leaf owns none.
+  /// Blocks in ascending order with their neighbours: one for each cell around a tagged edge, and for its
+  /// owner. All of a block is set; `crossing` are the tagged edges that it owns, and a block without a leaf
+  /// owns none.
   virtual const HermiteView::Blocks& blocks() const = 0;
   /// The signs of a block and of its upper neighbours, there or not: parts 4x + 2y + z.
   virtual std::array<SignLattice::Part, 8> signs(std::int32_t block) const = 0;
-  /// Writes the data of the block's edges along an axis that are in `wanted`, which must be tagged, in the order of
-  /// their samples.
+  /// Writes the data of the block's edges along an axis that are in `wanted`, which must be tagged, in the
+  /// order of their samples.
   virtual void read(std::int32_t block, int axis, const BlockMask& wanted, EdgeCrossing* out) const = 0;
 
  protected:
@@ -38,7 +40,8 @@ class EdgeSource {
 class SparseEdges : public EdgeSource {
  public:
   /// @throws Cancelled.
-  SparseEdges(const FloatHermite& hermite, RunContext& context) : hermite_(hermite), view_(view_of(hermite, context)) {}
+  SparseEdges(const FloatHermite& hermite, RunContext& context)
+      : hermite_(hermite), view_(view_of(hermite, context)) {}
 
   const HermiteView::Blocks& blocks() const override { return view_.blocks(); }
   std::array<SignLattice::Part, 8> signs(std::int32_t block) const override;

@@ -58,7 +58,8 @@ class EdgeSourceTest : public testing::Test {
 std::size_t boundary_edges(const PolygonMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   const auto add = [&](const auto& polygon) {
-    for (std::size_t i = 0; i < polygon.size(); ++i) ++uses[std::minmax(polygon[i], polygon[(i + 1) % polygon.size()])];
+    for (std::size_t i = 0; i < polygon.size(); ++i)
+      ++uses[std::minmax(polygon[i], polygon[(i + 1) % polygon.size()])];
   };
   for (const Triangle& triangle : mesh.triangles) add(triangle);
   for (const Quad& quad : mesh.quads) add(quad);
@@ -77,7 +78,8 @@ TEST_F(EdgeSourceTest, PackedDataGiveTheMeshOfTheSameDataUnpacked) {
   EXPECT_EQ(edges.tagged(), sparse.crossings.size());
   EXPECT_EQ(edges.lost(), 0u);
   EXPECT_EQ(edges.needless(), 0u);
-  for (const double threshold : {0.0, 0.1, 10.0}) EXPECT_EQ(mesh(dense, threshold), mesh(sparse, threshold)) << threshold;
+  for (const double threshold : {0.0, 0.1, 10.0})
+    EXPECT_EQ(mesh(dense, threshold), mesh(sparse, threshold)) << threshold;
 }
 
 TEST_F(EdgeSourceTest, BothFormsHaveTheSameSigns) {
@@ -117,10 +119,12 @@ TEST_F(EdgeSourceTest, LostCrossingsAreHolesInTheMesh) {
   EXPECT_EQ(figure("lost_crossings"), double(lost));
 }
 
-// Trap T11: eq. 7.1 leaves data between samples of one sign where its operands cross an edge against each other.
+// Trap T11: eq. 7.1 leaves data between samples of one sign where its operands cross an edge against each
+// other.
 TEST_F(EdgeSourceTest, DataBetweenSamplesOfOneSignMakePolygons) {
   // Two boxes with a gap of 0.4 voxel between x = 9.3 and 9.7: edges from 9 to 10 lie within the union.
-  const FloatHermite left = box({5.0, 10.0, 10.0}, {4.3, 6.2, 6.2}, 0.0), right = box({15.0, 10.0, 10.0}, {5.3, 6.2, 6.2}, 0.0);
+  const FloatHermite left = box({5.0, 10.0, 10.0}, {4.3, 6.2, 6.2}, 0.0),
+                     right = box({15.0, 10.0, 10.0}, {5.3, 6.2, 6.2}, 0.0);
   const ThesisDense both = combine(Boolean::unite, packed(left), packed(right), context_);
   const PackedEdges edges(both, context_);
   EXPECT_EQ(edges.tagged(), both.crossings());

@@ -2,8 +2,8 @@
 
 #include "algorithms/lattice/simd/vectors.h"
 
-// Plain loops over lanes, compiled as those of winding_kernels.cpp are; every lane's operations are the same at all
-// levels, and so are its bytes.
+// Plain loops over lanes, compiled as those of winding_kernels.cpp are; every lane's operations are the same
+// at all levels, and so are its bytes.
 namespace hermesh::qef_kernels {
 namespace HERMESH_SIMD_LEVEL {
 namespace {
@@ -16,7 +16,8 @@ inline float larger(float a, float b) { return a < b ? b : a; }
   for (int i = 0; i < kLanes; ++i) {
     const float d = m.diagonal[q][i] - m.diagonal[p][i], e = 2.0f * m.off[r][i];
     // The tangent of the smaller of the two angles that do it; with kTiny a matrix that is 0 stays as it is.
-    const float t = __builtin_copysignf(1.0f, d) * e / (__builtin_fabsf(d) + __builtin_sqrtf(d * d + e * e) + kTiny);
+    const float t =
+        __builtin_copysignf(1.0f, d) * e / (__builtin_fabsf(d) + __builtin_sqrtf(d * d + e * e) + kTiny);
     const float c = 1.0f / __builtin_sqrtf(1.0f + t * t), s = t * c;
     m.diagonal[p][i] -= t * m.off[r][i];
     m.diagonal[q][i] += t * m.off[r][i];
@@ -32,8 +33,8 @@ inline float larger(float a, float b) { return a < b ? b : a; }
   }
 }
 
-/// Eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for a symmetric matrix
-/// of three rows this takes the place of the singular value decomposition of A (eq. 6.4).
+/// Eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for a symmetric
+/// matrix of three rows this takes the place of the singular value decomposition of A (eq. 6.4).
 [[gnu::always_inline]] inline void decompose(EigenLanes& m) {
   for (int k = 0; k < 3; ++k)
     for (int a = 0; a < 3; ++a)

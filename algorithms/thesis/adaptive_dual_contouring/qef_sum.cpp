@@ -11,8 +11,8 @@ using qef_kernels::EigenLanes, qef_kernels::kLanes, qef_kernels::Lanes;
 
 namespace {
 
-/// Writes a sum's matrix AᵀA, of which `value` gives the upper triangle row by row, into one lane. `off[i]` is the entry that
-/// row and column i have no part in.
+/// Writes a sum's matrix AᵀA, of which `value` gives the upper triangle row by row, into one lane. `off[i]`
+/// is the entry that row and column i have no part in.
 void load(EigenLanes& m, int lane, const QefSum& sum) {
   constexpr int kDiagonal[3] = {0, 3, 5}, kOff[3] = {4, 2, 1};
   for (int i = 0; i < 3; ++i) {
@@ -57,8 +57,8 @@ double QefSum::error(const Eigen::Vector3d& x) const {
   return std::max(0.0, value(9) - x.dot(atb) - x.dot(slope(*this, x)));
 }
 
-void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts, double truncation,
-                Eigen::Vector3d* out) {
+void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts,
+                double truncation, Eigen::Vector3d* out) {
   const auto start = [&](std::size_t i) { return starts.empty() ? sums[i]->mass_point() : starts[i]; };
   if (truncation < kLeastInSingle) {
     for (std::size_t i = 0; i < sums.size(); ++i)
@@ -75,8 +75,8 @@ void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vect
       // Lanes without a sum repeat the last one.
       const std::size_t at = first + static_cast<std::size_t>(std::min(i, n - 1));
       load(m, i, *sums[at]);
-      // From the start, in double precision, so that only the step is a single one, and a direction without a singular
-      // value stays as it is there: the pseudo-inverse of §6.2.1 about the start as origin.
+      // From the start, in double precision, so that only the step is a single one, and a direction without a
+      // singular value stays as it is there: the pseudo-inverse of §6.2.1 about the start as origin.
       const Eigen::Vector3d fall = slope(*sums[at], start(at));
       for (int a = 0; a < 3; ++a) slopes[a][i] = static_cast<float>(fall[a]);
     }

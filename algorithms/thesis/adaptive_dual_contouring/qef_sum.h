@@ -6,10 +6,10 @@
 
 namespace hermesh {
 
-/// E(x) = Σ (nᵢ·(x − pᵢ))² as the sums of eq. 6.3, so that the function of a region is the sum of those of its cells.
-/// All summands must share one frame, with its origin nearby: a block's middle, in voxels. (No initialiser: a block has
-/// room for 512 and uses few. Pairs, because that is what the vector units of every machine add at once; Eigen's would
-/// go by way of the memory.)
+/// E(x) = Σ (nᵢ·(x − pᵢ))² as the sums of eq. 6.3, so that the function of a region is the sum of those of
+/// its cells. All summands must share one frame, with its origin nearby: a block's middle, in voxels. (No
+/// initialiser: a block has room for 512 and uses few. Pairs, because that is what the vector units of every
+/// machine add at once; Eigen's would go by way of the memory.)
 struct QefSum {
   using Pair = double __attribute__((vector_size(16)));
   /// The entries AᵀA (xx, xy, xz, yy, yz, zz), Aᵀb (x, y, z), bᵀb, Σp (x, y, z), number of planes.
@@ -36,20 +36,23 @@ struct QefSum {
   /// Number of planes.
   double planes() const { return value(13); }
   /// Mean of the crossings: where minimisers start from, and the `average` placement.
-  Eigen::Vector3d mass_point() const { return Eigen::Vector3d(value(10), value(11), value(12)) * (1.0 / planes()); }
+  Eigen::Vector3d mass_point() const {
+    return Eigen::Vector3d(value(10), value(11), value(12)) * (1.0 / planes());
+  }
   /// E(x) in square voxels, never negative.
   double error(const Eigen::Vector3d& x) const;
 };
 
-/// Least share of the largest singular value that minimisers() tells from zero: with a smaller `truncation` it takes
-/// this one. Sums of squares in double precision know no more of a singular value.
+/// Least share of the largest singular value that minimisers() tells from zero: with a smaller `truncation`
+/// it takes this one. Sums of squares in double precision know no more of a singular value.
 inline constexpr double kLeastTruncation = 1e-6;
 
-/// Writes for each sum the minimiser nearest to its start by truncated singular value decomposition (§6.2.1): singular
-/// values of A below `truncation` times the largest are set to zero. It may lie anywhere. `starts` holds as many places
-/// as there are sums, or none for the mass points; they and `out`, which has room for as many, are in the sums' frame.
-/// Below a truncation of 0.001 single precision would not do, and each sum is solved by itself in double precision.
-void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts, double truncation,
-                Eigen::Vector3d* out);
+/// Writes for each sum the minimiser nearest to its start by truncated singular value decomposition (§6.2.1):
+/// singular values of A below `truncation` times the largest are set to zero. It may lie anywhere. `starts`
+/// holds as many places as there are sums, or none for the mass points; they and `out`, which has room for as
+/// many, are in the sums' frame. Below a truncation of 0.001 single precision would not do, and each sum is
+/// solved by itself in double precision.
+void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts,
+                double truncation, Eigen::Vector3d* out);
 
 }  // namespace hermesh

@@ -92,7 +92,8 @@ TEST(QefSum, MinimisersAreTheSameAtAnyLevelOfVectorCode) {
 TEST(QefSum, ThreePlanesMeetInTheirCorner) {
   const Vector3f corner(0.25f, -3.5f, 1.75f);
   Planes planes;
-  for (int axis = 0; axis < 3; ++axis) planes.add(corner + 0.5f * Vector3f::Unit((axis + 1) % 3), Vector3f::Unit(axis));
+  for (int axis = 0; axis < 3; ++axis)
+    planes.add(corner + 0.5f * Vector3f::Unit((axis + 1) % 3), Vector3f::Unit(axis));
   EXPECT_LT((minimiser(planes.sum, 0.1) - corner.cast<double>()).norm(), 1e-6);
 }
 
@@ -120,7 +121,8 @@ TEST(QefSum, WithoutTruncationNearlyParallelPlanesMeetWhereTheyDo) {
   // Along x the two normals have the singular value √2·0.01, the others √2 and none at all.
   EXPECT_NEAR(minimiser(planes.sum, 0.1)[0], 0.0, 1e-3);
   EXPECT_LT((minimiser(planes.sum, 0.0) - Vector3d(10.0, 0.0, 0.1)).norm(), 1e-3);
-  // The least truncation keeps a direction without a singular value where it is, so that no place is infinite.
+  // The least truncation keeps a direction without a singular value where it is, so that no place is
+  // infinite.
   EXPECT_EQ(minimiser(planes.sum, 0.0), minimiser(planes.sum, kLeastTruncation));
 }
 

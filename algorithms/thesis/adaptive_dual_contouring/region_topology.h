@@ -11,8 +11,8 @@ namespace hermesh {
 
 namespace region_topology {
 
-/// The corners of a cube that `from` reaches along edges whose ends are both in `set`. Corner (x, y, z) is bit 4x +
-/// 2y + z.
+/// The corners of a cube that `from` reaches along edges whose ends are both in `set`. Corner (x, y, z) is
+/// bit 4x + 2y + z.
 constexpr unsigned reached(unsigned set, unsigned from) {
   for (;;) {
     unsigned next = from;
@@ -24,21 +24,21 @@ constexpr unsigned reached(unsigned set, unsigned from) {
   }
 }
 
-/// The first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose ends have one sign
-/// are collapsed; the contour is one disc if a single edge is left, that is, if the corners inside hang together,
-/// those outside do, and there are some of both.
+/// The first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose ends have
+/// one sign are collapsed; the contour is one disc if a single edge is left, that is, if the corners inside
+/// hang together, those outside do, and there are some of both.
 constexpr std::array<bool, 256> collapse_table() {
   std::array<bool, 256> table{};
   for (unsigned inside = 1; inside < 255; ++inside) {
     const unsigned outside = 255u & ~inside;
-    table[inside] =
-        reached(inside, inside & (0u - inside)) == inside && reached(outside, outside & (0u - outside)) == outside;
+    table[inside] = reached(inside, inside & (0u - inside)) == inside &&
+                    reached(outside, outside & (0u - outside)) == outside;
   }
   return table;
 }
 
-/// The table of the first test, made by the compiler: filled at start-up it could be read before it is whole (trap
-/// T13).
+/// The table of the first test, made by the compiler: filled at start-up it could be read before it is whole
+/// (trap T13).
 inline constexpr std::array<bool, 256> kCollapsesToOneEdge = collapse_table();
 
 /// The signs of 3×3×3 samples, half a region's side apart: bit 9x + 3y + z.
@@ -52,8 +52,8 @@ constexpr unsigned corners(Signs27 signs) {
   return result;
 }
 
-/// The second test (Ju et al. 2002): the sign in the middle of an edge is that of one of its ends, in the middle of a
-/// face that of one of its corners, and in the middle of the cube that of one of its corners.
+/// The second test (Ju et al. 2002): the sign in the middle of an edge is that of one of its ends, in the
+/// middle of a face that of one of its corners, and in the middle of the cube that of one of its corners.
 constexpr bool middles_agree(Signs27 s) {
   constexpr unsigned kStep[3] = {9, 3, 1};
   for (int axis = 0; axis < 3; ++axis) {
@@ -77,8 +77,8 @@ constexpr bool passes(Signs27 signs) { return kCollapsesToOneEdge[corners(signs)
 /// The signs of the 9³ samples at the corners of a block's cells.
 class SignLattice {
  public:
-  /// The signs of a block, or null where all are `uniform`. The block itself and its upper neighbours are parts 4x +
-  /// 2y + z.
+  /// The signs of a block, or null where all are `uniform`. The block itself and its upper neighbours are
+  /// parts 4x + 2y + z.
   struct Part {
     const BlockMask* inside = nullptr;
     bool uniform = false;
@@ -89,7 +89,8 @@ class SignLattice {
     for (int x = 0; x < 9; ++x)
       for (int y = 0; y < 9; ++y) {
         const unsigned column = 4u * (x >> 3) + 2u * (y >> 3);
-        const std::uint32_t low = row(parts[column], x & 7, y & 7), high = row(parts[column + 1], x & 7, y & 7);
+        const std::uint32_t low = row(parts[column], x & 7, y & 7),
+                            high = row(parts[column + 1], x & 7, y & 7);
         rows_[x][y] = static_cast<std::uint16_t>(low | (high & 1) << 8);
       }
   }

@@ -11,8 +11,8 @@ namespace {
 
 using namespace region_topology;
 
-/// Gerstner & Pajarola's collapse done literally: the cube's twelve edges, of which one with ends of one sign is shrunk
-/// to a point until none is left; then the edges that still join two different points are counted.
+/// Gerstner & Pajarola's collapse done literally: the cube's twelve edges, of which one with ends of one sign
+/// is shrunk to a point until none is left; then the edges that still join two different points are counted.
 bool collapses_by_hand(unsigned inside) {
   int point[8];
   for (int corner = 0; corner < 8; ++corner) point[corner] = corner;

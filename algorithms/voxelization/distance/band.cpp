@@ -49,7 +49,12 @@ class LeafWork {
   /// `without`: triangles to leave out, ascending; may be null.
   LeafWork(const IndexSoup& soup, const TriangleBins& bins, double reach, bool ids,
            const std::vector<std::uint32_t>* without = nullptr)
-      : soup_(soup), bins_(bins), reach_(reach), ids_(ids), without_(without), kernels_(chosen_kernels<Kernels>()) {}
+      : soup_(soup),
+        bins_(bins),
+        reach_(reach),
+        ids_(ids),
+        without_(without),
+        kernels_(chosen_kernels<Kernels>()) {}
 
   /// Computes a block's values, active voxels and crossed edges; false when no voxel is within reach.
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
@@ -65,8 +70,9 @@ class LeafWork {
     crossed = {};
     crossed_ = &crossed;
     gather(block);
-    // Kernels that look from voxels take whole clusters, which may hold triangles to leave out. Of equally near
-    // triangles the first one looked at stays the nearest; the bins give them in one order whatever the threads do.
+    // Kernels that look from voxels take whole clusters, which may hold triangles to leave out. Of equally
+    // near triangles the first one looked at stays the nearest; the bins give them in one order whatever the
+    // threads do.
     if (triangles_ > kManyTriangles && !without_)
       look_from_voxels();
     else
@@ -93,7 +99,8 @@ class LeafWork {
     return sum;
   }
 
-  /// Collects the clusters within reach of the block. Their spans stay valid until the bins go to another slab.
+  /// Collects the clusters within reach of the block. Their spans stay valid until the bins go to another
+  /// slab.
   void gather(const BlockAt& block) {
     clusters_.clear();
     triangles_ = 0;
@@ -104,7 +111,8 @@ class LeafWork {
     });
   }
 
-  /// Copies the corners of at most 16 triangles. Lanes beyond them keep what was there, and are masked out later.
+  /// Copies the corners of at most 16 triangles. Lanes beyond them keep what was there, and are masked out
+  /// later.
   void fetch(std::span<const std::uint32_t> triangles, kernels::MeshCorners& to) const {
     for (std::size_t j = 0; j < triangles.size(); ++j) {
       const Triangle t = soup_.triangle(triangles[j]);
@@ -115,8 +123,8 @@ class LeafWork {
     }
   }
 
-  /// Looks for the voxels and edges of at most 16 triangles. Those that pass the test of the box gather in `pending_`
-  /// and `crossing_` until there are 16, so that the kernels work on full batches.
+  /// Looks for the voxels and edges of at most 16 triangles. Those that pass the test of the box gather in
+  /// `pending_` and `crossing_` until there are 16, so that the kernels work on full batches.
   void add(std::span<const std::uint32_t> triangles) {
     fetch(triangles, fetched_);
     const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
@@ -165,8 +173,8 @@ class LeafWork {
       kernels::set_up_segment(corners_, __builtin_ctz(thin), batch);
   }
 
-  /// Lets each voxel look for its triangle among the clusters, whose batches are set up when the first voxel wants
-  /// them.
+  /// Lets each voxel look for its triangle among the clusters, whose batches are set up when the first voxel
+  /// wants them.
   void look_from_voxels() {
     boxes_.resize((clusters_.size() + kBatch - 1) / kBatch);
     for (std::size_t i = 0; i < boxes_.size() * kBatch; ++i) set_box(i);
@@ -176,8 +184,8 @@ class LeafWork {
     const kernels::LazyBatches lazy{boxes_.data(), pointers_.data(), int(clusters_.size()), &prepare, this};
     kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
     for (const TriangleBins::Cluster& cluster : clusters_) {
-      // Triangles still look for their edges; most clusters of tiny ones lie between the grid lines and meet none.
-      // Whether one is at an edge does not depend on the reach, so a voxel will do.
+      // Triangles still look for their edges; most clusters of tiny ones lie between the grid lines and meet
+      // none. Whether one is at an edge does not depend on the reach, so a voxel will do.
       if (!meets_edges(cluster.box)) continue;
       fetch(cluster.triangles, fetched_);
       const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
@@ -189,8 +197,8 @@ class LeafWork {
     kernels::Boxes& boxes = boxes_[i / kBatch];
     for (std::size_t a = 0; a < 3; ++a) {
       const bool there = i < clusters_.size();
-      // The box is rounded outwards by far more than single precision's error at this range. Those that fill up the
-      // last sixteen are so far away that none is ever near, and their squares are still finite.
+      // The box is rounded outwards by far more than single precision's error at this range. Those that fill
+      // up the last sixteen are so far away that none is ever near, and their squares are still finite.
       boxes.side[a][0][i % kBatch] =
           there ? float(clusters_[i].box.lower[a] - frame_.origin[a]) - 1e-5f : 1e18f;
       boxes.side[a][1][i % kBatch] =
@@ -214,12 +222,14 @@ class LeafWork {
     return &batch;
   }
 
-  /// Whether an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so at least two of the
-  /// box's sides must reach across one. The margin of 1e-5 is wider than the shift of the sides' lattice.
+  /// Whether an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so at least
+  /// two of the box's sides must reach across one. The margin of 1e-5 is wider than the shift of the sides'
+  /// lattice.
   bool meets_edges(const Bounds& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double low = box.lower[a] - frame_.origin[a] - 1e-5, high = box.upper[a] - frame_.origin[a] + 1e-5;
+      const double low = box.lower[a] - frame_.origin[a] - 1e-5,
+                   high = box.upper[a] - frame_.origin[a] + 1e-5;
       if (high < 0.0 || low > 8.0) return false;
       across += std::floor(high) >= std::ceil(low) ? 1 : 0;
     }
@@ -259,9 +269,9 @@ std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, 
   return leaf;
 }
 
-/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. It does a part of a slab at a time, so that
-/// this thread can report between them. Few blocks make a task: one of a fine mesh takes a good part of a
-/// millisecond, and a slab's last tasks are waited for.
+/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. It does a part of a slab at a time,
+/// so that this thread can report between them. Few blocks make a task: one of a fine mesh takes a good part
+/// of a millisecond, and a slab's last tasks are waited for.
 template <class F>
 void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span<const std::uint32_t> blocks,
                    RunContext& context, F&& f) {

@@ -11,8 +11,8 @@
 
 namespace hermesh {
 
-/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest. It means nothing for a
-/// voxel that is out of reach.
+/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest. It means nothing
+/// for a voxel that is out of reach.
 using LeafTriangles = std::array<std::int32_t, 512>;
 
 /// Distances around the triangles, without signs. Block i is number i of `TriangleBins::blocks()`.
@@ -22,7 +22,7 @@ struct Band {
   /// Distance of each voxel in world units, at most the reach; the active voxels are those below it. Null
   /// where no voxel is.
   std::vector<std::unique_ptr<FloatLeaf>> leaves;
-  std::vector<kernels::EdgeBits> crossed;               ///< edges between side_place()s that a triangle crosses
+  std::vector<kernels::EdgeBits> crossed;  ///< edges between side_place()s that a triangle crosses
   std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless asked for
 };
 
@@ -47,14 +47,15 @@ struct BandWork {
   const std::vector<std::uint32_t>* without = nullptr;  ///< triangles to leave out, ascending; may be null
 };
 
-/// Calls found(leaf) once for each block, in any order and from several threads at once; what `leaf` holds depends on
-/// neither. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel within reach is
-/// looked at. The bins are left without clusters, unless they have one slab.
+/// Calls found(leaf) once for each block, in any order and from several threads at once; what `leaf` holds
+/// depends on neither. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel
+/// within reach is looked at. The bins are left without clusters, unless they have one slab.
 /// @throws Cancelled.
 void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
                  const std::function<void(const FoundLeaf&)>& found);
 
-/// The distances of all blocks, in memory at once. `work.blocks` and `work.without` count as in find_leaves().
+/// The distances of all blocks, in memory at once. `work.blocks` and `work.without` count as in
+/// find_leaves().
 /// @throws Cancelled.
 Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context);
 

@@ -26,7 +26,8 @@ class IndexSoup {
   /// A point in world units relative to the mesh's origin.
   const Eigen::Vector3f& point(std::uint32_t i) const { return mesh_.points[i]; }
   double scale() const { return scale_; }  ///< voxels a world unit
-  /// Corners of triangle i. The product of single precision coordinates and the scale is rounded once, in double.
+  /// Corners of triangle i. The product of single precision coordinates and the scale is rounded once, in
+  /// double.
   TriangleCorners corners(std::size_t i) const {
     const Triangle t = triangle(i);
     TriangleCorners corners;

@@ -16,12 +16,12 @@ namespace {
 /// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
 /// each, so small ones are filed once; but then a block must look at all that are filed around it.
 constexpr double kLargest = 4.0;
-/// The number of triangles that a slab aims at, and the most slabs: few enough triangles that the clusters of three
-/// slabs are small beside the volume, few enough slabs that each keeps all threads busy.
+/// The number of triangles that a slab aims at, and the most slabs: few enough triangles that the clusters of
+/// three slabs are small beside the volume, few enough slabs that each keeps all threads busy.
 constexpr std::size_t kInSlab = 1 << 16;
 constexpr std::size_t kMostSlabs = 16;
-/// A thread that asks in any order keeps the bins around its block, and more while they are small: up to as many
-/// bins, or as many triangles.
+/// A thread that asks in any order keeps the bins around its block, and more while they are small: up to as
+/// many bins, or as many triangles.
 constexpr std::size_t kCachedBins = 64, kCachedTriangles = 1 << 16;
 /// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
 constexpr std::size_t kManyPieces = 256;
@@ -59,10 +59,11 @@ void for_each_block_near(const Bounds& box, double reach, F&& f) {
     }
 }
 
-/// A test whether a block can hold a voxel within reach of a triangle: a large triangle's box has many blocks that are not
-/// near the triangle. Block and triangle are seen along the triangle's normal and the outward normals of its edges. Whatever
-/// these are, what is farther apart than the reach along one of them is so in space: the normal of a triangle whose corners
-/// lie on a line but for rounding is noise, and costs blocks that are looked into for nothing.
+/// A test whether a block can hold a voxel within reach of a triangle: a large triangle's box has many blocks
+/// that are not near the triangle. Block and triangle are seen along the triangle's normal and the outward
+/// normals of its edges. Whatever these are, what is farther apart than the reach along one of them is so in
+/// space: the normal of a triangle whose corners lie on a line but for rounding is noise, and costs blocks
+/// that are looked into for nothing.
 class TriangleSlab {
  public:
   explicit TriangleSlab(const TriangleCorners& c) {
@@ -80,7 +81,8 @@ class TriangleSlab {
       ++count_;
     };
     add(normal);
-    for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)}) add((b - a).cross(normal));
+    for (const auto& [a, b] : {std::pair(p0, p1), std::pair(p1, p2), std::pair(p2, p0)})
+      add((b - a).cross(normal));
   }
   bool near(const BlockAt& block, double reach) const {
     const Eigen::Vector3d centre(block[0] * 8.0 + 3.5, block[1] * 8.0 + 3.5, block[2] * 8.0 + 3.5);
@@ -144,8 +146,8 @@ void make_compact(std::span<Centre> centres) {
   }
 }
 
-/// Orders many triangles along the Morton curve through cells of half a voxel, by a counting sort, in linear time.
-/// Fills `sorted`.
+/// Orders many triangles along the Morton curve through cells of half a voxel, by a counting sort, in linear
+/// time. Fills `sorted`.
 void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, double scale,
                   std::vector<std::uint32_t>& cell, std::vector<Centre>& sorted) {
   constexpr int kBits = 4;
@@ -180,8 +182,8 @@ void write_packed(std::uint32_t step, std::uint8_t*& at) {
   *at++ = std::uint8_t(step);
 }
 
-/// The box in sixteenths of a voxel from three voxels before the bin's first, rounded outwards: truncation and the added 1
-/// do that. A small triangle lies well within 0 to 255, and the clamp only guards it.
+/// The box in sixteenths of a voxel from three voxels before the bin's first, rounded outwards: truncation
+/// and the added 1 do that. A small triangle lies well within 0 to 255, and the clamp only guards it.
 BinBounds in_sixteenths(const Bounds& box, const BlockAt& bin) {
   BinBounds result;
   for (int a = 0; a < 3; ++a) {
@@ -233,7 +235,9 @@ struct TriangleBins::Survey {
   std::vector<std::vector<BinRun>> runs;
 };
 
-Bounds TriangleBins::bin_box(std::uint32_t bin) const { return from_sixteenths(box_of_bin_[bin], bin_at_[bin]); }
+Bounds TriangleBins::bin_box(std::uint32_t bin) const {
+  return from_sixteenths(box_of_bin_[bin], bin_at_[bin]);
+}
 
 bool TriangleBins::is_large(const Bounds& box) {
   double longest = 0;
@@ -257,8 +261,8 @@ TriangleBins::Survey TriangleBins::survey() {
   found.runs.resize(chunks.count);
   all_large_.resize(chunks.count);
   parallel_chunks(chunks, context_, [&](std::size_t chunk) {
-    // A chunk writes to its own runs and list of large triangles, and numbers bins by itself; numbers that all agree
-    // on come when the sets are merged.
+    // A chunk writes to its own runs and list of large triangles, and numbers bins by itself; numbers that
+    // all agree on come when the sets are merged.
     std::vector<BinRun>& runs = found.runs[chunk];
     CodeNumbers numbers;
     for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
@@ -273,7 +277,8 @@ TriangleBins::Survey TriangleBins::survey() {
       if (number == runs.size()) runs.emplace_back(code);
       BinRun& run = runs[number];
       run.box.add(in_sixteenths(box, block));
-      // The first number of a run is a step from the last one of an earlier chunk, and so is measured in pack().
+      // The first number of a run is a step from the last one of an earlier chunk, and so is measured in
+      // pack().
       if (run.count++ == 0)
         run.first = t;
       else
@@ -286,15 +291,15 @@ TriangleBins::Survey TriangleBins::survey() {
   return found;
 }
 
-/// Packs the triangles' numbers by bin. The boxes are made again rather than remembered, which for ten million
-/// triangles would take more memory than the volume.
+/// Packs the triangles' numbers by bin. The boxes are made again rather than remembered, which for ten
+/// million triangles would take more memory than the volume.
 void TriangleBins::pack(Survey& survey) {
   const std::size_t bins = bins_.size();
   first_byte_.assign(bins + 1, 0);
   count_.assign(bins, 0);
   box_of_bin_.assign(bins, {});
-  // One thread goes through the chunks in their order, so that each run learns where its bytes begin within its bin,
-  // and from which number its first step is.
+  // One thread goes through the chunks in their order, so that each run learns where its bytes begin within
+  // its bin, and from which number its first step is.
   std::vector<std::uint32_t> before(bins, 0);  // the last triangle so far
   for (std::size_t chunk = 0; chunk < survey.runs.size(); ++chunk) {
     const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
@@ -332,8 +337,8 @@ void TriangleBins::pack(Survey& survey) {
   });
 }
 
-/// Cuts space into slabs: across x unless another side is much longer, for blocks are numbered along x first, so that
-/// those who ask for them in their order stay in a slab for long.
+/// Cuts space into slabs: across x unless another side is much longer, for blocks are numbered along x first,
+/// so that those who ask for them in their order stay in a slab for long.
 void TriangleBins::choose_slabs() {
   place_.resize(bins_.size());
   std::array<std::map<std::int32_t, std::size_t>, 3> layers;  // how many triangles
@@ -370,7 +375,8 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {
     for (const BinRun& run : survey.runs[chunk]) {
       context_.check();
-      // Small triangles ask for blocks by the box of their run: a few blocks too many, and far fewer questions.
+      // Small triangles ask for blocks by the box of their run: a few blocks too many, and far fewer
+      // questions.
       for_each_block_near(from_sixteenths(run.box, survey.bins[chunk].block(run.code)), reach_,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
     }
@@ -434,12 +440,13 @@ void TriangleBins::forget_slabs() {
 std::size_t TriangleBins::bytes_in_memory() const {
   std::size_t bytes = packed_.size() + bins_.size() * (sizeof(BlockAt) + sizeof(BinBounds) + 16);
   for (const Slab& slab : slabs_)
-    if (slab.files) bytes += 4 * slab.files->order.size() + sizeof(BoundsOf<float>) * slab.files->clusters.size();
+    if (slab.files)
+      bytes += 4 * slab.files->order.size() + sizeof(BoundsOf<float>) * slab.files->clusters.size();
   return bytes;
 }
 
-/// The files of a bin for this thread alone, made when it first asks. They serve few questions, so the triangles stay
-/// in the mesh's order: where that goes along the surface, its sixteens are compact, too.
+/// The files of a bin for this thread alone, made when it first asks. They serve few questions, so the
+/// triangles stay in the mesh's order: where that goes along the surface, its sixteens are compact, too.
 const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
   std::unordered_map<std::uint32_t, Files>& cache = cache_.local();
   const auto known = cache.find(bin);

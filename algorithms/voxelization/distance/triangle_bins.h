@@ -13,14 +13,14 @@
 #include <vector>
 
 #include "algorithms/core/bounds.h"
-#include "algorithms/lattice/block_table.h"
 #include "algorithms/core/run_context.h"
+#include "algorithms/lattice/block_table.h"
 #include "algorithms/voxelization/distance/index_soup.h"
 
 namespace hermesh {
 
-/// The box from a block's first voxel to its last and `margin` voxels more on every side; voxels relative to the mesh's
-/// origin, as all boxes here whose name does not say otherwise.
+/// The box from a block's first voxel to its last and `margin` voxels more on every side; voxels relative to
+/// the mesh's origin, as all boxes here whose name does not say otherwise.
 inline Bounds around(const BlockAt& block, double margin) {
   Bounds box;
   for (int a = 0; a < 3; ++a) {
@@ -33,15 +33,16 @@ inline Bounds around(const BlockAt& block, double margin) {
 /// Triangles of a cluster at most: as many as a kernel's batch has lanes.
 inline constexpr std::size_t kClusterSize = 16;
 
-/// The box of small triangles that are filed in a bin, in sixteenths of a voxel from three voxels before the bin's
-/// first, rounded outwards. A small triangle reaches two voxels beyond its bin, so that eight bits are enough.
+/// The box of small triangles that are filed in a bin, in sixteenths of a voxel from three voxels before the
+/// bin's first, rounded outwards. A small triangle reaches two voxels beyond its bin, so that eight bits are
+/// enough.
 using BinBounds = BoundsOf<std::uint8_t>;
 
 /// The triangles of a soup by the blocks of voxels that they can be near.
 class TriangleBins {
  public:
-  /// Sorts the triangles. `reach` is how far from a triangle, in voxels, its distance matters. The soup and the
-  /// context have to outlive the bins.
+  /// Sorts the triangles. `reach` is how far from a triangle, in voxels, its distance matters. The soup and
+  /// the context have to outlive the bins.
   /// @throws Cancelled.
   TriangleBins(const IndexSoup& soup, double reach, RunContext& context);
 
@@ -53,15 +54,16 @@ class TriangleBins {
     std::span<const std::uint32_t> triangles;  ///< numbers, at most kClusterSize
     Bounds box;
   };
-  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are within
-  /// reach, in an order that depends on the mesh alone. From any thread, but not from within f, where the slabs
-  /// around the block are not in memory: the clusters are made then, and kept for this thread's next call.
+  /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are
+  /// within reach, in an order that depends on the mesh alone. From any thread, but not from within f, where
+  /// the slabs around the block are not in memory: the clusters are made then, and kept for this thread's
+  /// next call.
   template <class F>
   void for_each_cluster(const BlockAt& block, F&& f) const {
     for_each_cluster(block, around(block, reach_), f);
   }
-  /// Calls f(cluster) for the clusters that may meet the box `near`, which reaches no farther around the block's
-  /// voxels than the reach. The smaller the box, the fewer clusters have to be made.
+  /// Calls f(cluster) for the clusters that may meet the box `near`, which reaches no farther around the
+  /// block's voxels than the reach. The smaller the box, the fewer clusters have to be made.
   template <class F>
   void for_each_cluster(const BlockAt& block, const Bounds& near, F&& f) const;
   /// Large triangles within reach of block number `i`, in ascending order.
@@ -69,8 +71,8 @@ class TriangleBins {
     return {large_.data() + first_large_[i], first_large_[i + 1] - first_large_[i]};
   }
 
-  /// Number of the slabs that space is cut into across one axis; the triangles that matter to a block are in its own
-  /// slab and the two beside it.
+  /// Number of the slabs that space is cut into across one axis; the triangles that matter to a block are in
+  /// its own slab and the two beside it.
   std::size_t slab_count() const { return slabs_.size(); }
   /// Number of the slab that a block is in.
   std::size_t slab_of(const BlockAt& block) const;
@@ -123,8 +125,8 @@ class TriangleBins {
   BlockTable bins_;
   std::vector<BlockAt> bin_at_;
   std::vector<BinBounds> box_of_bin_;
-  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte, the
-  /// lowest first, the eighth bit set where more follow.
+  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte,
+  /// the lowest first, the eighth bit set where more follow.
   std::vector<std::uint8_t> packed_;
   std::vector<std::uint64_t> first_byte_;
   std::vector<std::uint32_t> count_;

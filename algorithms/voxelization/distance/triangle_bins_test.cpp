@@ -156,7 +156,8 @@ TEST(TriangleBins, SmallBoxFindsWhatMeetsIt) {
     for (std::uint32_t t = 0; t < soup.size(); ++t) {
       const Bounds box = box_of(soup, t);
       bool meets = true;
-      for (std::size_t a = 0; a < 3; ++a) meets &= box.lower[a] <= near.upper[a] && box.upper[a] >= near.lower[a];
+      for (std::size_t a = 0; a < 3; ++a)
+        meets &= box.lower[a] <= near.upper[a] && box.upper[a] >= near.lower[a];
       ASSERT_TRUE(!meets || found.contains(t)) << t;
     }
   }
@@ -185,8 +186,8 @@ TEST(Band, SameDistancesWhateverTheOrderOfTheTriangles) {
   ASSERT_EQ(other.size(), leaves);
   for (std::size_t i = 0; i < once.blocks.size(); ++i)
     for (unsigned v = 0; v < (once.leaves[i] ? 512u : 0u); ++v) {
-      // Of two triangles that share the nearest point one may be left out, as its cluster cannot be nearer; their
-      // distances are equal but for the rounding of their planes.
+      // Of two triangles that share the nearest point one may be left out, as its cluster cannot be nearer;
+      // their distances are equal but for the rounding of their planes.
       ASSERT_NEAR(once.leaves[i]->getValue(v), other.at(once.blocks[i])->getValue(v), 2e-6);
     }
 }

@@ -22,14 +22,15 @@ struct Side {
   float limit = 0;     ///< world units
 };
 
-/// Queries for the voxels of a leaf one after the other, where the answer to one bounds the search for the next.
+/// Queries for the voxels of a leaf one after the other, where the answer to one bounds the search for the
+/// next.
 class VoxelQueries {
  public:
   explicit VoxelQueries(const TriangleTree& tree) : tree_(tree) {}
 
   NearestTriangle operator()(const Eigen::Vector3d& p, double width) {
-    // Distance changes by no more than one moves, so the last one and the step bound this one; the rest is for
-    // rounding.
+    // Distance changes by no more than one moves, so the last one and the step bound this one; the rest is
+    // for rounding.
     const double known = last_ + (p - at_).norm() + 1e-6;
     NearestTriangle found{width * width, TriangleTree::kNone};
     if (known < width) found = tree_.nearest(p, known * known);
@@ -68,8 +69,8 @@ class Widening {
     std::vector<std::unique_ptr<IntLeaf>> ids(leaves.size());
     // `known_` has every block that is, or is about to be, looked at, so that each is once.
     for (const FloatLeaf* leaf : leaves) known_.insert(leaf->origin());
-    // The triangles go to copies of their leaves: adding leaves to a tree is for one thread at a time, while its
-    // other leaves are read here by all.
+    // The triangles go to copies of their leaves: adding leaves to a tree is for one thread at a time, while
+    // its other leaves are read here by all.
     parallel_blocks(leaves.size(), context_, [&](std::size_t i) {
       if (nearest_) ids[i] = ids_of(leaves[i]->origin());
       complete(*leaves[i], ids[i].get());
@@ -94,8 +95,8 @@ class Widening {
       if (leaf && !leaf->isEmpty()) nearest_->tree().addLeaf(leaf.release());
   }
 
-  /// Completes the inactive voxels of a leaf: they keep their sign, and get their distance where the band reaches.
-  /// Active ones are right already.
+  /// Completes the inactive voxels of a leaf: they keep their sign, and get their distance where the band
+  /// reaches. Active ones are right already.
   void complete(FloatLeaf& leaf, IntLeaf* ids) const {
     VoxelQueries query(tree_);
     for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
@@ -123,9 +124,9 @@ class Widening {
         }
   }
 
-  /// Makes leaves of blocks without one, and returns the blocks around those that have a voxel in the band. A block
-  /// without a leaf lies on one side as a whole. The way from a voxel to the surface leads through blocks that touch
-  /// each other and have a voxel in the band, so none is missed.
+  /// Makes leaves of blocks without one, and returns the blocks around those that have a voxel in the band. A
+  /// block without a leaf lies on one side as a whole. The way from a voxel to the surface leads through
+  /// blocks that touch each other and have a voxel in the band, so none is missed.
   std::vector<Coord> add_blocks(const std::vector<Coord>& blocks) {
     std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
     std::vector<std::unique_ptr<IntLeaf>> ids(blocks.size());

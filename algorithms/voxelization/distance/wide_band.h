@@ -23,10 +23,11 @@ struct BandWidths {
   double exterior = 3.0, interior = 3.0;  ///< voxels
 };
 
-/// Widens the band of a level set whose values are right as far as `near` on either side, and whose leaves hold all
-/// voxels nearer than that. The values beyond it become what they would have been had the band been `wide` from the
-/// start; `nearest`, if not null, gets the numbers of the triangles. Index space has to be voxels relative to the
-/// mesh's origin, whatever the grids' transforms say. The bytes are the same at any thread count.
+/// Widens the band of a level set whose values are right as far as `near` on either side, and whose leaves
+/// hold all voxels nearer than that. The values beyond it become what they would have been had the band been
+/// `wide` from the start; `nearest`, if not null, gets the numbers of the triangles. Index space has to be
+/// voxels relative to the mesh's origin, whatever the grids' transforms say. The bytes are the same at any
+/// thread count.
 /// @throws Cancelled.
 void widen_band(const BoundaryTriangles& boundary, double voxel_size, const BandWidths& near,
                 const BandWidths& wide, openvdb::FloatGrid& distance, openvdb::Int32Grid* nearest,

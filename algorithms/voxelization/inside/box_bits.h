@@ -11,8 +11,8 @@ namespace hermesh {
 
 using Voxel = std::array<std::int32_t, 3>;
 
-/// The bits of a block's voxels in the box from one voxel to another, both included; none where the box is beside the
-/// block.
+/// The bits of a block's voxels in the box from one voxel to another, both included; none where the box is
+/// beside the block.
 inline BlockMask box_bits(const BlockAt& block, const Voxel& from, const Voxel& to) {
   std::int32_t first[3], last[3];
   for (std::size_t a = 0; a < 3; ++a) {

@@ -7,17 +7,17 @@
 #include <span>
 #include <vector>
 
-
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// The most that is kept. Some hundred kilobytes of blocks, some megabytes of triangles: where sheets cross a block
-/// may hold thousands, and to file them again costs more than what is asked of them.
+/// The most that is kept. Some hundred kilobytes of blocks, some megabytes of triangles: where sheets cross a
+/// block may hold thousands, and to file them again costs more than what is asked of them.
 constexpr std::size_t kMostBlocks = 256, kMostObstacles = 20000;
 
-/// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all did.
+/// Calls f(cell) for the cells that the box around a way meets, while it returns true. Returns whether all
+/// did.
 template <class F>
 bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
   const Vector3d low = from.cwiseMin(to), high = from.cwiseMax(to);
@@ -31,8 +31,8 @@ bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
 
 }  // namespace
 
-/// The triangles of one block by cell, in one array (count, scan, fill): some hundred little lists would cost more
-/// than what is asked of them.
+/// The triangles of one block by cell, in one array (count, scan, fill): some hundred little lists would cost
+/// more than what is asked of them.
 struct CellObstacles::Block {
   std::vector<Obstacle> obstacles;
   std::vector<std::uint32_t> triangles;  ///< their numbers in the soup
@@ -41,7 +41,8 @@ struct CellObstacles::Block {
   std::vector<std::uint32_t> numbers;
 
   Block(const IndexSoup& soup, const TriangleBins& bins, const BlockAt& at) {
-    // First how many triangles each cell has. A triangle whose plane passes all cells of the block by is not kept.
+    // First how many triangles each cell has. A triangle whose plane passes all cells of the block by is not
+    // kept.
     const auto add = [&](std::uint32_t triangle) {
       obstacles.emplace_back(Facet(soup.corners(triangle)));
       bool touches = false;
@@ -56,7 +57,8 @@ struct CellObstacles::Block {
     };
     bins.for_each_cluster(at, around(at, 1.1), [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
-        // The cells of a block reach from its first voxel to the next block's; the rest is more than the margin.
+        // The cells of a block reach from its first voxel to the next block's; the rest is more than the
+        // margin.
         if (cluster.box.lower[a] > at[a] * 8.0 + 8.1 || cluster.box.upper[a] < at[a] * 8.0 - 0.1) return;
       for (const std::uint32_t t : cluster.triangles) add(t);
     });
@@ -74,8 +76,8 @@ struct CellObstacles::Block {
     return {numbers.data() + first[cell], numbers.data() + first[cell + 1]};
   }
 
-  /// Finds an obstacle of the cell that is in the way, or null. What is in one way is often in the next one, so it
-  /// comes first from now on; whether one is found does not depend on the order.
+  /// Finds an obstacle of the cell that is in the way, or null. What is in one way is often in the next one,
+  /// so it comes first from now on; whether one is found does not depend on the order.
   const Obstacle* find(unsigned cell, const Vector3d& from, const Vector3d& to, std::size_t& work) {
     const std::span<std::uint32_t> there = in_cell(cell);
     for (auto i = there.begin(); i != there.end(); ++i) {
@@ -87,8 +89,8 @@ struct CellObstacles::Block {
     return nullptr;
   }
 
-  /// Makes a triangle of the cell the first one met if it is; of several at one place the one with the least number,
-  /// for the order of the list depends on what was asked before.
+  /// Makes a triangle of the cell the first one met if it is; of several at one place the one with the least
+  /// number, for the order of the list depends on what was asked before.
   void meet(unsigned cell, const Vector3d& from, const Vector3d& to, Met& met) {
     for (const std::uint32_t i : in_cell(cell))
       if (const double along = obstacles[i].meeting(from, to);
@@ -125,7 +127,8 @@ CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
   if (last_ && at == last_at_) return *last_;
   auto known = blocks_.find(at);
   if (known == blocks_.end()) {
-    // All at once rather than the oldest: questions go from block to block, and what is near is made again soon.
+    // All at once rather than the oldest: questions go from block to block, and what is near is made again
+    // soon.
     if (blocks_.size() >= kMostBlocks || (blocks_.size() >= kept_ && obstacles_ > kMostObstacles)) {
       blocks_.clear();
       obstacles_ = 0;

@@ -10,8 +10,8 @@
 
 namespace hermesh {
 
-/// The triangles by the cell up from each voxel that they touch, block by block as they are asked for. Each thread
-/// has an object of its own. All coordinates are voxels.
+/// The triangles by the cell up from each voxel that they touch, block by block as they are asked for. Each
+/// thread has an object of its own. All coordinates are voxels.
 class CellObstacles {
  public:
   /// Coordinates of a voxel, and of the cell up from it.
@@ -27,7 +27,9 @@ class CellObstacles {
   /// Whether no triangle is in the way. The search ends at the first that is.
   bool is_free(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
   /// The part of the way, which may be some voxels long, that no triangle is in: 1 if none is.
-  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to) { return first_met(from, to).part; }
+  double free_part(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return first_met(from, to).part;
+  }
 
   /// A triangle in a way.
   struct Met {
@@ -38,8 +40,8 @@ class CellObstacles {
   /// The first triangle in the way; of several at one place the one with the least number.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-  /// Numbers of the triangles that may touch a cell, in an order that depends on earlier questions. Valid until the
-  /// next question.
+  /// Numbers of the triangles that may touch a cell, in an order that depends on earlier questions. Valid
+  /// until the next question.
   const std::vector<std::uint32_t>& triangles_in(const Voxel& cell);
 
   /// Triangles that all questions so far have looked at, which is what they cost; it depends on their order.

@@ -43,8 +43,8 @@ DuplicateFaces find_duplicates(std::span<const Triangle> triangles) {
         const auto forward = [](std::span<const Triangle> all, const Face& face) {
           return same_winding(all[face.number], face.points);
         };
-        // A face counts once, in the winding that is left over when opposite ones cancel. Where nothing is left over,
-        // one still stands for the place, and find_double_walls() says whether it bounds anything.
+        // A face counts once, in the winding that is left over when opposite ones cancel. Where nothing is
+        // left over, one still stands for the place, and find_double_walls() says whether it bounds anything.
         std::ptrdiff_t net = 0;
         for (const Face& face : same) net += forward(triangles, face) ? 1 : -1;
         std::uint32_t left = same[0].number;
@@ -101,8 +101,8 @@ std::vector<std::uint32_t> find_double_walls(std::span<const Triangle> triangles
         std::size_t count = 0;
         while (count < same.size() && same[count].wall != kSingle)
           walls.join(same[0].wall, same[count++].wall);
-        // Only an odd number of walls changes the parity: +1 where the others are even in number, and closed without
-        // the walls.
+        // Only an odd number of walls changes the parity: +1 where the others are even in number, and closed
+        // without the walls.
         if (count % 2 == 1) balance[same[0].wall] += (same.size() - count) % 2 == 0 ? 1 : -1;
       });
   for (std::uint32_t i = 0; i < walls.size(); ++i)

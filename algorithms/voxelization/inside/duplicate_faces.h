@@ -21,14 +21,14 @@ struct DuplicateFaces {
   std::vector<std::uint32_t> cancelling;
 };
 
-/// Finds the faces to drop where several have the same three points: all but the first that has the winding of most.
-/// Degenerate faces stay as they are.
+/// Finds the faces to drop where several have the same three points: all but the first that has the winding
+/// of most. Degenerate faces stay as they are.
 DuplicateFaces find_duplicates(std::span<const Triangle> triangles);
 
-/// Finds the cancelling faces that are double walls and bound nothing: where two parts of a model lie face on face,
-/// and sheets of no thickness. Others are single faces of a surface that the file has twice, wound at random. The
-/// faces around tell, since a surface goes on across its edges: connected cancelling faces are a wall if without them
-/// fewer edges are left with an odd number of faces.
+/// Finds the cancelling faces that are double walls and bound nothing: where two parts of a model lie face on
+/// face, and sheets of no thickness. Others are single faces of a surface that the file has twice, wound at
+/// random. The faces around tell, since a surface goes on across its edges: connected cancelling faces are a
+/// wall if without them fewer edges are left with an odd number of faces.
 std::vector<std::uint32_t> find_double_walls(std::span<const Triangle> triangles,
                                              const DuplicateFaces& duplicates);
 

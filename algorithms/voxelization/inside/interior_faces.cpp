@@ -14,31 +14,31 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/sample_side.h"
-#include "algorithms/voxelization/inside/oriented_winding.h"
+#include "algorithms/search/triangle_tree.h"
 #include "algorithms/voxelization/distance/segment.h"
 #include "algorithms/voxelization/inside/box_bits.h"
+#include "algorithms/voxelization/inside/oriented_winding.h"
 #include "algorithms/voxelization/inside/sheet_prober.h"
 #include "algorithms/voxelization/inside/triangle_faces.h"
-#include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// How far off an edge between samples its triangles are looked for, in voxels: farther than the places of their
-/// sides are.
+/// How far off an edge between samples its triangles are looked for, in voxels: farther than the places of
+/// their sides are.
 constexpr double kNearby = 1e-5;
-/// The most faces that all triangles may be cut into: a constant, some a sample, and some a triangle. What they take
-/// is some microseconds each.
+/// The most faces that all triangles may be cut into: a constant, some a sample, and some a triangle. What
+/// they take is some microseconds each.
 constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
 
-/// One run of find_interior_faces(): suspicious places, triangles there, their faces, and what is on both sides of
-/// these.
+/// One run of find_interior_faces(): suspicious places, triangles there, their faces, and what is on both
+/// sides of these.
 class Finder {
  public:
-  Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-         const Signs& signs, RunContext& context)
+  Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band, const Signs& signs,
+         RunContext& context)
       : soup_(soup), bins_(bins), band_(band), inside_(signs.inside), caps_(signs.caps), context_(context) {}
 
   InteriorFaces run(double reach, double voxel_size) {
@@ -48,8 +48,8 @@ class Finder {
     find_sides();
     settle_doubts();
     InteriorFaces sheets;
-    // `sheets_` is in the order of `triangles_`. A triangle with one inner face goes out as a whole, and those of its
-    // faces that stay come back as pieces.
+    // `sheets_` is in the order of `triangles_`. A triangle with one inner face goes out as a whole, and
+    // those of its faces that stay come back as pieces.
     std::size_t next = 0;
     for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
       const std::size_t first = next;
@@ -66,10 +66,10 @@ class Finder {
   }
 
  private:
-  /// Finds the voxels near an edge between two voxels inside that sheets cross, and the blocks that have some. Where
-  /// the sheets are two, they are most often the walls of a gap narrower than a voxel, which do bound the solid; but
-  /// interior faces near a seam look the same, so they count where a chain of such voxels leads to one with an odd
-  /// number.
+  /// Finds the voxels near an edge between two voxels inside that sheets cross, and the blocks that have
+  /// some. Where the sheets are two, they are most often the walls of a gap narrower than a voxel, which do
+  /// bound the solid; but interior faces near a seam look the same, so they count where a chain of such
+  /// voxels leads to one with an odd number.
   void find_suspects() {
     std::vector<BlockMask> marked(band_.blocks.size(), BlockMask{}), counts = marked;
     parallel_blocks(marked.size(), context_, [&](std::size_t i) {
@@ -104,8 +104,8 @@ class Finder {
       }
   }
 
-  /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that counts. What
-  /// is reached does not depend on the order.
+  /// Lets all voxels count that have a mark and that a chain of neighbours with marks joins to one that
+  /// counts. What is reached does not depend on the order.
   void spread_over_neighbours(const std::vector<BlockMask>& marked, std::vector<BlockMask>& counts) const {
     std::vector<Voxel> stack;
     for (std::uint32_t i = 0; i < counts.size(); ++i)
@@ -190,7 +190,8 @@ class Finder {
     };
     bins_.for_each_cluster(band_.blocks[block], box, [&](const TriangleBins::Cluster& cluster) {
       for (std::size_t a = 0; a < 3; ++a)
-        if (cluster.box.lower[a] > box.upper[a] + kNearby || cluster.box.upper[a] < box.lower[a] - kNearby) return;
+        if (cluster.box.lower[a] > box.upper[a] + kNearby || cluster.box.upper[a] < box.lower[a] - kNearby)
+          return;
       for (const std::uint32_t t : cluster.triangles) meet(t);
     });
     for (const std::uint32_t t : bins_.large(block)) meet(t);
@@ -234,7 +235,8 @@ class Finder {
     std::vector<std::vector<std::uint32_t>> small(suspects_.blocks.size());
     const auto keep_those_that_touch = [&](std::vector<std::uint32_t>& triangles) {
       Suspicion suspicion(suspects_, band_, bins_.blocks());
-      std::erase_if(triangles, [&](std::uint32_t t) { return !suspicion.touches(Facet(soup_.corners(t)).corner); });
+      std::erase_if(triangles,
+                    [&](std::uint32_t t) { return !suspicion.touches(Facet(soup_.corners(t)).corner); });
     };
     parallel_blocks(small.size(), context_, [&](std::size_t i) {
       add_small_triangles(suspects_.blocks[i], small[i]);
@@ -257,7 +259,8 @@ class Finder {
     return triangles;
   }
 
-  /// Adds the small triangles near a block's suspicious voxels: those whose clusters come within a voxel of it.
+  /// Adds the small triangles near a block's suspicious voxels: those whose clusters come within a voxel of
+  /// it.
   void add_small_triangles(std::uint32_t block, std::vector<std::uint32_t>& triangles) const {
     const BlockAt& at = band_.blocks[block];
     bins_.for_each_cluster(at, around(at, 2.0), [&](const TriangleBins::Cluster& cluster) {
@@ -267,8 +270,8 @@ class Finder {
     });
   }
 
-  /// Calls f(i) for each i below n, in parallel, and reports between parts of them how far from `done` to `to` the
-  /// signs are.
+  /// Calls f(i) for each i below n, in parallel, and reports between parts of them how far from `done` to
+  /// `to` the signs are.
   template <class F>
   void in_parts(std::size_t n, double done, double to, F&& f) const {
     constexpr std::size_t kParts = 16;
@@ -282,7 +285,8 @@ class Finder {
     }
   }
 
-  /// Cuts the triangles into faces. All that crosses one of them near a suspicious voxel is one of them, or a cap.
+  /// Cuts the triangles into faces. All that crosses one of them near a suspicious voxel is one of them, or a
+  /// cap.
   void cut_triangles() {
     std::vector<Triangle> corners;
     for (const std::uint32_t t : triangles_) corners.push_back(soup_.triangle(t));
@@ -356,8 +360,7 @@ class Finder {
     const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(some);
     tbb::enumerable_thread_specific<Prober> probers(
         [&] { return Prober(soup_, bins_, band_, inside_, suspects_); });
-    in_parts(order.size(), done, to,
-             [&](std::size_t i) { f(sheets_[order[i].second], probers.local()); });
+    in_parts(order.size(), done, to, [&](std::size_t i) { f(sheets_[order[i].second], probers.local()); });
   }
 
   /// Looks from every face, and notes what could not be cut to the end.
@@ -382,9 +385,10 @@ class Finder {
   void note_crowded(std::size_t faces, double largest) {
     char size[32];
     std::snprintf(size, sizeof size, "%.2g", largest);
-    context_.note("The polygons cross one another more often than there are samples to show it: " +
-                  std::to_string(faces) + " parts of them, of up to " + size +
-                  " voxels, were not cut to the end, and distances inside are uncertain by as much near them.");
+    context_.note(
+        "The polygons cross one another more often than there are samples to show it: " +
+        std::to_string(faces) + " parts of them, of up to " + size +
+        " voxels, were not cut to the end, and distances inside are uncertain by as much near them.");
   }
 
   /// Sheets that cross one another within a voxel enclose spaces that hold none, so that no way leads out of
@@ -424,8 +428,8 @@ class Finder {
     wind(doubtful, winding.number());
   }
 
-  /// Asks the winding numbers about sides of which nothing is known. Outside of all that is closed the number is 0,
-  /// whatever the orientation of each part.
+  /// Asks the winding numbers about sides of which nothing is known. Outside of all that is closed the number
+  /// is 0, whatever the orientation of each part.
   void wind(const std::vector<std::uint32_t>& doubtful, const WindingNumber& winding) {
     const std::vector<std::pair<BlockAt, std::uint32_t>> order = by_block(doubtful);
     constexpr std::size_t kTogether = 256;  // two places each
@@ -438,9 +442,11 @@ class Finder {
       for (std::size_t i = first[k]; i < first[k + 1]; ++i) {
         const TriangleSheet& sheet = sheets_[order[i].second];
         const TriangleFace of = face(sheet);
-        for (const Vector3d& place : places_beside(of, of.middle(), unit_normal(sheet))) places.push_back(place);
+        for (const Vector3d& place : places_beside(of, of.middle(), unit_normal(sheet)))
+          places.push_back(place);
       }
-      // A batch is a block's share in a fixed order, so that its single precision errs in the same way on any run.
+      // A batch is a block's share in a fixed order, so that its single precision errs in the same way on any
+      // run.
       std::vector<float> numbers(places.size());
       winding.at(places, numbers);
       for (std::size_t i = 0; i < places.size(); ++i) {
@@ -463,7 +469,8 @@ class Finder {
     }
   }
 
-  /// Finds the blocks whose distances a left out triangle may have touched: those in its box, grown by the reach.
+  /// Finds the blocks whose distances a left out triangle may have touched: those in its box, grown by the
+  /// reach.
   void find_blocks(double reach, InteriorFaces& sheets) const {
     std::vector<char> near(band_.blocks.size(), 0);
     BlockFinder finder(bins_.blocks());
@@ -490,15 +497,15 @@ class Finder {
   const std::vector<TriangleCorners>& caps_;
   RunContext& context_;
   Suspects suspects_;
-  std::vector<std::uint32_t> triangles_;         ///< those that touch suspicious voxels, by number
+  std::vector<std::uint32_t> triangles_;          ///< those that touch suspicious voxels, by number
   std::vector<std::vector<TriangleFace>> faces_;  ///< of each; none where nothing crosses it
-  std::vector<TriangleSheet> sheets_;            ///< triangle by triangle
+  std::vector<TriangleSheet> sheets_;             ///< triangle by triangle
 };
 
 }  // namespace
 
 InteriorFaces find_interior_faces(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-                              const Signs& signs, double reach, double voxel_size, RunContext& context) {
+                                  const Signs& signs, double reach, double voxel_size, RunContext& context) {
   return Finder(soup, bins, band, signs, context).run(reach, voxel_size);
 }
 

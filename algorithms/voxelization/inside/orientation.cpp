@@ -34,7 +34,8 @@ std::vector<Triangle> merge_points(std::span<const Eigen::Vector3f> points,
   for (std::size_t i = 0; i < points.size(); ++i)
     places[i] = {points[i][0], points[i][1], points[i][2], static_cast<std::uint32_t>(i)};
   tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    // The number tells equal places apart, so that each group begins with its lowest point whatever the threads do.
+    // The number tells equal places apart, so that each group begins with its lowest point whatever the
+    // threads do.
     return std::tie(a.x, a.y, a.z, a.point) < std::tie(b.x, b.y, b.z, b.point);
   });
   std::vector<std::uint32_t> first(points.size());
@@ -78,7 +79,8 @@ class Orienter {
   /// The bit of an entry of `neighbours_` that says that the two faces are wound against each other.
   static constexpr std::uint32_t kDisagrees = 1;
 
-  /// A side of a face, by its points in ascending order, so that the sides at one edge sort next to each other.
+  /// A side of a face, by its points in ascending order, so that the sides at one edge sort next to each
+  /// other.
   struct Edge {
     std::uint32_t low, high;
     std::uint32_t face_and_way;  ///< twice the face's number, plus 1 if it runs from high to low
@@ -90,7 +92,7 @@ class Orienter {
   struct Patch {
     std::size_t begin = 0, end = 0;  ///< in queue_
     bool consistent = true, orientable = true, closed = true;
-    bool has_rim = false;                        ///< an edge that no other face has
+    bool has_rim = false;              ///< an edge that no other face has
     double given = 0.0, turned = 0.0;  ///< area that keeps the given winding, and that does not
     double volume = 0.0;               ///< after the turns, about centre_
     Eigen::Vector3d vector = Eigen::Vector3d::Zero();  ///< sum of the area vectors; zero if it is closed
@@ -105,8 +107,8 @@ class Orienter {
     return 0.5 * (corner(face, 1) - a).cross(corner(face, 2) - a);
   }
 
-  /// Drops the duplicates and the double walls. Faces that are there with both windings count for the area, so that
-  /// it is known how much of it cancels; those of double walls do not, unless there are no others.
+  /// Drops the duplicates and the double walls. Faces that are there with both windings count for the area,
+  /// so that it is known how much of it cancels; those of double walls do not, unless there are no others.
   void drop_duplicates() {
     const DuplicateFaces duplicates = find_duplicates(triangles_);
     result_.duplicates = duplicates.dropped.size();
@@ -117,8 +119,8 @@ class Orienter {
       if (result_.turns[face] != 0 || !(area_ > 0)) cancelling_area_ += area_vector(face).norm();
   }
 
-  /// Measures the area, its centre, about which volumes are taken, and its box. One thread adds up face by face, so
-  /// that the sums are the same on every machine.
+  /// Measures the area, its centre, about which volumes are taken, and its box. One thread adds up face by
+  /// face, so that the sums are the same on every machine.
   void measure() {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t face = 0; face < triangles_.size(); ++face) {
@@ -214,8 +216,8 @@ class Orienter {
     }
   }
 
-  /// How often the faces of one patch, or all, run along an edge of more than two faces from its low point to its high
-  /// one more than the other way.
+  /// How often the faces of one patch, or all, run along an edge of more than two faces from its low point to
+  /// its high one more than the other way.
   struct Flow {
     std::uint32_t patch;
     std::size_t edge;
@@ -225,7 +227,8 @@ class Orienter {
   /// Sorts the flows by patch and edge, and adds up those of the same patch and edge.
   static void merge_by_patch(std::vector<Flow>& flows) {
     const auto key = [](const Flow& f) { return std::tie(f.patch, f.edge); };
-    tbb::parallel_sort(flows.begin(), flows.end(), [&](const Flow& a, const Flow& b) { return key(a) < key(b); });
+    tbb::parallel_sort(flows.begin(), flows.end(),
+                       [&](const Flow& a, const Flow& b) { return key(a) < key(b); });
     std::size_t count = 0;
     for (const Flow& flow : flows)
       if (count > 0 && key(flows[count - 1]) == key(flow))
@@ -235,10 +238,11 @@ class Orienter {
     flows.resize(count);
   }
 
-  /// Leaves out each patch that the others do not need: at every edge of its border two or more others meet, and
-  /// without it these run along the edge as often one way as the other. So it is a wall within the solid or a fin of
-  /// no thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall would make a solid,
-  /// too; the least area comes first, and no surface within the wall's border has less than a plane one.
+  /// Leaves out each patch that the others do not need: at every edge of its border two or more others meet,
+  /// and without it these run along the edge as often one way as the other. So it is a wall within the solid
+  /// or a fin of no thickness, and bounds nothing. Of a solid that a wall parts, either side and the wall
+  /// would make a solid, too; the least area comes first, and no surface within the wall's border has less
+  /// than a plane one.
   void leave_out_walls(const std::vector<Patch>& patches, std::vector<std::int8_t>& turns) {
     if (shared_edges_.empty() || result_.non_manifold_edges > two_face_edges_) return;
     std::vector<std::uint32_t> patch_of(triangles_.size(), kNone);
@@ -254,7 +258,8 @@ class Orienter {
           total.push_back(0);
           for (const Edge& edge : same) {
             const std::uint32_t face = edge.face_and_way >> 1;
-            flows.push_back({patch_of[face], total.size() - 1, (edge.face_and_way & 1) ? -turns[face] : turns[face]});
+            flows.push_back(
+                {patch_of[face], total.size() - 1, (edge.face_and_way & 1) ? -turns[face] : turns[face]});
             total.back() += flows.back().own;
           }
         });
@@ -268,18 +273,19 @@ class Orienter {
       // An edge of one face is the border of a hole, and the patch may be what is left of a solid.
       if (patches[p].has_rim || !patches[p].orientable) continue;
       const auto [begin, end] = std::ranges::equal_range(flows, p, {}, &Flow::patch);
-      // The others are closed along the border where the whole flow is the patch's own. A patch that has no such
-      // border, or whose own faces cancel along all of it, is kept.
-      const bool others_are_closed = std::all_of(begin, end, [&](const Flow& f) { return f.own == total[f.edge]; });
+      // The others are closed along the border where the whole flow is the patch's own. A patch that has no
+      // such border, or whose own faces cancel along all of it, is kept.
+      const bool others_are_closed =
+          std::all_of(begin, end, [&](const Flow& f) { return f.own == total[f.edge]; });
       if (!others_are_closed || std::all_of(begin, end, [](const Flow& f) { return f.own == 0; })) continue;
       for (auto f = begin; f != end; ++f) total[f->edge] -= f->own;
       for (std::size_t i = patches[p].begin; i < patches[p].end; ++i) turns[queue_[i]] = 0;
     }
   }
 
-  /// The largest volume that the surface has about any apex in its box. The volume of an open surface, which is that
-  /// of the cone to it, depends on where the apex is: it is linear in the apex, and so the largest in one of the
-  /// corners of the box.
+  /// The largest volume that the surface has about any apex in its box. The volume of an open surface, which
+  /// is that of the cone to it, depends on where the apex is: it is linear in the apex, and so the largest in
+  /// one of the corners of the box.
   double largest_volume(double about_centre, const Eigen::Vector3d& vector) const {
     double volume = about_centre;
     for (int a = 0; a < 3; ++a)

@@ -186,7 +186,8 @@ TEST(Orientation, LeavesOutTheWallBetweenTwoParts) {
 TEST(Orientation, LeavesOutASingleWallWithinASolid) {
   Soup soup;
   for (const float z : {0.0f, 2.0f, 5.0f})
-    for (const auto& [x, y] : {std::pair(0.0f, 0.0f), std::pair(1.0f, 0.0f), std::pair(1.0f, 1.0f), std::pair(0.0f, 1.0f)})
+    for (const auto& [x, y] :
+         {std::pair(0.0f, 0.0f), std::pair(1.0f, 0.0f), std::pair(1.0f, 1.0f), std::pair(0.0f, 1.0f)})
       soup.points.emplace_back(x, y, z);
   soup.triangles = {{0, 3, 2}, {0, 2, 1}, {8, 9, 10}, {8, 10, 11}};
   for (std::uint32_t low : {0u, 4u})
@@ -209,7 +210,8 @@ TEST(Orientation, LeavesOutASingleWallWithinASolid) {
 TEST(Orientation, WallsDoNotCancelTheSurface) {
   // 144 walls between 64 cubes, and 96 outer sides.
   Soup boxes;
-  for (int i = 0; i < 64; ++i) boxes.add(cube(1, 2 * Eigen::Vector3f(float(i % 4), float(i / 4 % 4), float(i / 16))));
+  for (int i = 0; i < 64; ++i)
+    boxes.add(cube(1, 2 * Eigen::Vector3f(float(i % 4), float(i / 4 % 4), float(i / 16))));
   const Orientation found = boxes.orient();
   EXPECT_EQ(found.duplicates, 2u * 144);
   EXPECT_NEAR(volume(boxes, found.turns), 8 * 64, 1e-9);

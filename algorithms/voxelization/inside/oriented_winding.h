@@ -9,8 +9,8 @@
 
 namespace hermesh {
 
-/// The orientation and the winding number of a mesh. It keeps a reference to the mesh, and copies its triangles if it
-/// has quads.
+/// The orientation and the winding number of a mesh. It keeps a reference to the mesh, and copies its
+/// triangles if it has quads.
 class OrientedWinding {
  public:
   explicit OrientedWinding(const IndexSoup& soup) : OrientedWinding(soup.mesh(), soup.scale()) {}

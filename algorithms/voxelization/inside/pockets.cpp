@@ -22,8 +22,9 @@ constexpr std::size_t kLargestPocket = 64;
 /// How far it is looked in voxels, first by all, then by those that saw nothing: along a slit far narrower
 /// than a voxel the next voxel in it may be some away.
 constexpr std::int32_t kFar[] = {2, 6};
-/// How many triangles may be looked at for ways along walls, for all pockets together: some tenths of a second. Many
-/// thousands of pockets are no crevices, but what parts of a model enclose between them where they intersect.
+/// How many triangles may be looked at for ways along walls, for all pockets together: some tenths of a
+/// second. Many thousands of pockets are no crevices, but what parts of a model enclose between them where
+/// they intersect.
 constexpr std::size_t kMostWork = 20'000'000;
 /// A triangle in whose plane a way lies is met by no test, so ways are taken a little to one side, too.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
@@ -48,20 +49,17 @@ class PocketOpener {
  public:
   PocketOpener(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockAt>& blocks,
                Regions& regions, const RunContext& context)
-      : soup_(soup),
-        bins_(bins),
-        blocks_(blocks),
-        regions_(regions),
-        context_(context),
-        obstacles_([&] { return CellObstacles(soup, bins, kNeighboursKept); }) {}
+      : soup_(soup), bins_(bins), blocks_(blocks), regions_(regions), context_(context), obstacles_([&] {
+          return CellObstacles(soup, bins, kNeighboursKept);
+        }) {}
 
   void run() {
     find_pockets();
     std::vector<char> open(regions_.count, 0);
     open[Regions::kOutside] = 1;
     for (const std::int32_t far : kFar) {
-      // A round opens all pockets that see a goal, and these are the goals of the next: what is opened does not
-      // depend on the order in which threads ask.
+      // A round opens all pockets that see a goal, and these are the goals of the next: what is opened does
+      // not depend on the order in which threads ask.
       far_ = far;
       goals_ = open;
       std::vector<std::uint32_t> asked = closed_ones(open);
@@ -98,8 +96,8 @@ class PocketOpener {
     return closed;
   }
 
-  /// Finds the closed pockets in the blocks around those just opened, for no others can see them. To ask all would
-  /// take as many looks as a slit has voxels for each of the rounds that lead through it.
+  /// Finds the closed pockets in the blocks around those just opened, for no others can see them. To ask all
+  /// would take as many looks as a slit has voxels for each of the rounds that lead through it.
   std::vector<std::uint32_t> closed_ones_near_opened(const std::vector<char>& open) const {
     std::vector<std::uint32_t> near;
     for (const std::uint32_t pocket : opened_)
@@ -124,7 +122,8 @@ class PocketOpener {
     numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
   }
 
-  /// Puts the voxels of all goals into `goal_bits_`, or those of the pockets that were opened in the last round.
+  /// Puts the voxels of all goals into `goal_bits_`, or those of the pockets that were opened in the last
+  /// round.
   void mark_goals(bool all) {
     if (all) {
       goal_bits_.assign(blocks_.size(), BlockMask{});
@@ -160,8 +159,8 @@ class PocketOpener {
     return sees;
   }
 
-  /// Opens the pockets that a way along their walls leads out of. It asks one after the other, with obstacles of
-  /// their own: what these cost must not depend on what threads asked before.
+  /// Opens the pockets that a way along their walls leads out of. It asks one after the other, with obstacles
+  /// of their own: what these cost must not depend on what threads asked before.
   void open_along_walls(std::vector<char>& open) {
     CellObstacles obstacles(soup_, bins_, kNeighboursKept);
     goals_ = open;
@@ -179,8 +178,8 @@ class PocketOpener {
     }
   }
 
-  /// Whether the triangles around the first voxel face it at least as often as not. What is inside of a thin wall is
-  /// many pockets, and to follow all ways within it would take longer than all the rest.
+  /// Whether the triangles around the first voxel face it at least as often as not. What is inside of a thin
+  /// wall is many pockets, and to follow all ways within it would take longer than all the rest.
   bool may_be_outside(const Pocket& pocket, CellObstacles& obstacles) const {
     const Vector3d from = side_place(pocket.voxels.front());
     int facing = 0;
@@ -198,9 +197,9 @@ class PocketOpener {
     std::vector<std::uint32_t> regions;  ///< of the pockets that they lead to
   };
 
-  /// Follows the ways along a pocket's walls, and those of the pockets that are seen from them. They lead out if a
-  /// goal is seen before any other large region. Where that comes first, there is a hole in the solid, which must not
-  /// be emptied.
+  /// Follows the ways along a pocket's walls, and those of the pockets that are seen from them. They lead out
+  /// if a goal is seen before any other large region. Where that comes first, there is a hole in the solid,
+  /// which must not be emptied.
   Ways follow_walls(const Pocket& pocket, CellObstacles& obstacles) const {
     Ways ways{.lead_out = false, .regions = {pocket.region}};
     WallWalk walk(soup_, obstacles);
@@ -291,11 +290,13 @@ class PocketOpener {
   }
 
   /// Whether a goal's voxel in the block is seen whose distance, the largest of the three axes', is `far`.
-  bool sees_goal_in(std::uint32_t block, const Voxel& voxel, std::int32_t far, CellObstacles& obstacles) const {
+  bool sees_goal_in(std::uint32_t block, const Voxel& voxel, std::int32_t far,
+                    CellObstacles& obstacles) const {
     const BlockAt& at = blocks_[block];
     const BlockMask within = cube_bits(at, voxel, far), nearer = cube_bits(at, voxel, far - 1);
     for (std::int32_t x = 0; x < 8; ++x)
-      for (std::uint64_t bits = goal_bits_[block][std::size_t(x)] & within[std::size_t(x)] & ~nearer[std::size_t(x)];
+      for (std::uint64_t bits =
+               goal_bits_[block][std::size_t(x)] & within[std::size_t(x)] & ~nearer[std::size_t(x)];
            bits; bits &= bits - 1) {
         const int place = __builtin_ctzll(bits);
         const Voxel other{at[0] * 8 + x, at[1] * 8 + place / 8, at[2] * 8 + place % 8};
@@ -316,12 +317,12 @@ class PocketOpener {
   const RunContext& context_;
   mutable tbb::enumerable_thread_specific<CellObstacles> obstacles_;
   std::vector<Pocket> pockets_;
-  std::vector<std::uint32_t> pocket_of_;  ///< the pocket of each region, kNone for large ones
+  std::vector<std::uint32_t> pocket_of_;                ///< the pocket of each region, kNone for large ones
   std::vector<std::vector<std::uint32_t>> pockets_in_;  ///< the pockets of each block
   std::vector<std::uint32_t> opened_;                   ///< pockets opened in the last round
   std::int32_t far_ = 0;
-  std::vector<BlockMask> goal_bits_;  ///< voxels of the goals, by block
-  bool all_marked_ = false;                  ///< whether `goal_bits_` has all goals, or those opened last
+  std::vector<BlockMask> goal_bits_;          ///< voxels of the goals, by block
+  bool all_marked_ = false;                   ///< whether `goal_bits_` has all goals, or those opened last
   std::vector<std::uint32_t> marked_blocks_;  ///< blocks with bits of the latter
   std::vector<char> goals_;  ///< regions from which a way leads outside that pockets have not looked for yet
 };

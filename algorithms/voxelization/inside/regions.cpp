@@ -37,7 +37,8 @@ Steps steps_among(const BlockMask& free) {
   return steps;
 }
 
-/// Lets the bits of one layer spread along its steps, all at once, until nothing is added. A step leads both ways.
+/// Lets the bits of one layer spread along its steps, all at once, until nothing is added. A step leads both
+/// ways.
 std::uint64_t spread_in_word(std::uint64_t m, std::uint64_t up_y, std::uint64_t up_z) {
   std::uint64_t before;
   do {
@@ -90,8 +91,8 @@ void add_components(BlockMask free, const Steps& steps, std::vector<BlockMask>& 
   }
 }
 
-/// A level of blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the level
-/// below, and the components are those of the cells without a block.
+/// A level of blocks of 8³ cells. On the finest level the cells are voxels; above, they are the blocks of the
+/// level below, and the components are those of the cells without a block.
 struct Level {
   std::vector<BlockAt> blocks;
   std::vector<std::uint32_t> first;  ///< component of each block, as a node
@@ -99,8 +100,8 @@ struct Level {
   std::uint32_t node = 0;  ///< number of the first component's node
 };
 
-/// Fills in a level's components: components_of(i, list) adds those of block i. Chunks of a size that depends on
-/// nothing are put together in their order, so that the numbers are the same at any thread count.
+/// Fills in a level's components: components_of(i, list) adds those of block i. Chunks of a size that depends
+/// on nothing are put together in their order, so that the numbers are the same at any thread count.
 template <class F>
 void find_components(Level& level, const RunContext& context, F&& components_of) {
   const std::size_t n = level.blocks.size();
@@ -123,8 +124,8 @@ void find_components(Level& level, const RunContext& context, F&& components_of)
   }
 }
 
-/// All levels, and a set of disjoint regions over their components. Empty space is a component of the coarsest kind
-/// of cell that it fills, so that space costs by surface and not by volume.
+/// All levels, and a set of disjoint regions over their components. Empty space is a component of the
+/// coarsest kind of cell that it fills, so that space costs by surface and not by volume.
 class Hierarchy {
  public:
   Hierarchy(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed, const RunContext& context)
@@ -155,8 +156,8 @@ class Hierarchy {
   std::uint32_t root(std::uint32_t component) { return sets_.find(levels_[0].node + component); }
 
  private:
-  /// Adds the level above the coarsest one. True when it has only the eight blocks around zero, so that there is
-  /// nothing beyond but infinity.
+  /// Adds the level above the coarsest one. True when it has only the eight blocks around zero, so that there
+  /// is nothing beyond but infinity.
   bool add_level() {
     const BlockTable& below = *tables_.back();
     std::vector<BlockSet> set(1);
@@ -178,8 +179,8 @@ class Hierarchy {
     return last;
   }
 
-  /// Finds the node of the empty space at a cell of level l that has no block: on the first level whose block holds
-  /// it.
+  /// Finds the node of the empty space at a cell of level l that has no block: on the first level whose block
+  /// holds it.
   std::uint32_t empty_at(std::size_t l, BlockAt cell) const {
     for (; l + 1 < levels_.size(); ++l) {
       const BlockAt parent = tile_of(cell);
@@ -195,7 +196,8 @@ class Hierarchy {
     return Regions::kOutside;
   }
 
-  /// Joins the components of a level's blocks to what is across their faces: blocks of the level, or empty space.
+  /// Joins the components of a level's blocks to what is across their faces: blocks of the level, or empty
+  /// space.
   void connect(std::size_t l) {
     const Level& level = levels_[l];
     BlockFinder finder(*tables_[l]);
@@ -206,8 +208,7 @@ class Hierarchy {
           BlockAt at = level.blocks[i];
           at[std::size_t(axis)] += side ? 1 : -1;
           const std::uint32_t j = finder.find(at);
-          if (j == BlockTable::kNone)
-            connect_to_empty(l, i, axis, side, empty_at(l, at));
+          if (j == BlockTable::kNone) connect_to_empty(l, i, axis, side, empty_at(l, at));
           // Two blocks are joined once, from the lower one, which owns the edges between them.
           else if (side == 1)
             connect_blocks(l, i, j, axis);
@@ -287,8 +288,8 @@ Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBit
   Level& finest = hierarchy.finest();
   regions.first = finest.first;
   regions.components.resize(finest.components.size());
-  // Regions get their numbers in the order of their first component, whatever node is the root of their set. Node 0,
-  // infinity, is the root of its own.
+  // Regions get their numbers in the order of their first component, whatever node is the root of their set.
+  // Node 0, infinity, is the root of its own.
   std::vector<std::uint32_t> number_of_root;
   regions.count = 1;
   for (std::uint32_t c = 0; c < finest.components.size(); ++c) {

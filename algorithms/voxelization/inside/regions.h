@@ -31,7 +31,8 @@ struct Regions {
   std::uint32_t count = 0;  ///< of regions; numbered in the order of their first component
 };
 
-/// Bits of the voxels in a word whose upper neighbour in y, or in z, is in the same word, as a block has them.
+/// Bits of the voxels in a word whose upper neighbour in y, or in z, is in the same word, as a block has
+/// them.
 inline constexpr std::uint64_t kBelowTopY = ~kLastY, kBelowTopZ = ~kLastZ;
 
 /// The bits of the 64 voxels on one side of a block, 0 lower and 1 upper, in the order of the two other axes.

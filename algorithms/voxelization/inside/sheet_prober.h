@@ -21,8 +21,8 @@ struct Suspects {
   std::vector<std::uint32_t> blocks;  ///< those with some
 };
 
-/// Tells whether pieces are near suspicious voxels; each thread has its own, since it keeps the block that it looked
-/// up last.
+/// Tells whether pieces are near suspicious voxels; each thread has its own, since it keeps the block that it
+/// looked up last.
 class Suspicion {
  public:
   Suspicion(const Suspects& suspects, const Band& band, const BlockTable& blocks)
@@ -81,7 +81,8 @@ struct TriangleSheet {
   std::uint32_t triangle = 0;  ///< by its place in the list of suspicious ones
   std::uint32_t face = 0;
   Side side = Side::unknown;
-  std::array<Side, 2> sides{Side::unknown, Side::unknown};  ///< what each side is: along the normal, against it
+  std::array<Side, 2> sides{Side::unknown,
+                            Side::unknown};  ///< what each side is: along the normal, against it
 
   /// A face is outer if one of its sides is, and inner if both are inner.
   void conclude() {
@@ -106,9 +107,9 @@ class Prober {
          const std::vector<BlockMask>& inside, const Suspects& suspects)
       : probe_(soup, bins, inside), suspicion_(suspects, band, bins.blocks()) {}
 
-  /// Finds out what is on the two sides of a face. All places of a whole face have the same around them, so that one
-  /// that sees something tells. It is outer where one of its sides is; of a face that is not whole, all places have
-  /// to agree that it is inner.
+  /// Finds out what is on the two sides of a face. All places of a whole face have the same around them, so
+  /// that one that sees something tells. It is outer where one of its sides is; of a face that is not whole,
+  /// all places have to agree that it is inner.
   void look(const TriangleFace& face, const Eigen::Vector3d& normal, TriangleSheet& sheet) {
     if (!suspicion_.touches(face.corners)) {
       sheet.side = Side::outer;

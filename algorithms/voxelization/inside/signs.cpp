@@ -28,8 +28,8 @@ struct OpenEdge {
   Eigen::Vector3d end[2];
 };
 
-/// Counts of the block's edges that are crossed, and of those of them with both ends outside. Edges that lead to
-/// another block are left out: a sample of the block's edges is enough to tell a leak.
+/// Counts of the block's edges that are crossed, and of those of them with both ends outside. Edges that lead
+/// to another block are left out: a sample of the block's edges is enough to tell a leak.
 struct CrossedEdges {
   int all = 0, open = 0;
   OpenEdge example;
@@ -68,8 +68,8 @@ struct Flood {
   std::vector<OpenEdge> leaks;  ///< one open edge of every block in which nearly all are open
 };
 
-/// Counts the open edges block by block. Nearly all edges of a block are open where the flood leaked in, and at a
-/// plate thinner than a voxel. Single open edges are at thin features and mean nothing.
+/// Counts the open edges block by block. Nearly all edges of a block are open where the flood leaked in, and
+/// at a plate thinner than a voxel. Single open edges are at thin features and mean nothing.
 Flood look_at_flood(const Band& band, const std::vector<BlockMask>& inside, const RunContext& context) {
   constexpr int kEnough = 12;
   std::vector<CrossedEdges> edges(band.blocks.size());
@@ -141,7 +141,8 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   };
   if (rule != SignRule::winding_number) {
     if (is_automatic) flood_from_infinity();
-    // Pockets only make the outside larger: what leaks without them leaks with them, and there may be thousands.
+    // Pockets only make the outside larger: what leaks without them leaks with them, and there may be
+    // thousands.
     if (!leaks) {
       open_pockets(soup, bins, band.blocks, regions, context);
       if (is_automatic) open_cavities(soup, bins, band, wound, regions, context);
@@ -153,9 +154,11 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   }
   if (!wound().usable()) {
     // Faces that cancel can still enclose something.
-    if (rule == SignRule::automatic_sheets || (rule == SignRule::automatic && flood.share > 0.5)) return signs;
+    if (rule == SignRule::automatic_sheets || (rule == SignRule::automatic && flood.share > 0.5))
+      return signs;
     // Nobody gets signs that are made up: voxelize() gives distances alone.
-    context.note(std::string("The distances have no sign: ") + explanation(wound().orientation().verdict) + ".");
+    context.note(std::string("The distances have no sign: ") + explanation(wound().orientation().verdict) +
+                 ".");
     signs.inside.clear();
     signs.usable = false;
     return signs;
@@ -166,7 +169,8 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   const bool open = orientation.boundary_edges + orientation.non_manifold_edges > 0;
   Signs by_number = winding_signs(wound().number(), bins.blocks(), band, regions, open, reach, context);
   if (rule == SignRule::automatic_sheets && area_of(by_number.caps) > kMostCapped * area_of(soup)) {
-    context.note("the polygons have holes too large to be closed, so open parts are sheets that enclose nothing");
+    context.note(
+        "the polygons have holes too large to be closed, so open parts are sheets that enclose nothing");
     open_pockets(soup, bins, band.blocks, regions, context);
     flood_from_infinity();
     return signs;

@@ -13,7 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Blocks whose triangles are kept: as many as meet at a corner, since places next to each other are asked for in turn.
+/// Blocks whose triangles are kept: as many as meet at a corner, since places next to each other are asked
+/// for in turn.
 constexpr std::size_t kBlocksKept = 8;
 /// Steps of at most a voxel that a crevice is followed.
 constexpr int kSteps = 8;

@@ -18,10 +18,11 @@ class SurfaceProbe {
   /// Keeps references. `inside` has the voxels inside each block of the bins, by number.
   SurfaceProbe(const IndexSoup& soup, const TriangleBins& bins, const std::vector<BlockMask>& inside);
 
-  /// What is around a place off the surface, in voxels, by straight ways to the corners of the cell that it is in.
+  /// What is around a place off the surface, in voxels, by straight ways to the corners of the cell that it
+  /// is in.
   Side seen_from(const Eigen::Vector3d& p);
-  /// What is around a place next to a sheet with this unit normal from which nothing is seen: follows the narrow
-  /// space to where it is wider, as long as it widens.
+  /// What is around a place next to a sheet with this unit normal from which nothing is seen: follows the
+  /// narrow space to where it is wider, as long as it widens.
   Side followed_from(Eigen::Vector3d p, const Eigen::Vector3d& normal);
 
  private:

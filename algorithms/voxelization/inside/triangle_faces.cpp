@@ -13,8 +13,8 @@ using Eigen::Vector3d;
 
 /// A corner that is no farther from a plane, in voxels, lies in it.
 constexpr double kOnPlane = 1e-7;
-/// What ends this near to a triangle, in voxels, parts the space next to it, from which voxels are looked for: as far
-/// as sheet_prober.h starts its ways at most.
+/// What ends this near to a triangle, in voxels, parts the space next to it, from which voxels are looked
+/// for: as far as sheet_prober.h starts its ways at most.
 constexpr double kTouchingPlane = 1e-3;
 /// A strip along a face's border that is no wider, in voxels, stays with the face.
 constexpr double kBorder = 1e-6;
@@ -65,7 +65,8 @@ double TriangleFace::room_at(const Vector3d& place) const {
 
 TriangleCutter::TriangleCutter(const Facet& triangle)
     : triangle_(triangle), normal_(triangle.normal().normalized()) {
-  // Coordinates in the triangle's plane, in which it is counter-clockwise, so that its inside is left of each side.
+  // Coordinates in the triangle's plane, in which it is counter-clockwise, so that its inside is left of each
+  // side.
   along_ = (triangle.corner[1] - triangle.corner[0]).normalized();
   across_ = normal_.cross(along_);
   for (const Vector3d& corner : triangle.corner) outline_.push_back(flat(corner));
@@ -94,8 +95,8 @@ void TriangleCutter::add(const Facet& other) {
       met.push_back(flat(other.corner[i] + part * (other.corner[j] - other.corner[i])));
     }
   }
-  // Two ends make the crossing. Where there are fewer, a side that comes close as a whole cuts; where all three
-  // corners do, the whole outline.
+  // Two ends make the crossing. Where there are fewer, a side that comes close as a whole cuts; where all
+  // three corners do, the whole outline.
   if (met.size() == 2) add_cut(met[0], met[1]);
   if (touching.size() == 2 && met.size() < 2) add_cut(touching[0], touching[1]);
   if (touching.size() == 3)
@@ -120,8 +121,8 @@ std::vector<TriangleCutter::Side> TriangleCutter::sides(const std::vector<Place>
   return sides;
 }
 
-/// Clips a cut to its part within a convex polygon (Cyrus & Beck 1978); false if that is no more than a point, or on
-/// the border.
+/// Clips a cut to its part within a convex polygon (Cyrus & Beck 1978); false if that is no more than a
+/// point, or on the border.
 bool TriangleCutter::clip(const std::vector<Side>& sides, Cut& cut) {
   double begin = 0, end = 1;
   for (const Side& side : sides) {
@@ -136,14 +137,14 @@ bool TriangleCutter::clip(const std::vector<Side>& sides, Cut& cut) {
   return true;
 }
 
-/// Splits a part along the longest of its cuts that parts it, and forgets the cuts that do not. The part keeps what
-/// is left of the line, `other` gets the rest, and each the cuts within it.
+/// Splits a part along the longest of its cuts that parts it, and forgets the cuts that do not. The part
+/// keeps what is left of the line, `other` gets the rest, and each the cuts within it.
 bool TriangleCutter::split(Part& part, Part& other) {
   while (!part.cuts.empty()) {
     const auto longest = std::ranges::max_element(
         part.cuts, {}, [](const Cut& cut) { return (cut.to - cut.from).squaredNorm(); });
-    // The longest first: it is the likeliest to cut all the way, so that the line, which goes on beyond its ends,
-    // cuts nothing in vain.
+    // The longest first: it is the likeliest to cut all the way, so that the line, which goes on beyond its
+    // ends, cuts nothing in vain.
     const Cut line = *longest;
     *longest = part.cuts.back();
     part.cuts.pop_back();
@@ -188,8 +189,8 @@ TriangleFace TriangleCutter::face(const Part& part) const {
   return face;
 }
 
-/// Takes as many of the longest cuts as there may be faces: to hand all of them down would take far longer than to
-/// cut.
+/// Takes as many of the longest cuts as there may be faces: to hand all of them down would take far longer
+/// than to cut.
 std::vector<TriangleCutter::Cut> TriangleCutter::longest_cuts(std::size_t most) const {
   std::vector<Cut> cuts = cuts_;
   if (cuts.size() <= most) return cuts;
@@ -206,7 +207,8 @@ std::vector<TriangleFace> TriangleCutter::faces(
   std::vector<Part> parts = {{outline_, longest_cuts(most), area_of(outline_)}};
   const bool all_cuts = parts[0].cuts.size() == cuts_.size();
   while (!parts.empty()) {
-    // The largest part is the next to be cut, so that when no more faces may be made only small ones are uncut.
+    // The largest part is the next to be cut, so that when no more faces may be made only small ones are
+    // uncut.
     std::ranges::pop_heap(parts, smaller);
     Part part = std::move(parts.back()), other;
     parts.pop_back();

@@ -1,5 +1,5 @@
-// A triangle cut along the lines in which others cross it, so that each part has one and the same space above it and
-// one and the same space below it.
+// A triangle cut along the lines in which others cross it, so that each part has one and the same space above
+// it and one and the same space below it.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,14 +31,14 @@ class TriangleCutter {
   /// Prepares a triangle, which must have an area.
   explicit TriangleCutter(const Facet& triangle);
 
-  /// Cuts the triangle where another one meets it: along the line in which they cross, along an edge that ends within a
-  /// thousandth of a voxel of it, and along the outline of one that lies that near as a whole. Does nothing where they
-  /// meet in a point or along the triangle's own border.
+  /// Cuts the triangle where another one meets it: along the line in which they cross, along an edge that
+  /// ends within a thousandth of a voxel of it, and along the outline of one that lies that near as a whole.
+  /// Does nothing where they meet in a point or along the triangle's own border.
   void add(const Facet& other);
 
-  /// Cuts the triangle into no more than `most` faces, the largest of which are cut first (an autopartition: Paterson
-  /// & Yao 1990); those that would have to be cut further are not whole. Only faces for which `matters` holds are
-  /// cut.
+  /// Cuts the triangle into no more than `most` faces, the largest of which are cut first (an autopartition:
+  /// Paterson & Yao 1990); those that would have to be cut further are not whole. Only faces for which
+  /// `matters` holds are cut.
   std::vector<TriangleFace> faces(std::size_t most,
                                   const std::function<bool(const TriangleFace&)>& matters) const;
   /// Whether any line cuts the triangle.

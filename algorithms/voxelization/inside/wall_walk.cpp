@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-
 namespace hermesh {
 namespace {
 
@@ -57,7 +56,8 @@ void WallWalk::begin(const Vector3d& from, const Vector3d& way) {
 }
 
 std::optional<Vector3d> WallWalk::next() {
-  // Neighbours are looked for only when the place before has been of no use, so that a short walk stays cheap.
+  // Neighbours are looked for only when the place before has been of no use, so that a short walk stays
+  // cheap.
   if (given_ > 0) go_on_from(Place(places_[given_ - 1]));
   if (given_ == places_.size()) return std::nullopt;
   return places_[given_++].at;
@@ -69,8 +69,8 @@ void WallWalk::go_on_from(const Place& place) {
     if (const std::optional<Place> to = across(place, edge)) add(*to);
 }
 
-/// Finds the middle of the next triangle around an edge, if it can be gone to. Of all triangles at the edge the next
-/// one is at the least angle, measured from this triangle's plane through the space above it.
+/// Finds the middle of the next triangle around an edge, if it can be gone to. Of all triangles at the edge
+/// the next one is at the least angle, measured from this triangle's plane through the space above it.
 std::optional<WallWalk::Place> WallWalk::across(const Place& from, std::size_t edge) {
   const Triangle t = soup_.triangle(from.triangle);
   const Facet facet(soup_.corners(from.triangle));
@@ -81,9 +81,11 @@ std::optional<WallWalk::Place> WallWalk::across(const Place& from, std::size_t e
   std::optional<Place> next;
   for (const std::uint32_t number : obstacles_.triangles_in(cell_of(hinge.middle))) {
     const Triangle other = soup_.triangle(number);
-    const auto third = std::ranges::find_if(other, [&](std::uint32_t point) { return point != a && point != b; });
+    const auto third =
+        std::ranges::find_if(other, [&](std::uint32_t point) { return point != a && point != b; });
     // A second copy of the triangle is none to go to.
-    if (third == other.end() || *third == c || std::ranges::count(other, a) != 1 || std::ranges::count(other, b) != 1)
+    if (third == other.end() || *third == c || std::ranges::count(other, a) != 1 ||
+        std::ranges::count(other, b) != 1)
       continue;
     const Facet to(soup_.corners(number));
     const Vector3d way = hinge.to(to.corner[third - other.begin()]);
@@ -97,9 +99,10 @@ std::optional<WallWalk::Place> WallWalk::across(const Place& from, std::size_t e
     next = Place{number, up, (to.corner[0] + to.corner[1] + to.corner[2]) / 3.0 + kHair * up};
   }
   if (!next || least < kFolded) return std::nullopt;
-  // Over a place in the middle of the wedge, a hair off the edge; both halves of the way have to be free, for a
-  // triangle that shares no edge may cross the wedge.
-  const Vector3d bridge = hinge.middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
+  // Over a place in the middle of the wedge, a hair off the edge; both halves of the way have to be free, for
+  // a triangle that shares no edge may cross the wedge.
+  const Vector3d bridge =
+      hinge.middle + kHair * (std::cos(0.5 * least) * back + std::sin(0.5 * least) * from.up);
   if (!obstacles_.is_free(from.at, bridge) || !obstacles_.is_free(bridge, next->at)) return std::nullopt;
   return next;
 }

@@ -36,7 +36,8 @@ std::vector<Vector3d> walk(const PolygonMesh& mesh, const Vector3d& from, const 
 
 TEST(WallWalk, GoesOnceOverOneSideOfAllTriangles) {
   for (const bool inside : {false, true}) {
-    const std::vector<Vector3d> places = walk(box(), {0.3, 0.2, inside ? 2.0 : 3.0}, {0, 0, inside ? 1.0 : -1.0});
+    const std::vector<Vector3d> places =
+        walk(box(), {0.3, 0.2, inside ? 2.0 : 3.0}, {0, 0, inside ? 1.0 : -1.0});
     EXPECT_EQ(places.size(), 12u);
     for (const Vector3d& at : places) EXPECT_EQ(is_inside(at), inside) << at.transpose();
   }

@@ -2,9 +2,9 @@
 
 #include "algorithms/lattice/simd/vectors.h"
 
-// Plain loops, compiled with -fno-math-errno and -fno-trapping-math: square roots that set errno and comparisons that
-// may trap could not be taken several at a time. All operations are of one lane and contraction is off, so wider
-// registers give the same bits.
+// Plain loops, compiled with -fno-math-errno and -fno-trapping-math: square roots that set errno and
+// comparisons that may trap could not be taken several at a time. All operations are of one lane and
+// contraction is off, so wider registers give the same bits.
 namespace hermesh::winding {
 namespace HERMESH_SIMD_LEVEL {
 namespace {
@@ -38,8 +38,9 @@ template <class Real>
   return y < 0 ? -angle : angle;
 }
 
-/// Adds a triangle's solid angle at each point: van Oosterom & Strackee, The Solid Angle of a Plane Triangle, IEEE
-/// Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop holds scalars alone, which the compiler can turn into lanes.
+/// Adds a triangle's solid angle at each point: van Oosterom & Strackee, The Solid Angle of a Plane Triangle,
+/// IEEE Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop holds scalars alone, which the compiler can turn
+/// into lanes.
 template <class Real>
 void add_solid_angle(const PlacedTriangle<Real>& triangle, const Targets& targets) {
   const auto [a, b, c] = triangle.corner;
@@ -72,8 +73,8 @@ void add_solid_angle(const PlacedTriangle<Real>& triangle, const Targets& target
 // ∫n·R/|R|³ − 3 RᵀBR/|R|⁵ + 15/2 C(R,R,R)/|R|⁷.
 void add_multipole(const Multipole& multipole, const float centre[3], const Targets& targets) {
   float b[6], c[10];
-  // A symmetric tensor's components off the diagonal count as often as their indices can be ordered: 2 of a pair; 3
-  // of a triple with two equal, 6 of one with none.
+  // A symmetric tensor's components off the diagonal count as often as their indices can be ordered: 2 of a
+  // pair; 3 of a triple with two equal, 6 of one with none.
   for (int k = 0; k < 6; ++k) b[k] = multipole.second[k] * (k == 1 || k == 2 || k == 4 ? -6.0f : -3.0f);
   for (int k = 0; k < 10; ++k)
     c[k] = multipole.third[k] * (k == 0 || k == 6 || k == 9 ? 7.5f : k == 4 ? 45.0f : 22.5f);

@@ -7,9 +7,9 @@
 
 namespace hermesh::winding {
 
-/// Points relative to an origin near them, in voxels, and for each the solid angle that it was found to be surrounded
-/// by so far, 4π for once around. Every point has its own sum, so that the order of additions, and with it every bit,
-/// is the same for any width of the lanes.
+/// Points relative to an origin near them, in voxels, and for each the solid angle that it was found to be
+/// surrounded by so far, 4π for once around. Every point has its own sum, so that the order of additions, and
+/// with it every bit, is the same for any width of the lanes.
 struct Targets {
   const float *x, *y, *z;
   float* solid_angle;
@@ -38,12 +38,13 @@ struct PlacedTriangle {
 /// See simd_level.h.
 struct Kernels {
   SimdLevel level;
-  /// Adds what the triangles in a box make up, seen from points outside its sphere. `centre` is the box's relative to
-  /// the targets' origin.
+  /// Adds what the triangles in a box make up, seen from points outside its sphere. `centre` is the box's
+  /// relative to the targets' origin.
   void (*add_multipole)(const Multipole& multipole, const float centre[3], const Targets& targets);
   /// Adds the solid angle of a triangle to within 3e-6; nothing for a point in its plane but outside it.
   void (*add_triangle)(const PlacedTriangle<float>& triangle, const Targets& targets);
-  /// As add_triangle(), in double precision, for triangles that are large beside the distances between the points.
+  /// As add_triangle(), in double precision, for triangles that are large beside the distances between the
+  /// points.
   void (*add_large_triangle)(const PlacedTriangle<double>& triangle, const Targets& targets);
   static const Kernels sse2, avx2, avx512;
 };

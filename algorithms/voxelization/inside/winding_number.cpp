@@ -57,8 +57,8 @@ bool is_empty(const TriangleTree& tree, std::size_t box) {
   return pack.lower[0][box % kFan] > pack.upper[0][box % kFan];
 }
 
-/// Moments about a centre: the symmetric parts of n, n u and n u u summed over dipoles n at u, in voxels. The field
-/// is a contraction with symmetric tensors, so that other parts have no effect.
+/// Moments about a centre: the symmetric parts of n, n u and n u u summed over dipoles n at u, in voxels. The
+/// field is a contraction with symmetric tensors, so that other parts have no effect.
 struct Moments {
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   std::array<double, 6> second{};
@@ -90,8 +90,8 @@ struct Moments {
     }
   }
 
-  /// Takes the traces out, whose fields vanish, and scales to a radius of 1, so that single precision holds the
-  /// moments of any size of box.
+  /// Takes the traces out, whose fields vanish, and scales to a radius of 1, so that single precision holds
+  /// the moments of any size of box.
   Multipole multipole(double radius) const {
     Multipole result;
     result.radius = static_cast<float>(radius);
@@ -114,8 +114,8 @@ struct Moments {
   }
 };
 
-/// The multipole of a leaf's triangles. Integrals up to second order over a triangle are those of the midpoints of
-/// the three sides with equal weights, so each triangle becomes three dipoles without loss.
+/// The multipole of a leaf's triangles. Integrals up to second order over a triangle are those of the
+/// midpoints of the three sides with equal weights, so each triangle becomes three dipoles without loss.
 Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> turns, std::size_t box) {
   const Eigen::Vector3d centre = box_centre(tree, box);
   Moments moments;
@@ -185,7 +185,8 @@ class Batch {
     return begin + std::min((end - begin + 31) / 32 * 16, end - begin);
   }
 
-  /// Orders a range so that each half is compact. Equal coordinates are told apart by number: the order is unique.
+  /// Orders a range so that each half is compact. Equal coordinates are told apart by number: the order is
+  /// unique.
   void sort(std::span<const Eigen::Vector3d> points, std::size_t begin, std::size_t end) {
     if (end - begin <= kGroup) return;
     Bounds box;
@@ -300,8 +301,8 @@ class Batch {
 
 WindingNumber::WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns, double far)
     : tree_(tree), turns_(turns), far_(far), multipoles_(tree.packs().size() * kFan) {
-  // Level by level from the leaves up: the boxes of one depend only on those of the level below, and not on each
-  // other.
+  // Level by level from the leaves up: the boxes of one depend only on those of the level below, and not on
+  // each other.
   for (std::uint32_t level = 0; level < tree.level_count(); ++level) {
     const std::size_t end = level + 1 < tree.level_count() ? tree.first_pack(level + 1) : tree.packs().size();
     tbb::parallel_for(tree.first_pack(level) * kFan, end * kFan, [&](std::size_t box) {

@@ -29,18 +29,18 @@ class WindingNumber {
   explicit WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns = {},
                          double far = kFar);
 
-  /// The number at a point in voxels relative to the mesh's origin. On a triangle, one of the values on its two
-  /// sides.
+  /// The number at a point in voxels relative to the mesh's origin. On a triangle, one of the values on its
+  /// two sides.
   double at(const Eigen::Vector3d& p) const;
-  /// The numbers at many points near each other, such as a block's samples in any order: they share one descent.
-  /// Positions count to 1e-7 of the extent of each 512 consecutive points.
+  /// The numbers at many points near each other, such as a block's samples in any order: they share one
+  /// descent. Positions count to 1e-7 of the extent of each 512 consecutive points.
   /// @param points in voxels relative to the mesh's origin
   /// @param values as many as points
   void at(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
     evaluate(points, values, far_);
   }
-  /// The numbers at many points, as at() gives them, with an error that is some sixty times smaller, in ten times the
-  /// time or more.
+  /// The numbers at many points, as at() gives them, with an error that is some sixty times smaller, in ten
+  /// times the time or more.
   /// @param points in voxels relative to the mesh's origin
   /// @param values as many as points
   void at_finely(std::span<const Eigen::Vector3d> points, std::span<float> values) const {
@@ -59,8 +59,8 @@ class WindingNumber {
   std::vector<winding::Multipole> multipoles_;  ///< by box number
 };
 
-/// The winding number as a sum over all triangles by the formula of van Oosterom & Strackee in double precision, in
-/// linear time.
+/// The winding number as a sum over all triangles by the formula of van Oosterom & Strackee in double
+/// precision, in linear time.
 /// @param points in world units
 /// @param triangles by the numbers of their points
 /// @param scale voxels per unit of the points

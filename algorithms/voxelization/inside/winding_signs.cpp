@@ -14,8 +14,8 @@
 namespace hermesh {
 namespace {
 
-/// Components whose winding number is this near ½ have every voxel asked. The number of a component beside a closed
-/// surface is whole but for 0.01, so that only holes are within.
+/// Components whose winding number is this near ½ have every voxel asked. The number of a component beside a
+/// closed surface is whole but for 0.01, so that only holes are within.
 constexpr float kDoubt = 0.25f;
 /// Voxels whose number is this near ½, twice its error, are asked once more.
 constexpr float kError = 0.02f;
@@ -59,8 +59,8 @@ class WindingSigns {
   /// `rings`: how many blocks away from a cap its distance matters.
   Signs run(int rings) {
     ask_components();
-    // From the rims of holes the surface of ½ is followed block by block, until it ends at triangles. All blocks of a
-    // round are known before the next, so that the threads' order changes nothing.
+    // From the rims of holes the surface of ½ is followed block by block, until it ends at triangles. All
+    // blocks of a round are known before the next, so that the threads' order changes nothing.
     std::vector<BlockAt> doubtful = doubtful_blocks();
     while (!doubtful.empty()) {
       ask(doubtful);
@@ -105,8 +105,8 @@ class WindingSigns {
   bool sure(std::uint32_t component) const { return std::abs(value_[component] - 0.5f) > kDoubt; }
   bool side(std::uint32_t component) const { return value_[component] > 0.5f; }
 
-  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the number
-  /// changes within the component, which is in doubt whatever its one voxel says.
+  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the
+  /// number changes within the component, which is in doubt whatever its one voxel says.
   bool goes_round(std::uint32_t block, std::uint32_t component) const {
     const BlockMask& voxels = regions_.components[component].voxels;
     const auto& crossed = band_.crossed[block].word;
@@ -119,7 +119,8 @@ class WindingSigns {
     return false;
   }
 
-  /// Lists the blocks with a component in doubt, or next to one on the other side although no triangle is between.
+  /// Lists the blocks with a component in doubt, or next to one on the other side although no triangle is
+  /// between.
   std::vector<BlockAt> doubtful_blocks() const {
     std::vector<char> doubtful(band_.blocks.size(), 0);
     BlockFinder finder(table_);
@@ -139,7 +140,8 @@ class WindingSigns {
     return result;
   }
 
-  /// Whether components of two neighbouring blocks are on different sides and connected across the face between.
+  /// Whether components of two neighbouring blocks are on different sides and connected across the face
+  /// between.
   bool disagree(std::uint32_t lower, std::uint32_t upper, int axis) const {
     BlockMask crossed;
     for (std::size_t x = 0; x < 8; ++x) crossed[x] = band_.crossed[lower].word[axis][x];
@@ -152,10 +154,10 @@ class WindingSigns {
     return false;
   }
 
-  /// Asks once more about each sample that is so close to a triangle that the single precision of many points together
-  /// does not tell its side.
-  void ask_singly(const float* distances, std::span<const unsigned> places, std::span<const Eigen::Vector3d> points,
-                  std::span<float> values) const {
+  /// Asks once more about each sample that is so close to a triangle that the single precision of many points
+  /// together does not tell its side.
+  void ask_singly(const float* distances, std::span<const unsigned> places,
+                  std::span<const Eigen::Vector3d> points, std::span<float> values) const {
     if (!distances) return;
     const float near = float(kOnSurface * band_.voxel_size);
     for (std::size_t i = 0; i < places.size(); ++i)
@@ -198,9 +200,9 @@ class WindingSigns {
     for (std::size_t i = 0; i < blocks.size(); ++i) asked_.emplace(blocks[i], std::move(found[i]));
   }
 
-  /// Finds the neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: across a side of
-  /// the block on which the sign changes without a triangle, or where the neighbour is believed to be on the other
-  /// side. The map gives them in ascending order.
+  /// Finds the neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: across a
+  /// side of the block on which the sign changes without a triangle, or where the neighbour is believed to be
+  /// on the other side. The map gives them in ascending order.
   std::vector<BlockAt> next_blocks(const std::vector<BlockAt>& from) const {
     std::map<BlockAt, int> next;
     for (const BlockAt& block : from) {
@@ -303,7 +305,8 @@ class WindingSigns {
             last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
         Eigen::Vector3d crossing = voxel_at(block, place);
         CapEdge edge{{}, axis};
-        // Windings are taken a few millionths of a voxel beside the samples (SampleSide), on either side of whole numbers.
+        // Windings are taken a few millionths of a voxel beside the samples (SampleSide), on either side of
+        // whole numbers.
         for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(std::lround(crossing[a]));
         // Linear between the two numbers, as a level set's crossing is.
         crossing[axis] += std::clamp((0.5 - double(from)) / (double(to) - double(from)), 0.0, 1.0);
@@ -344,8 +347,8 @@ class WindingSigns {
     }
   }
 
-  /// Signs the blocks around those that were asked, which distances to caps reach: each is on one side of the surface
-  /// as a whole unless it was asked itself, so that one of its voxels speaks for all.
+  /// Signs the blocks around those that were asked, which distances to caps reach: each is on one side of the
+  /// surface as a whole unless it was asked itself, so that one of its voxels speaks for all.
   void sign_beyond(int rings, std::map<BlockAt, BlockMask>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();

@@ -7,10 +7,11 @@
 
 namespace hermesh {
 
-/// Signs of the band's voxels: inside is where `winding` is above ½. Where neighbouring components disagree or the
-/// number is near ½, as it is around a hole, every voxel is asked; the surface of the value ½ across the hole is
-/// followed through space without blocks and returned as the caps. `open` says whether the surface may have holes at
-/// all; a closed one is not searched for their rims. `reach` is how far distances matter, in voxels.
+/// Signs of the band's voxels: inside is where `winding` is above ½. Where neighbouring components disagree
+/// or the number is near ½, as it is around a hole, every voxel is asked; the surface of the value ½ across
+/// the hole is followed through space without blocks and returned as the caps. `open` says whether the
+/// surface may have holes at all; a closed one is not searched for their rims. `reach` is how far distances
+/// matter, in voxels.
 /// @throws Cancelled.
 Signs winding_signs(const WindingNumber& winding, const BlockTable& table, const Band& band,
                     const Regions& regions, bool open, double reach, const RunContext& context);

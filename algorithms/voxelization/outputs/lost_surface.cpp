@@ -10,22 +10,22 @@
 #include <vector>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/voxelization/hermesh_voxelizer.h"
-#include "algorithms/voxelization/distance/segment.h"
 #include "algorithms/search/triangle_tree.h"
+#include "algorithms/voxelization/distance/segment.h"
+#include "algorithms/voxelization/hermesh_voxelizer.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMostPlaces = 200'000;      ///< where every triangle is larger than its share
-constexpr std::size_t kMostProbes = 20'000;  ///< lost places whose thickness is measured
+constexpr double kMostPlaces = 200'000;          ///< where every triangle is larger than its share
+constexpr std::size_t kMostProbes = 20'000;      ///< lost places whose thickness is measured
 constexpr std::size_t kTrianglesPerTask = 4096;  ///< triangles to a task
-constexpr double kReach = 2.0;               ///< voxels: how far an opposite wall is looked for
-constexpr double kOff = 1e-4;                ///< voxels: where the way to it begins
+constexpr double kReach = 2.0;                   ///< voxels: how far an opposite wall is looked for
+constexpr double kOff = 1e-4;                    ///< voxels: where the way to it begins
 constexpr double kSameDistance =
-    1e-3;                           ///< voxels: up to here a sample's distance is that to the place's polygon
+    1e-3;                         ///< voxels: up to here a sample's distance is that to the place's polygon
 constexpr double kNoWall = 1e-3;  ///< voxels: what is thinner is no wall to be kept
 
 /// A place of the surface without a change of sign around it.
@@ -63,12 +63,13 @@ class Search {
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
       context_.check();
       auto samples = grid_.getConstUnsafeAccessor();
-      for (std::size_t t = i * kTrianglesPerTask; t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t)
+      for (std::size_t t = i * kTrianglesPerTask;
+           t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t)
         look(Facet(corner(t, 0), corner(t, 1), corner(t, 2)), share, samples, parts[i]);
     });
     LostSurface result;
-    // One thread adds up the parts in their order, which the size of the mesh alone decides: the sums are the same at
-    // any thread count.
+    // One thread adds up the parts in their order, which the size of the mesh alone decides: the sums are the
+    // same at any thread count.
     std::vector<LostPlace> places;
     for (const Part& part : parts) {
       result.area += part.area * voxel_size_ * voxel_size_;
@@ -91,7 +92,8 @@ class Search {
   double total_area() const {
     std::vector<double> area((triangles_.size() + kTrianglesPerTask - 1) / kTrianglesPerTask, 0.0);
     tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t i) {
-      for (std::size_t t = i * kTrianglesPerTask; t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t) {
+      for (std::size_t t = i * kTrianglesPerTask;
+           t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t) {
         const Triangle& corners = triangles_[t];
         const Vector3d a = mesh_.points[corners[0]].cast<double>(),
                        b = mesh_.points[corners[1]].cast<double>(),
@@ -104,8 +106,8 @@ class Search {
     return sum / (voxel_size_ * voxel_size_);
   }
 
-  /// Looks at places of a triangle: its middle, or the points of Roberts' sequence R2, which fill it evenly whatever
-  /// their number.
+  /// Looks at places of a triangle: its middle, or the points of Roberts' sequence R2, which fill it evenly
+  /// whatever their number.
   void look(const Facet& facet, double share, Samples& samples, Part& part) const {
     const Vector3d normal = facet.normal();
     const double area = 0.5 * normal.norm();
@@ -193,8 +195,8 @@ class Search {
     result.thickness = *least * voxel_size_;
   }
 
-  /// Selects the triangles that may be within reach of one of the places: a tree of all of them would take longer
-  /// than the search where little is lost.
+  /// Selects the triangles that may be within reach of one of the places: a tree of all of them would take
+  /// longer than the search where little is lost.
   std::vector<Triangle> triangles_about(const std::vector<LostPlace>& places) const {
     // Cells as long as the reach: what is within reach of a place and no longer than it has all of its
     // corners within two cells of the place's.
@@ -208,11 +210,12 @@ class Search {
       cells.fill(openvdb::CoordBBox(cell.offsetBy(-2), cell.offsetBy(2)), true);
     }
     std::vector<std::uint8_t> near(mesh_.points.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, near.size(), kTrianglesPerTask), [&](const auto& range) {
-      const openvdb::tree::ValueAccessor<const openvdb::MaskTree> marked(cells);
-      for (std::size_t i = range.begin(); i < range.end(); ++i)
-        near[i] = marked.isValueOn(cell_of(origin_ + scale_ * mesh_.points[i].cast<double>()));
-    });
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, near.size(), kTrianglesPerTask), [&](const auto& range) {
+          const openvdb::tree::ValueAccessor<const openvdb::MaskTree> marked(cells);
+          for (std::size_t i = range.begin(); i < range.end(); ++i)
+            near[i] = marked.isValueOn(cell_of(origin_ + scale_ * mesh_.points[i].cast<double>()));
+        });
     std::vector<Triangle> result;
     const auto longest = static_cast<float>(kReach * voxel_size_);
     for (const Triangle& t : triangles_) {
@@ -224,18 +227,18 @@ class Search {
     return result;
   }
 
-  /// The distance in voxels from the place along a unit vector to the next triangle, at most kReach. It begins a
-  /// little off the place, so that the place's own triangle does not count.
+  /// The distance in voxels from the place along a unit vector to the next triangle, at most kReach. It
+  /// begins a little off the place, so that the place's own triangle does not count.
   static double gap(const TriangleTree& tree, const Vector3d& place, const Vector3d& along) {
     const Vector3d from = place + kOff * along, to = place + kReach * along;
     constexpr double kMargin = 1e-6;  // beyond what the boxes of slabs in a plane of samples are rounded by
     double nearest = 1.0;
-    tree.for_each_near(from.cwiseMin(to).array() - kMargin, from.cwiseMax(to).array() + kMargin,
-                       [&](std::uint32_t t) {
-                         const double part =
-                             meeting(from, to, Facet(tree.corner(t, 0), tree.corner(t, 1), tree.corner(t, 2)));
-                         if (part >= 0.0) nearest = std::min(nearest, part);
-                       });
+    tree.for_each_near(
+        from.cwiseMin(to).array() - kMargin, from.cwiseMax(to).array() + kMargin, [&](std::uint32_t t) {
+          const double part =
+              meeting(from, to, Facet(tree.corner(t, 0), tree.corner(t, 1), tree.corner(t, 2)));
+          if (part >= 0.0) nearest = std::min(nearest, part);
+        });
     return kOff + nearest * (kReach - kOff);
   }
 

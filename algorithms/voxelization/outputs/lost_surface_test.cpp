@@ -11,16 +11,17 @@ namespace {
 void add_box(PolygonMesh& mesh, const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
   const auto n = std::uint32_t(mesh.points.size());
   for (unsigned i = 0; i < 8; ++i)
-    mesh.points.push_back({i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()});
-  for (const Quad& q : {Quad{0, 2, 3, 1}, Quad{4, 5, 7, 6}, Quad{0, 1, 5, 4}, Quad{2, 6, 7, 3}, Quad{0, 4, 6, 2},
-                        Quad{1, 3, 7, 5}})
+    mesh.points.push_back(
+        {i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()});
+  for (const Quad& q : {Quad{0, 2, 3, 1}, Quad{4, 5, 7, 6}, Quad{0, 1, 5, 4}, Quad{2, 6, 7, 3},
+                        Quad{0, 4, 6, 2}, Quad{1, 3, 7, 5}})
     mesh.quads.push_back({n + q[0], n + q[1], n + q[2], n + q[3]});
 }
 
 LostSurface lost_of(const PolygonMesh& mesh, double voxel_size) {
   RunContext context;
-  const LevelSet level_set =
-      make_level_set(voxelize(mesh, {.voxel_size = voxel_size, .signs = SignRule::flood_fill}, context).distance);
+  const LevelSet level_set = make_level_set(
+      voxelize(mesh, {.voxel_size = voxel_size, .signs = SignRule::flood_fill}, context).distance);
   return find_lost_surface(mesh, level_set, true, context);
 }
 

@@ -65,8 +65,8 @@ class AttributeSampler {
   std::size_t place(std::uint32_t triangle, int corner) const {
     return element(triangle, std::size_t(corner)) * std::size_t(attribute_.components);
   }
-  /// Number of the point, corner or polygon that a corner of a triangle has its values from. Corners and polygons are
-  /// those of all triangles, then those of all quads.
+  /// Number of the point, corner or polygon that a corner of a triangle has its values from. Corners and
+  /// polygons are those of all triangles, then those of all quads.
   std::size_t element(std::size_t triangle, std::size_t corner) const {
     if (attribute_.domain == AttributeDomain::point) return IndexSoup(mesh_, 1.0).triangle(triangle)[corner];
     const std::size_t triangles = mesh_.triangles.size();
@@ -90,7 +90,8 @@ class AttributeSampler {
 
 // ---- A grid that is being filled.
 
-/// A grid of any type while it is filled. One leaf is for one thread; different leaves may be filled at a time.
+/// A grid of any type while it is filled. One leaf is for one thread; different leaves may be filled at a
+/// time.
 class Layer {
  public:
   virtual ~Layer() = default;
@@ -107,8 +108,8 @@ class SampledLayer final : public Layer {
  public:
   using Tree = typename Grid::TreeType;
   SampledLayer(const openvdb::Int32Grid& nearest, typename Grid::ValueType background, Sample sample)
-      // The topology is that of the triangles from the start, so that filling in adds no node, and leaf i is the same
-      // block in all layers.
+      // The topology is that of the triangles from the start, so that filling in adds no node, and leaf i is
+      // the same block in all layers.
       : grid_(Grid::create(std::make_shared<Tree>(nearest.tree(), background, openvdb::TopologyCopy()))),
         sample_(std::move(sample)) {
     grid_->setTransform(nearest.transform().copy());
@@ -291,7 +292,8 @@ std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mes
   });
   std::vector<openvdb::GridBase::Ptr> grids;
   for (NamedLayer& layer : layers) grids.push_back(finish(layer));
-  if (request.closest_point) grids.front()->insertMeta(kZeroOfPositions, openvdb::Vec3DMetadata(to_vec3d(mesh.origin)));
+  if (request.closest_point)
+    grids.front()->insertMeta(kZeroOfPositions, openvdb::Vec3DMetadata(to_vec3d(mesh.origin)));
   return grids;
 }
 

@@ -8,14 +8,14 @@
 #include <cstdio>
 #include <sstream>
 
-#include "algorithms/io/atomic_file.h"
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/lattice/sample_side.h"
-#include "algorithms/io/vdb_archive.h"
 #include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/io/atomic_file.h"
+#include "algorithms/io/vdb_archive.h"
+#include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/outputs/surface_transfer.h"
 
 namespace hermesh {
@@ -26,8 +26,8 @@ constexpr const char* kNames =
 
 // ---- Volumes from the distances.
 
-/// Replaces every value, those of tiles and inactive ones included; `active` says which are active then. The leaves
-/// are for all threads, each leaf for one; the few tiles above them for the thread that calls.
+/// Replaces every value, those of tiles and inactive ones included; `active` says which are active then. The
+/// leaves are for all threads, each leaf for one; the few tiles above them for the thread that calls.
 template <class Map, class Active>
 void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Active active) {
   std::vector<openvdb::FloatTree::LeafNodeType*> leaves;
@@ -64,8 +64,8 @@ openvdb::FloatGrid::Ptr make_udf(const openvdb::FloatGrid& sdf, RunContext& cont
   return grid;
 }
 
-/// Fog (§5.6): 1 inside, and a linear ramp from 1 at the inner end of the band to 0 at the surface, or at the outer
-/// end of the band.
+/// Fog (§5.6): 1 inside, and a linear ramp from 1 at the inner end of the band to 0 at the surface, or at the
+/// outer end of the band.
 openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOptions& options, bool exterior,
                                  RunContext& context) {
   const Stage stage(context, "fog");
@@ -78,12 +78,13 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
       [=](float distance) {
         // Exactly 1 beyond the band, where division might leave a little less.
         if (distance <= -inner) return 1.0f;
-        if (distance < 0.0f && distance >= -on_surface) distance = 0.0f;  // a sample on the surface, which is no depth
+        if (distance < 0.0f && distance >= -on_surface)
+          distance = 0.0f;  // a sample on the surface, which is no depth
         return std::clamp((outer - distance) / (outer + inner), 0.0f, 1.0f);
       },
       [](float density, bool) { return density > 0.0f; });
-  // The background was the exterior width, and inactive tiles of it are 0 by now; pruning makes tiles of leaves that
-  // are all 1 or all 0.
+  // The background was the exterior width, and inactive tiles of it are 0 by now; pruning makes tiles of
+  // leaves that are all 1 or all 0.
   openvdb::tools::changeBackground(grid->tree(), 0.0f);
   openvdb::tools::prune(grid->tree());
   grid->setName("fog");
@@ -91,8 +92,8 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   return grid;
 }
 
-/// The nearest triangles by the numbers that the user knows them by. A copy, for the other grids are made from
-/// triangulated()'s.
+/// The nearest triangles by the numbers that the user knows them by. A copy, for the other grids are made
+/// from triangulated()'s.
 openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
                                          const std::vector<std::uint32_t>& numbers, RunContext& context) {
   if (numbers.empty()) return nearest;
@@ -129,7 +130,8 @@ std::vector<const MeshAttribute*> chosen_attributes(const PolygonMesh& mesh, con
   return chosen;
 }
 
-/// Refuses what is made of an inside if there is none. It is asked twice: before the work, and once it is known.
+/// Refuses what is made of an inside if there is none. It is asked twice: before the work, and once it is
+/// known.
 void check_signs(const VolumeRequest& request, bool is_signed) {
   if (is_signed) return;
   for (const auto& [asked, name] : {std::pair(request.fog, "fog"), std::pair(request.hermite, "hermite")})
@@ -138,8 +140,8 @@ void check_signs(const VolumeRequest& request, bool is_signed) {
                   " needs an inside, but the distances have no sign; leave it out");
 }
 
-/// Bytes beyond those that the distances alone take: leaves of 512 values for each grid, and for the triangles that
-/// some are made from.
+/// Bytes beyond those that the distances alone take: leaves of 512 values for each grid, and for the
+/// triangles that some are made from.
 double bytes_of_outputs(const VolumeRequest& request, const std::vector<const MeshAttribute*>& attributes,
                         double leaves) {
   std::size_t bytes = (request.udf ? 4 : 0) + (request.fog ? 4 : 0) +
@@ -150,7 +152,8 @@ double bytes_of_outputs(const VolumeRequest& request, const std::vector<const Me
   return 512.0 * leaves * double(bytes);
 }
 
-/// Refuses grids that together need more memory than there is, before the work begins. Unknown memory is enough.
+/// Refuses grids that together need more memory than there is, before the work begins. Unknown memory is
+/// enough.
 void check_fits(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
                 const std::vector<const MeshAttribute*>& attributes) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
@@ -208,11 +211,12 @@ VolumeRequest parse_volume_request(const std::string& list) {
 VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options,
                                   const VolumeRequest& request, RunContext& context) {
   return make_volume_outputs(
-      mesh, options, request, [&](const VoxelizeOptions& asked) { return voxelize(mesh, asked, context); }, context);
+      mesh, options, request, [&](const VoxelizeOptions& asked) { return voxelize(mesh, asked, context); },
+      context);
 }
 
-VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
-                                  const VoxelizeBy& by, RunContext& context) {
+VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions& options,
+                                  const VolumeRequest& request, const VoxelizeBy& by, RunContext& context) {
   const std::vector<const MeshAttribute*> attributes = chosen_attributes(mesh, request);
   check_signs(request, options.signs != SignRule::none);
   // For the distances alone voxelize() does the same.
@@ -229,7 +233,8 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
   // Without signs the distances themselves are "udf", and there is no other grid to make of them.
   if (request.sdf || (request.udf && !made.is_signed)) outputs.grids.push_back(made.distance);
   if (request.udf && made.is_signed) outputs.grids.push_back(make_udf(*made.distance, context));
-  if (request.triangle_id) outputs.grids.push_back(make_triangle_id(made.nearest, request.triangle_numbers, context));
+  if (request.triangle_id)
+    outputs.grids.push_back(make_triangle_id(made.nearest, request.triangle_numbers, context));
   if (request.closest_point || !attributes.empty())
     for (const auto& grid : transfer_from_surface(mesh, *made.nearest, options.voxel_size,
                                                   {request.closest_point, attributes}, context))

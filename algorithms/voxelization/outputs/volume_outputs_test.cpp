@@ -165,10 +165,12 @@ TEST_F(VolumeOutputsTest, UnsignedDistancesAreAsWideAsTheExteriorBand) {
   for (const auto& [exterior, interior] : {std::pair(2.0, 5.0), {5.0, 2.0}, {2.0, 30.0}})
     for (const SignRule signs : {SignRule::none, SignRule::automatic}) {
       const Voxelization made = voxelize(
-          sheet, {.voxel_size = 0.1, .exterior_band = exterior, .interior_band = interior, .signs = signs}, context);
+          sheet, {.voxel_size = 0.1, .exterior_band = exterior, .interior_band = interior, .signs = signs},
+          context);
       if (made.is_signed) continue;
       EXPECT_NEAR(made.distance->background(), 0.1 * exterior, 1e-6);
-      for (auto voxel = made.distance->cbeginValueOn(); voxel; ++voxel) ASSERT_LT(*voxel, 0.1 * exterior + 1e-6);
+      for (auto voxel = made.distance->cbeginValueOn(); voxel; ++voxel)
+        ASSERT_LT(*voxel, 0.1 * exterior + 1e-6);
       // A column over the middle: 0, ±1, … samples nearer than the band is wide.
       int column = 0;
       for (int z = -40; z <= 40; ++z) column += made.distance->tree().isValueOn(openvdb::Coord(0, 0, z));
@@ -300,10 +302,9 @@ TEST_F(VolumeOutputsTest, OpenVdbsOwnToolPrintsEveryStandardGrid) {
   ASSERT_EQ(std::system("command -v vdb_print > /dev/null"), 0)
       << "vdb_print is not installed (package libopenvdb-tools)";
   const std::string text = text_of_vdb_print(file);
-  for (const char* expected :
-       {"sdf", "udf", "fog", "triangle-id", "closest-point", "normal", "colour", "colour-alpha", "uv",
-        "material", "label", "attribute-fog", "level set", "fog volume", "Tree_float_5_4_3",
-        "Tree_int32_5_4_3", "Tree_vec3s_5_4_3"})
+  for (const char* expected : {"sdf", "udf", "fog", "triangle-id", "closest-point", "normal", "colour",
+                               "colour-alpha", "uv", "material", "label", "attribute-fog", "level set",
+                               "fog volume", "Tree_float_5_4_3", "Tree_int32_5_4_3", "Tree_vec3s_5_4_3"})
     EXPECT_NE(text.find(expected), std::string::npos) << expected << " is missing in:\n" << text;
   for (const char* complaint : {"error", "Error", "ERROR", "not registered", "Cannot"})
     EXPECT_EQ(text.find(complaint), std::string::npos) << text;

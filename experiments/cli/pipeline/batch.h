@@ -27,8 +27,8 @@ std::vector<BatchItem> batch_items(const std::vector<std::string>& inputs, const
 /// Whether the command line asks for a batch. @throws UsageError where it cannot be told.
 bool is_batch(const CLI::App& command, const CommandFiles& files);
 
-/// A sentence if the command was told an input, and no output; empty otherwise. For a command line that lacks other things,
-/// too, of which the reader would first see those.
+/// A sentence if the command was told an input, and no output; empty otherwise. For a command line that lacks
+/// other things, too, of which the reader would first see those.
 std::string missing_output(const CLI::App& app, const Session& session);
 
 /// The files of the command that was asked for; null where it works on none, and where it is a batch, which

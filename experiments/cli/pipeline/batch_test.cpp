@@ -164,7 +164,8 @@ TEST_F(BatchTest, CtrlCStopsAllAndLeavesNothingHalfWritten) {
 TEST_F(BatchTest, AProcessThatIsKilledIsOneFailure) {
   const Outcome outcome = run_shell(
       "$H remesh s1.off cube.off --out-dir clean --resolution 900 --json summary.jsonl & p=$!; "
-      "kill_child() { until kill -KILL $(cat /proc/$p/task/$p/children) 2> /dev/null; do sleep 0.05; done; }; "
+      "kill_child() { until kill -KILL $(cat /proc/$p/task/$p/children) 2> /dev/null; do sleep 0.05; done; "
+      "}; "
       "kill_child; sleep 0.3; kill_child; wait $p");
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.out.find("0 of 2 done, 2 failed"), std::string::npos) << outcome.out;

@@ -49,19 +49,20 @@ void add_files(CLI::App& command, Session& session, CommandFiles given) {
   CommandFiles& files = session.files[&command] = std::move(given);
   const bool mesh = files.in != FileKind::imported &&
                     (files.in != FileKind::volume || (files.output && files.out == FileKind::mesh));
-  command.add_option(
-      "--format", files.format,
-      std::string("Format of a standard stream, which - names: ") +
-          (mesh ? "ply, obj, off, stl, glb, gltf or 3mf of a mesh (default: the standard input's by its content, ply for the "
-                  "standard output)"
-                : "told by its kind"));
+  command.add_option("--format", files.format,
+                     std::string("Format of a standard stream, which - names: ") +
+                         (mesh ? "ply, obj, off, stl, glb, gltf or 3mf of a mesh (default: the standard "
+                                 "input's by its content, ply for the "
+                                 "standard output)"
+                               : "told by its kind"));
   command.add_option("--input-format", files.input_format,
                      "Format of the standard input, where --format is that of the standard output");
   if (files.output && (files.in == FileKind::mesh || files.in == FileKind::mesh_or_volume))
     add_scale_options(command, session);
   if (files.output && files.out != FileKind::folder)
-    command.add_flag("--overwrite-input", files.overwrite_input,
-                     "Allow OUT to be a file that the command reads; it is replaced once the work has succeeded");
+    command.add_flag(
+        "--overwrite-input", files.overwrite_input,
+        "Allow OUT to be a file that the command reads; it is replaced once the work has succeeded");
   if (!files.takes_many) return;
   if (files.output) {
     command.add_option("MORE", files.batch.more, "With --out-dir: more inputs (OUT is one, too)");
@@ -125,8 +126,8 @@ void check_written_files(const CLI::App& app, const CommandFiles* files, const S
   for (const auto& [option, file] : {std::pair("--log", session.log_file), std::pair("--json", json)})
     for (const GivenValue& given : values)
       if (!file.empty() && given.option != option && is_same_file(given.value, file))
-        throw UsageError(std::string(option) + " '" + file + "' would be written into the file of " + given.option +
-                         "; name another file");
+        throw UsageError(std::string(option) + " '" + file + "' would be written into the file of " +
+                         given.option + "; name another file");
   const bool is_written = files && files->output && *files->output != "-" && files->out != FileKind::folder;
   if (!is_written || files->overwrite_input) return;
   for (const GivenValue& given : values)
@@ -139,7 +140,8 @@ std::string missing_output(const CLI::App& app, const Session& session) {
   const std::vector<CLI::App*> asked = app.get_subcommands();
   const auto found = asked.empty() ? session.files.end() : session.files.find(asked[0]);
   if (found == session.files.end() || !found->second.takes_many || !found->second.output) return "";
-  const bool missing = asked[0]->count("IN") > 0 && asked[0]->count("OUT") == 0 && asked[0]->count("--out-dir") == 0;
+  const bool missing =
+      asked[0]->count("IN") > 0 && asked[0]->count("OUT") == 0 && asked[0]->count("--out-dir") == 0;
   return missing ? "OUT is required, or --out-dir for many inputs" : "";
 }
 

@@ -26,7 +26,7 @@ struct CommandFiles {
   std::vector<std::string*> inputs;
   std::string* output = nullptr;  ///< null: the command writes no file
   FileKind in = FileKind::mesh, out = FileKind::mesh;
-  bool takes_many = false;   ///< whether the command can be run on many inputs, as BatchArguments say
+  bool takes_many = false;  ///< whether the command can be run on many inputs, as BatchArguments say
   BatchArguments batch = {};
   std::string format = {}, input_format = {};  ///< of standard streams; empty: not given
   bool overwrite_input = false;                ///< whether the output may be one of the inputs

@@ -1,21 +1,21 @@
 // What a command did, as one JSON object with the same keys for all commands.
 //
-// | key           | is                                                                                              |
-// | ------------- | ----------------------------------------------------------------------------------------------- |
-// | command       | name of the command                                                                             |
-// | program       | "hermesh" and its version                                                                       |
-// | input, inputs | the first file that was read; all of them; "-" is the standard input                            |
-// | output        | the file or folder that was written; null where the command writes none                        |
-// | status        | "done", "not met" (a promise or a requirement, exit code 3) or "failed"                         |
-// | exit_code     | that of the program                                                                             |
-// | error         | the sentence of a failure; null without one                                                     |
-// | seconds       | from the start of the command to its end                                                        |
-// | triangles     | of the mesh that was made, a quad counting as two; validate has quads apart; null without a mesh |
-// | result        | what was made or found; its keys depend on the command                                          |
-// | notes         | sentences that a user should read although the work went on                                     |
-// | figures       | numbers of the work by name                                                                     |
-// | stage_seconds | the stages in the order of their ends, each {stage, seconds}                                    |
-// | peak_bytes    | the most memory that the process had resident                                                   |
+// | key           | is | | ------------- |
+// ----------------------------------------------------------------------------------------------- | | command
+// | name of the command                                                                             | |
+// program       | "hermesh" and its version | | input, inputs | the first file that was read; all of them;
+// "-" is the standard input                            | | output        | the file or folder that was
+// written; null where the command writes none                        | | status        | "done", "not met" (a
+// promise or a requirement, exit code 3) or "failed"                         | | exit_code     | that of the
+// program                                                                             | | error         | the
+// sentence of a failure; null without one                                                     | | seconds |
+// from the start of the command to its end                                                        | |
+// triangles     | of the mesh that was made, a quad counting as two; validate has quads apart; null without a
+// mesh | | result        | what was made or found; its keys depend on the command | | notes         |
+// sentences that a user should read although the work went on                                     | | figures
+// | numbers of the work by name                                                                     | |
+// stage_seconds | the stages in the order of their ends, each {stage, seconds} | | peak_bytes    | the most
+// memory that the process had resident                                                   |
 //
 // `validate` has the keys of validation/report_json.h beside them.
 #pragma once

@@ -159,8 +159,7 @@ TEST_F(OptionsTest, AGridIsChosenByName) {
 TEST_F(OptionsTest, ALogHasStagesNotesAndSummariesWithTimes) {
   write_open_cube();
   ASSERT_EQ(
-      run({"remesh", "open.off", "out.stl", "--voxel-size", "0.13", "--log", "log", "--quiet"}).exit_code,
-      0);
+      run({"remesh", "open.off", "out.stl", "--voxel-size", "0.13", "--log", "log", "--quiet"}).exit_code, 0);
   ASSERT_EQ(run({"validate", "none.off", "--log", "log"}).exit_code, 1);
   std::istringstream lines(read("log"));
   std::size_t count = 0;
@@ -169,8 +168,9 @@ TEST_F(OptionsTest, ALogHasStagesNotesAndSummariesWithTimes) {
     EXPECT_EQ(line.substr(0, 2) + line[10] + line[13] + line[23] + line[24], "20T:Z ") << line;
   }
   EXPECT_GT(count, 10u);
-  for (const char* text : {"remesh open.off out.stl", "stage 'distances'", "end of stage 'distances'",
-                           "note: the polygons have holes", "extracted ", "ended with exit code 0", "failed: ", "none.off"})
+  for (const char* text :
+       {"remesh open.off out.stl", "stage 'distances'", "end of stage 'distances'",
+        "note: the polygons have holes", "extracted ", "ended with exit code 0", "failed: ", "none.off"})
     EXPECT_NE(read("log").find(text), std::string::npos) << text << '\n' << read("log");
   EXPECT_EQ(run({"remesh", "sphere.off", "out.stl", "--voxel-size", "0.1", "--log", "none/log"}).exit_code,
             1);

@@ -11,7 +11,9 @@ using Plan = std::vector<PlannedStage>;
 void append(Plan& plan, const Plan& more) { plan.insert(plan.end(), more.begin(), more.end()); }
 
 const Plan kVoxelize = {{"triangles to blocks", 0.02}, {"distances", 0.1}, {"signs", 0.45}, {"tree", 0.001}};
-const Plan kSample = {{"ends of the data", 0.002}, {"Hermite data from the level set", 0.004}, {"Hermite data from the polygons", 0.15}};
+const Plan kSample = {{"ends of the data", 0.002},
+                      {"Hermite data from the level set", 0.004},
+                      {"Hermite data from the polygons", 0.15}};
 const Plan kCollapse = {{"find cells", 0.002}, {"place points", 0.07}, {"let points leave", 0.03},
                         {"connect", 0.01},     {"try sheets", 0.001},  {"connect", 0.003},
                         {"move points", 0.02}, {"decimate", 0.06},     {"decimate", 0.04},
@@ -81,8 +83,8 @@ void OverallProgress::begin(std::string_view stage) {
     span_ = std::max(0.0, (before + planned->weight) / total_ - base_);
     return;
   }
-  // Nobody knows how many more will come: so each gets a part of the rest, and all together never get to the last stage.
-  // It is a small one while stages that are planned are still to come.
+  // Nobody knows how many more will come: so each gets a part of the rest, and all together never get to the
+  // last stage. It is a small one while stages that are planned are still to come.
   const double last = plan_.empty() ? 0.0 : plan_.back().weight / total_;
   const double part = next_ + 1 < plan_.size() ? 0.1 : 0.5;
   span_ = std::max(0.0, (1.0 - last - base_) * part);

@@ -14,13 +14,14 @@ struct PlannedStage {
   double weight;
 };
 
-/// The stages that a command usually has, in their order, some more than once. Weights are those of a scan of 70,000
-/// triangles at 150 voxels. Empty for commands that have no such order. "remesh --error" is a command
+/// The stages that a command usually has, in their order, some more than once. Weights are those of a scan of
+/// 70,000 triangles at 150 voxels. Empty for commands that have no such order. "remesh --error" is a command
 /// of its own here.
 std::vector<PlannedStage> plan_of(std::string_view command);
 
-/// Tells how much of a plan is done. The figure never falls, whatever stages come: one that is not planned, or comes
-/// once more than planned, takes a tenth of what is left before the last stage, or half if only that is still to come.
+/// Tells how much of a plan is done. The figure never falls, whatever stages come: one that is not planned,
+/// or comes once more than planned, takes a tenth of what is left before the last stage, or half if only that
+/// is still to come.
 class OverallProgress {
  public:
   explicit OverallProgress(std::vector<PlannedStage> plan);
@@ -28,8 +29,8 @@ class OverallProgress {
   /// Takes the progress of a stage and returns that of all, 0 to 1. A stage begins with the fraction 0.
   double update(std::string_view stage, double fraction);
 
-  /// Seconds until the end, once there is enough to go by: at least a second and a fiftieth of the work. `elapsed` is
-  /// seconds from the start.
+  /// Seconds until the end, once there is enough to go by: at least a second and a fiftieth of the work.
+  /// `elapsed` is seconds from the start.
   static std::optional<double> left(double done, double elapsed);
 
  private:

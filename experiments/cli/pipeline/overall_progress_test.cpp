@@ -53,7 +53,8 @@ TEST(OverallProgress, NeverFallsNorEndsBeforeTheLastStage) {
 
 TEST(OverallProgress, ASecondPassIsPlanned) {
   OverallProgress progress(plan_of("remesh --error"));
-  for (const char* stage : {"read", "try larger voxels", "triangles to blocks", "distances", "signs", "move points", "compare"})
+  for (const char* stage :
+       {"read", "try larger voxels", "triangles to blocks", "distances", "signs", "move points", "compare"})
     progress.update(stage, 1.0);
   const double first = progress.update("triangles to blocks", 0.0);
   EXPECT_GT(first, 0.1);

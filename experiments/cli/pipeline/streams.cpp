@@ -34,10 +34,11 @@ void check_format(const std::string& option, const std::string& format, FileKind
                                                        : format == "nii";
   if (fits) return;
   throw UsageError(option + " " + format + " is nothing that this command has there: it takes " +
-                   (kind == FileKind::volume           ? "vdb"
-                    : kind == FileKind::imported       ? "nii"
-                    : kind == FileKind::mesh_or_volume ? "ply, obj, off, stl, glb, gltf, 3mf (.gz may follow) or vdb"
-                                                       : "ply, obj, off, stl, glb, gltf or 3mf (.gz may follow)"));
+                   (kind == FileKind::volume     ? "vdb"
+                    : kind == FileKind::imported ? "nii"
+                    : kind == FileKind::mesh_or_volume
+                        ? "ply, obj, off, stl, glb, gltf, 3mf (.gz may follow) or vdb"
+                        : "ply, obj, off, stl, glb, gltf or 3mf (.gz may follow)"));
 }
 
 /// Copies a stream to its end into a file; returns the bytes.
@@ -102,7 +103,8 @@ std::string ending_of(std::string_view bytes) {
       bytes.starts_with(std::string_view("\0\0\x01\x5c", 4)))
     return ".nii";
   if (text.starts_with("solid")) return ".stl";
-  // A binary STL file has no keyword, but zeros: in the count of its triangles, and behind each. No text has any.
+  // A binary STL file has no keyword, but zeros: in the count of its triangles, and behind each. No text has
+  // any.
   if (bytes.find('\0') != std::string_view::npos) return ".stl";
   return ".obj";
 }
@@ -136,7 +138,8 @@ void Streams::take_input(std::string& input) {
     throw UsageError(std::string(kInputName) +
                      " is a terminal: write '< FILE' behind the command, or a program and '|' before it");
   if (is_closed(STDIN_FILENO))
-    throw Error(std::string(kInputName) + " is closed: write '< FILE' behind the command, or name a file instead of -");
+    throw Error(std::string(kInputName) +
+                " is closed: write '< FILE' behind the command, or name a file instead of -");
   // Where the output is a mesh, too, --format is about that.
   const bool about_output = session_.writes_stream && files_.out == FileKind::mesh;
   const std::string option = files_.input_format.empty() ? "--format" : "--input-format";

@@ -36,12 +36,13 @@ class Streams {
   int standard_output_ = -1;
 };
 
-/// Opens /dev/null in place of each standard stream that is closed, so that no file or pipe gets its number. It is
-/// opened the wrong way round: reading from the input and writing to the outputs fail as on a closed stream.
+/// Opens /dev/null in place of each standard stream that is closed, so that no file or pipe gets its number.
+/// It is opened the wrong way round: reading from the input and writing to the outputs fail as on a closed
+/// stream.
 void occupy_closed_streams() noexcept;
 
-/// Name ending of the format that the first bytes of a mesh, a .vdb or a NIfTI file tell, unpacked, such as ".ply". What
-/// nothing else claims is ".obj".
+/// Name ending of the format that the first bytes of a mesh, a .vdb or a NIfTI file tell, unpacked, such as
+/// ".ply". What nothing else claims is ".obj".
 std::string ending_of(std::string_view first_bytes);
 
 }  // namespace hermesh::cli

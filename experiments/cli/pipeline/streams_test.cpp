@@ -15,7 +15,8 @@ class StreamsTest : public ProgramTest {
   Outcome piped(const std::string& script) {
     const Outcome outcome = run_shell("export TMPDIR=$PWD/tmp; set -o pipefail; " + script);
     EXPECT_TRUE(std::filesystem::is_empty(path("tmp"))) << script;
-    EXPECT_EQ(outcome.err.find(path("tmp").string()), std::string::npos) << "a temporary file is named: " << outcome.err;
+    EXPECT_EQ(outcome.err.find(path("tmp").string()), std::string::npos)
+        << "a temporary file is named: " << outcome.err;
     return outcome;
   }
   void expect_refusal(int exit_code, const std::string& script, const std::string& words) {
@@ -51,7 +52,8 @@ TEST_F(StreamsTest, NothingButTheFileGoesToTheStandardOutput) {
 }
 
 TEST_F(StreamsTest, EveryFormatIsToldByItsContent) {
-  for (const char* format : {"ply", "obj", "off", "stl", "glb", "gltf", "3mf", "ply.gz", "stl.gz", "3mf.gz"}) {
+  for (const char* format :
+       {"ply", "obj", "off", "stl", "glb", "gltf", "3mf", "ply.gz", "stl.gz", "3mf.gz"}) {
     const Outcome outcome = piped(std::string("$H remesh sphere.off - --voxel-size 0.2 --quiet --format ") +
                                   format + " | $H validate - --require watertight --quiet");
     EXPECT_EQ(outcome.exit_code, 0) << format << outcome.err;

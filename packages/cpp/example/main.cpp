@@ -1,5 +1,5 @@
-// Mesh arrays in, a volume, mesh arrays out, with progress and cancelling. The pieces between //! [name] are the examples of the
-// API pages.
+// Mesh arrays in, a volume, mesh arrays out, with progress and cancelling. The pieces between //! [name] are
+// the examples of the API pages.
 #include <hermesh/hermesh.h>
 
 #include <cmath>
@@ -9,7 +9,8 @@
 
 namespace {
 
-/// Volume of a closed mesh: the sum over its triangles of the tetrahedra with the origin. A quad (a, b, c, d) is abc and acd.
+/// Volume of a closed mesh: the sum over its triangles of the tetrahedra with the origin. A quad (a, b, c, d)
+/// is abc and acd.
 double volume_of(const hermesh::Mesh& mesh) {
   const std::vector<double> p = mesh.world_points();
   double six_volumes = 0.0;
@@ -35,7 +36,8 @@ int main() try {
   // A cube of side 2: x, y, z of eight points, and six quads, counter-clockwise from outside.
   const std::vector<float> points = {-1, -1, -1, 1, -1, -1, -1, 1, -1, 1, 1, -1,
                                      -1, -1, 1,  1, -1, 1,  -1, 1, 1,  1, 1, 1};
-  const std::vector<std::uint32_t> quads = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
+  const std::vector<std::uint32_t> quads = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4,
+                                            2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
   const hermesh::Mesh cube(std::span<const float>(points), {}, quads);
   //! [arrays]
 
@@ -43,7 +45,8 @@ int main() try {
   hermesh::Context context;
   const hermesh::Volume volume = hermesh::voxelize(cube, {.voxel_size = 0.05}, context);
   const std::vector<double> centre_of_a_face = {1.0, 0.0, 0.0};
-  std::printf("%zu voxels, distance at a face %.4f\n", volume.active_voxels(), volume.sample(centre_of_a_face)[0]);
+  std::printf("%zu voxels, distance at a face %.4f\n", volume.active_voxels(),
+              volume.sample(centre_of_a_face)[0]);
   //! [volume]
 
   //! [extract]
@@ -57,7 +60,8 @@ int main() try {
       hermesh::remesh(cube, {.resolution = 40}, {.options = {{"tolerance", "0.05"}}}, context);
   for (const std::string& note : context.notes) std::printf("note: %s\n", note.c_str());
   //! [remesh]
-  std::printf("%zu polygons of volume %.6f\n", adaptive.triangle_count() + adaptive.quad_count(), volume_of(adaptive));
+  std::printf("%zu polygons of volume %.6f\n", adaptive.triangle_count() + adaptive.quad_count(),
+              volume_of(adaptive));
 
   //! [combine]
   const std::vector<double> moved = [&] {

@@ -21,8 +21,8 @@ inline Ints own_lanes(const Scan& scan, Floats x, Floats y, Floats z) {
   Ints own{};
   for (int i = 0; i < scan.own_count; ++i) {
     const Box& box = scan.own[i];
-    own |= (x > box.lower[0]) & (x < box.upper[0]) & (y > box.lower[1]) & (y < box.upper[1]) & (z > box.lower[2]) &
-           (z < box.upper[2]);
+    own |= (x > box.lower[0]) & (x < box.upper[0]) & (y > box.lower[1]) & (y < box.upper[1]) &
+           (z > box.lower[2]) & (z < box.upper[2]);
   }
   return own;
 }
@@ -35,8 +35,8 @@ inline void tell_points(const Scan& scan, const float* corner, std::uint32_t fir
     const std::uint32_t at = first + static_cast<std::uint32_t>(done);
     const Floats x = load(surface.x + at) + corner[0], y = load(surface.y + at) + corner[1],
                  z = load(surface.z + at) + corner[2];
-    // What is certain of a point holds with room for the rounding of single precision; between the two a point is told
-    // nothing about, and the caller looks at its triangles in double.
+    // What is certain of a point holds with room for the rounding of single precision; between the two a
+    // point is told nothing about, and the caller looks at its triangles in double.
     Ints inside[prisms], beyond_it[prisms];
     Ints certain{};
 #pragma GCC unroll 2
@@ -99,11 +99,12 @@ inline void tell_points(const Scan& scan, Found& found) {
       // Points are numbered cell by cell, so that those of a row of cells follow one another.
       const int first = popcount(active & before_first(asked)), end = popcount(active & until_last(asked));
       tell_points<prisms>(scan, window->corner,
-                          cells.first_point + cells.before[x] + static_cast<std::uint32_t>(first), end - first,
-                          found);
+                          cells.first_point + cells.before[x] + static_cast<std::uint32_t>(first),
+                          end - first, found);
     }
     if (block.later_points > 0)
-      tell_points<prisms>(scan, window->corner, block.first_later, static_cast<int>(block.later_points), found);
+      tell_points<prisms>(scan, window->corner, block.first_later, static_cast<int>(block.later_points),
+                          found);
   }
 }
 
@@ -124,12 +125,13 @@ inline int find_candidates(const Scan& scan, Candidate* out) {
     const Block& block = *window->block;
     for (int x = window->samples.first; x < window->samples.end; ++x) {
       std::uint64_t quads[3], any_axis = 0;
-      for (int axis = 0; axis < 3; ++axis) any_axis |= quads[axis] = block.crossing[axis][x] & ~block.without_quad[axis][x];
+      for (int axis = 0; axis < 3; ++axis)
+        any_axis |= quads[axis] = block.crossing[axis][x] & ~block.without_quad[axis][x];
       const std::uint64_t asked = any_axis & window->samples.rows;
       if (asked == 0) continue;
       const std::uint64_t before = before_first(asked), until = until_last(asked);
-      // Quads are numbered by word and within it by axis: those before the first row asked for are passed over, and the
-      // run ends behind the last.
+      // Quads are numbered by word and within it by axis: those before the first row asked for are passed
+      // over, and the run ends behind the last.
       std::uint32_t number = block.first_quad + block.quads_before[x], end = number;
       for (const std::uint64_t word : quads) {
         number += static_cast<std::uint32_t>(popcount(word & before));

@@ -36,7 +36,8 @@ enum Certain {
 /// A mesh with a point for most cells of a lattice, or several, and a quad for most edges that it crosses.
 struct Surface {
   const float *x, *y,
-      *z;  ///< coordinates of points, relative to the corners of their blocks; kLargestVector more can be read
+      *z;  ///< coordinates of points, relative to the corners of their blocks; kLargestVector more can be
+           ///< read
   const std::uint32_t (*quads)[4];
   const std::uint8_t*
       upright;  ///< 1 for quads whose triangles, 012 and 023, both face up along the block's direction
@@ -45,8 +46,9 @@ struct Surface {
   std::uint16_t* certain;
 };
 
-/// What is looked at in a block of the lattice: its points and quads. Masks of edges are eight words, one a layer x, with bit
-/// 8y+z for the edge's first sample. Quads are in the order of samples, those of one sample in that of axes.
+/// What is looked at in a block of the lattice: its points and quads. Masks of edges are eight words, one a
+/// layer x, with bit 8y+z for the edge's first sample. Quads are in the order of samples, those of one sample
+/// in that of axes.
 struct Block {
   const ActiveCells* cells;
   std::uint32_t first_later, later_points;             ///< cells' further points: all of them are looked at

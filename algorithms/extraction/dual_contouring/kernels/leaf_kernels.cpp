@@ -1,5 +1,5 @@
-// The loops over edges, cells and quads are plain C++ over arrays, which the compiler vectorises as wide as it is told;
-// every operation is elementwise and rounded once, so all levels give the same bytes.
+// The loops over edges, cells and quads are plain C++ over arrays, which the compiler vectorises as wide as
+// it is told; every operation is elementwise and rounded once, so all levels give the same bytes.
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 
 #include "algorithms/lattice/simd/bits.h"
@@ -12,15 +12,15 @@ namespace {
 using namespace simd;
 // clang-format off: the order matters
 #include "algorithms/extraction/dual_contouring/kernels/bit_numbers.inc"
-#include "algorithms/extraction/dual_contouring/kernels/signs.inc"
-#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
-#include "algorithms/extraction/dual_contouring/kernels/stencil.inc"
-#include "algorithms/extraction/dual_contouring/kernels/count.inc"
 #include "algorithms/extraction/dual_contouring/kernels/cells.inc"
-#include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
-#include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
-#include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
 #include "algorithms/extraction/dual_contouring/kernels/connect.inc"
+#include "algorithms/extraction/dual_contouring/kernels/count.inc"
+#include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
+#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
+#include "algorithms/extraction/dual_contouring/kernels/signs.inc"
+#include "algorithms/extraction/dual_contouring/kernels/stencil.inc"
 // clang-format on
 
 constexpr Kernels kKernels = {kLevel,      count,      place_average, place_optimal,

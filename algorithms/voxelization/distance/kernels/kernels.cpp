@@ -42,8 +42,8 @@ struct Functions {
   Floats16 height, across[3], along[3];
 };
 
-/// Squared distance to a triangle from the functions at 16 places (kernels.h has the rule): to its plane where a place is
-/// above the triangle, and to its nearest edge elsewhere.
+/// Squared distance to a triangle from the functions at 16 places (kernels.h has the rule): to its plane
+/// where a place is above the triangle, and to its nearest edge elsewhere.
 inline Floats16 squared_distance(const Functions& at, const Floats16* low, const Floats16* high) {
   Floats16 nearest;
   for (int i = 0; i < 3; ++i) {
@@ -72,7 +72,9 @@ struct Broadcast {
   }
 };
 
-inline Floats16 dot(const Floats16* g, Floats16 x, Floats16 y, Floats16 z) { return g[0] * x + g[1] * y + g[2] * z; }
+inline Floats16 dot(const Floats16* g, Floats16 x, Floats16 y, Floats16 z) {
+  return g[0] * x + g[1] * y + g[2] * z;
+}
 
 /// The functions without their constant parts, which a lane adds to what they are at its block's centre.
 inline Functions linear_parts(const Broadcast& t, const float (*place)[16]) {
@@ -89,7 +91,7 @@ inline Functions linear_parts(const Broadcast& t, const float (*place)[16]) {
 /// The functions at the centres of one half of the 32 blocks.
 inline Functions at_centres(const Broadcast& t, int half) {
   const Floats16 x = sixteen(kPositions.centre[0] + 16 * half), y = sixteen(kPositions.centre[1] + 16 * half),
-               z = sixteen(kPositions.centre[2] + 16 * half);
+                 z = sixteen(kPositions.centre[2] + 16 * half);
   Functions f;
   f.height = dot(t.height, x, y, z) + t.height[3];
   for (int i = 0; i < 3; ++i) {
@@ -104,8 +106,8 @@ struct CentreValues {
   alignas(64) float height[32], across[3][32], along[3][32];
 };
 
-/// Lowers the distances of a block's voxels by one triangle. Three functions of a place are linear, so that each is one
-/// addition a voxel: what it is at the block's centre and what the lane adds.
+/// Lowers the distances of a block's voxels by one triangle. Three functions of a place are linear, so that
+/// each is one addition a voxel: what it is at the block's centre and what the lane adds.
 template <bool ids>
 inline void update_block(const CentreValues& centre, const Functions& lane, const Broadcast& t, int block,
                          Ints id, Distances& distances) {
@@ -127,8 +129,8 @@ inline void update_block(const CentreValues& centre, const Functions& lane, cons
   store(best, smaller(squared, before));
 }
 
-/// Lowers the distances by the triangles of a batch, one after the other. For each, the blocks whose centre is within
-/// reach and half a block's diagonal are looked into; the others have no voxel within reach.
+/// Lowers the distances by the triangles of a batch, one after the other. For each, the blocks whose centre
+/// is within reach and half a block's diagonal are looked into; the others have no voxel within reach.
 template <bool ids>
 void update_with(const Batch& batch, int count, float reach, Distances& distances) {
   const Floats16 limit = sixteen((reach + kBlockRadius) * (reach + kBlockRadius));
@@ -164,8 +166,8 @@ void update(const Batch& batch, int count, float reach, bool ids, Distances& dis
 
 // ---- Fetching.
 
-/// Which triangles' boxes come within reach of the leaf's samples, and which within a voxel of them, by boxes in single
-/// precision that are widened by what it may err.
+/// Which triangles' boxes come within reach of the leaf's samples, and which within a voxel of them, by boxes
+/// in single precision that are widened by what it may err.
 Near near(const MeshCorners& corners, const LeafFrame& frame, float reach) {
   // Single precision errs by a few parts in ten million of what it adds and takes away.
   float margin = 16.0f + reach;
@@ -177,9 +179,9 @@ Near near(const MeshCorners& corners, const LeafFrame& frame, float reach) {
   for (int axis = 0; axis < 3; ++axis) {
     const Floats16 origin = sixteen(float(frame.origin[axis]));
     const Floats16 a = sixteen(corners.corner[axis]), b = sixteen(corners.corner[3 + axis]),
-                 c = sixteen(corners.corner[6 + axis]);
+                   c = sixteen(corners.corner[6 + axis]);
     const Floats16 low = smaller(smaller(a, b), c) * scale - origin,
-                 high = larger(larger(a, b), c) * scale - origin;
+                   high = larger(larger(a, b), c) * scale - origin;
     // How far the box is from the leaf's samples, which are 0 to 7, along this axis.
     const Floats16 gap = larger(larger(low - sixteen(7.0f), zero - high), zero);
     gap2 = gap2 + gap * gap;
@@ -189,8 +191,8 @@ Near near(const MeshCorners& corners, const LeafFrame& frame, float reach) {
   return {less(gap2, sixteen((reach + margin) * (reach + margin))), less(farthest, sixteen(1.0f + margin))};
 }
 
-/// In double precision, for a mesh's coordinates may be large beside a voxel; relative to the leaf they are small, and may
-/// be rounded to single precision later.
+/// In double precision, for a mesh's coordinates may be large beside a voxel; relative to the leaf they are
+/// small, and may be rounded to single precision later.
 void to_leaf(const MeshCorners& from, const LeafFrame& frame, Corners& to) {
   const Doubles8 scale = eight(frame.scale);
   for (int i = 0; i < 9; ++i) {
@@ -219,8 +221,8 @@ inline void put(float (*at)[kBatch], int first, const Vector& v) {
   store_rounded(at[2] + first, v.z);
 }
 
-/// Coefficients in double precision, rounded once. The division by a length of 0 gives values that are not finite; such a
-/// triangle is reported as thin, and its lane is set up anew as a segment (set_up_segment()).
+/// Coefficients in double precision, rounded once. The division by a length of 0 gives values that are not
+/// finite; such a triangle is reported as thin, and its lane is set up anew as a segment (set_up_segment()).
 unsigned set_up(const Corners& corners, Batch& batch) {
   unsigned thin = 0;
   for (int first = 0; first < kBatch; first += 8) {
@@ -272,7 +274,8 @@ inline Floats16 squared_distance(const Boxes& boxes, const Floats16* place) {
 /// Squared distances of one place to the 16 triangles of a batch.
 inline Floats16 squared_distance(const Batch& batch, const Floats16* place) {
   const auto value = [&](int k) {
-    return sixteen(batch.f[k]) * place[0] + sixteen(batch.f[k + 1]) * place[1] + sixteen(batch.f[k + 2]) * place[2];
+    return sixteen(batch.f[k]) * place[0] + sixteen(batch.f[k + 1]) * place[1] +
+           sixteen(batch.f[k + 2]) * place[2];
   };
   Functions at;
   Floats16 low[3], high[3];
@@ -287,14 +290,15 @@ inline Floats16 squared_distance(const Batch& batch, const Floats16* place) {
   return squared_distance(at, low, high);
 }
 
-/// A batch is set up when something looks into it for the first time: of many small triangles most are never asked.
+/// A batch is set up when something looks into it for the first time: of many small triangles most are never
+/// asked.
 inline const Batch& prepared(const LazyBatches& lazy, int b) {
   if (!lazy.batches[b]) lazy.batches[b] = lazy.prepare(lazy.context, b);
   return *lazy.batches[b];
 }
 
-/// Lowers `best`, a squared distance, to that of the batch's nearest triangle, and returns its lane, or −1 if none is
-/// nearer.
+/// Lowers `best`, a squared distance, to that of the batch's nearest triangle, and returns its lane, or −1 if
+/// none is nearer.
 inline int lower(const Batch& batch, const Floats16* place, float& best) {
   const Floats16 found = squared_distance(batch, place);
   unsigned nearer = less(found, sixteen(best));
@@ -318,8 +322,8 @@ inline void set_place(Floats16* place, float x, float y, float z) {
   place[2] = sixteen(z);
 }
 
-/// Finds the batch with the triangle nearest to a place, and lowers `best` to its squared distance; −1 if none is
-/// nearer than `best` was. `guess` is looked into first.
+/// Finds the batch with the triangle nearest to a place, and lowers `best` to its squared distance; −1 if
+/// none is nearer than `best` was. `guess` is looked into first.
 int nearest_batch(const LazyBatches& lazy, const Floats16* place, int guess, float& best) {
   int nearest = guess >= 0 && lower(prepared(lazy, guess), place, best) >= 0 ? guess : -1;
   for (int first = 0; first < lazy.count; first += kBatch) {
@@ -328,7 +332,8 @@ int nearest_batch(const LazyBatches& lazy, const Floats16* place, int guess, flo
     if (!near) continue;
     alignas(64) float bounds[16];
     store(bounds, bound);
-    // `best` falls from batch to batch, so that each bound is asked once more before its batch is looked into.
+    // `best` falls from batch to batch, so that each bound is asked once more before its batch is looked
+    // into.
     for (; near; near &= near - 1) {
       const int i = __builtin_ctz(near);
       if (bounds[i] < best && lower(prepared(lazy, first + i), place, best) >= 0) nearest = first + i;
@@ -354,9 +359,9 @@ struct BlockSearch {
     const Boxes& boxes = lazy.boxes[b / kBatch];
     Floats16 sum = sixteen(0.0f);
     for (int a = 0; a < 3; ++a) {
-      const Floats16 gap = larger(
-          larger(sixteen(boxes.side[a][0][b % kBatch]) - place[a], place[a] - sixteen(boxes.side[a][1][b % kBatch])),
-          sixteen(0.0f));
+      const Floats16 gap = larger(larger(sixteen(boxes.side[a][0][b % kBatch]) - place[a],
+                                         place[a] - sixteen(boxes.side[a][1][b % kBatch])),
+                                  sixteen(0.0f));
       sum = sum + gap * gap;
     }
     unsigned near = less(sum * sixteen(0.99999f), sixteen(best));
@@ -398,7 +403,8 @@ inline void look_around(const LazyBatches& lazy, const Floats16* place, float fr
   }
 }
 
-/// Goes through the blocks of 16 voxels, so that a batch serves all voxels of a block while it is in the cache.
+/// Goes through the blocks of 16 voxels, so that a batch serves all voxels of a block while it is in the
+/// cache.
 void update_from_many(const LazyBatches& lazy, float reach, bool ids, Distances& distances) {
   // The block before lies beside this one, so its nearest batch is a good first guess.
   int guess = -1;
@@ -424,8 +430,8 @@ void update_from_many(const LazyBatches& lazy, float reach, bool ids, Distances&
 
 // ---- The finished leaf.
 
-/// Square roots, world units, and the order of OpenVDB's leaves; voxels out of reach get the reach itself. Returns whether
-/// any voxel is within reach.
+/// Square roots, world units, and the order of OpenVDB's leaves; voxels out of reach get the reach itself.
+/// Returns whether any voxel is within reach.
 bool finish(const Distances& distances, float reach, float scale, float* values, std::uint64_t* active) {
   const Floats16 limit = sixteen(reach * reach);
   for (int x = 0; x < 8; ++x) active[x] = 0;
@@ -459,7 +465,8 @@ void apply_signs(const std::uint64_t* inside, float exterior, float interior, fl
       const Floats16 distance = sixteen(at);
       const unsigned in_band = less(distance, limit) & (active[x] >> part) & 0xffffu;
       below |= std::uint64_t(in_band) << part;
-      // What no triangle reached has the width itself, as tiles have it: the search may have left less, by rounding.
+      // What no triangle reached has the width itself, as tiles have it: the search may have left less, by
+      // rounding.
       const Floats16 value = choose(in_band, distance, limit);
       // Inside is negative even where the distance is 0, so that the sample keeps its side.
       store(at, choose(negative, sixteen(0.0f) - larger(value, sixteen(least)), value));

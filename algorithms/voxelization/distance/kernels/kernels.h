@@ -19,8 +19,8 @@ struct Corners {
   alignas(64) double corner[9][kBatch];
 };
 
-/// Corners of up to 16 triangles as the mesh has them, in world units and single precision: corner[3 · corner +
-/// axis][triangle].
+/// Corners of up to 16 triangles as the mesh has them, in world units and single precision: corner[3 · corner
+/// + axis][triangle].
 struct MeshCorners {
   alignas(64) float corner[9][kBatch];
 };
@@ -79,7 +79,8 @@ struct LazyBatches {
   void* context;
 };
 
-/// Grid edges that triangles cross: bit 8y + z of word x, axis of the edge first. An edge belongs to its lower end.
+/// Grid edges that triangles cross: bit 8y + z of word x, axis of the edge first. An edge belongs to its
+/// lower end.
 struct EdgeBits {
   std::uint64_t word[3][8];
 };
@@ -91,30 +92,30 @@ struct Kernels {
   Near (*near)(const MeshCorners&, const LeafFrame&, float reach);
   /// Changes the corners of 16 triangles to voxels relative to the leaf, in double precision.
   void (*to_leaf)(const MeshCorners&, const LeafFrame&, Corners&);
-  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel, and its
-  /// lane is for set_up_segment() to fill.
+  /// Sets up 16 triangles at once. Bit i of the result: triangle i is thinner than a millionth of a voxel,
+  /// and its lane is for set_up_segment() to fill.
   unsigned (*set_up)(const Corners&, Batch&);
-  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch; beyond it
-  /// they may stay as they are. With `ids`, notes which triangle is the nearest.
+  /// Lowers the distances of the voxels within `reach` voxels of the first `count` triangles of the batch;
+  /// beyond it they may stay as they are. With `ids`, notes which triangle is the nearest.
   void (*update)(const Batch&, int count, float reach, bool ids, Distances&);
-  /// Lowers the distances as `update` does, for thousands of triangles far smaller than a voxel: a voxel at a time,
-  /// 16 triangles at once, batches whose box is farther than the nearest triangle so far left out.
+  /// Lowers the distances as `update` does, for thousands of triangles far smaller than a voxel: a voxel at a
+  /// time, 16 triangles at once, batches whose box is farther than the nearest triangle so far left out.
   void (*update_from_many)(const LazyBatches&, float reach, bool ids, Distances&);
   /// Adds the edges that the first `count` triangles cross, ends and borders included with a tolerance of
   /// 1e-9 voxel, so that no path along grid edges slips through between two triangles that share an edge.
   void (*cross)(const Corners&, int count, EdgeBits&);
-  /// Writes the distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the voxels
-  /// below it as bits. False when there is none.
+  /// Writes the distances, in voxels times `scale`, in OpenVDB's order, none above reach · scale, and the
+  /// voxels below it as bits. False when there is none.
   bool (*finish)(const Distances&, float reach, float scale, float* values, std::uint64_t* active);
-  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit, to −`least` or less, and limits
-  /// them on either side; leaves in `active` the bits of those below their limit.
+  /// Turns `values` (OpenVDB's order, distances) negative where `inside` has a bit, to −`least` or less, and
+  /// limits them on either side; leaves in `active` the bits of those below their limit.
   void (*apply_signs)(const std::uint64_t* inside, float exterior, float interior, float least, float* values,
                       std::uint64_t* active);
   static const Kernels sse2, avx2, avx512;
 };
 
-/// Sets lane `triangle` of the batch up as a segment, the triangle's longest side; as a point where all corners
-/// coincide.
+/// Sets lane `triangle` of the batch up as a segment, the triangle's longest side; as a point where all
+/// corners coincide.
 void set_up_segment(const Corners&, int triangle, Batch&);
 
 }  // namespace hermesh::kernels

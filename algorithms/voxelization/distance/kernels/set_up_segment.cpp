@@ -1,6 +1,6 @@
-#include "algorithms/voxelization/distance/kernels/kernels.h"
-
 #include <Eigen/Geometry>
+
+#include "algorithms/voxelization/distance/kernels/kernels.h"
 
 namespace hermesh::kernels {
 namespace {

@@ -8,9 +8,9 @@
 #define HERMESH_API __attribute__((visibility("default")))
 #endif
 
-// Other programs say hermesh::Mesh, which is hermesh::v1::Mesh. A later version with other members can live in v2
-// beside it, so that programs compiled against either find their own. Only hermesh's own sources, whose names live
-// in namespace hermesh itself, have to say v1.
+// Other programs say hermesh::Mesh, which is hermesh::v1::Mesh. A later version with other members can live
+// in v2 beside it, so that programs compiled against either find their own. Only hermesh's own sources, whose
+// names live in namespace hermesh itself, have to say v1.
 #ifdef HERMESH_IMPLEMENTATION
 #define HERMESH_V1 v1
 #else

@@ -92,15 +92,15 @@ class HERMESH_API Mesh {
   std::shared_ptr<const Arrays> arrays_;
 };
 
-/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped, told by the name's end and checked against
-/// the content. Polygons of more corners are cut into triangles. What was forgiven is a note.
-/// With `attributes` those of PLY and OBJ are read, too.
+/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped, told by the
+/// name's end and checked against the content. Polygons of more corners are cut into triangles. What was
+/// forgiven is a note. With `attributes` those of PLY and OBJ are read, too.
 /// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
 HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
 
-/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, as the name ends, beside the path and renames, so that no
-/// half-written file stands there. Reading the file back gives the same points; but STL has single precision,
-/// and a note says what that cost. PLY alone keeps attributes.
+/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, as the name ends, beside the path and
+/// renames, so that no half-written file stands there. Reading the file back gives the same points; but STL
+/// has single precision, and a note says what that cost. PLY alone keeps attributes.
 /// @throws Error for an unknown end of the name or a path that cannot be written; Cancelled.
 HERMESH_API void write_mesh(const std::filesystem::path& path, const Mesh& mesh, Context& context);
 

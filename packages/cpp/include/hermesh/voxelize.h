@@ -38,8 +38,9 @@ HERMESH_API std::vector<MethodInfo> voxelizers();
 HERMESH_API Volume voxelize(const Mesh& mesh, const VoxelizeOptions& options, Context& context);
 
 /// Several volumes of one voxelization, by the voxelizers hermesh and thesis, in the order of the program's
-/// file: `grids` are names with commas between them, of sdf, udf, fog, closest-point, triangle-id, attributes,
-/// attribute:NAME. With `fog_exterior` the fog's ramp lies over both bands, not the interior one alone.
+/// file: `grids` are names with commas between them, of sdf, udf, fog, closest-point, triangle-id,
+/// attributes, attribute:NAME. With `fog_exterior` the fog's ramp lies over both bands, not the interior one
+/// alone.
 /// @throws Error as voxelize(), and for a name that there is not; Cancelled.
 HERMESH_API std::vector<Volume> voxelize_grids(const Mesh& mesh, const std::string& grids,
                                                const VoxelizeOptions& options, Context& context,
