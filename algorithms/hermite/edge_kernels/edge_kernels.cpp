@@ -13,9 +13,10 @@ namespace HERMESH_SIMD_LEVEL {
 namespace {
 
 using namespace simd;
-// clang-format off: the order matters
-#include "algorithms/hermite/edge_kernels/leaf_crossings.inc"
+// Each part uses those before it.
+// clang-format off
 #include "algorithms/hermite/edge_kernels/leaf_ends.inc"
+#include "algorithms/hermite/edge_kernels/leaf_crossings.inc"
 // clang-format on
 
 constexpr Kernels kKernels = {

@@ -11,16 +11,19 @@ namespace {
 
 using namespace simd;
 // clang-format off: the order matters
+// Each part uses those before it.
+// clang-format off
 #include "algorithms/extraction/dual_contouring/kernels/bit_numbers.inc"
-#include "algorithms/extraction/dual_contouring/kernels/cells.inc"
-#include "algorithms/extraction/dual_contouring/kernels/connect.inc"
-#include "algorithms/extraction/dual_contouring/kernels/count.inc"
-#include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
-#include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
-#include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
-#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
 #include "algorithms/extraction/dual_contouring/kernels/signs.inc"
+#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
 #include "algorithms/extraction/dual_contouring/kernels/stencil.inc"
+#include "algorithms/extraction/dual_contouring/kernels/count.inc"
+#include "algorithms/extraction/dual_contouring/kernels/cells.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
+#include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
+#include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
+#include "algorithms/extraction/dual_contouring/kernels/connect.inc"
+// clang-format on
 // clang-format on
 
 constexpr Kernels kKernels = {kLevel,      count,      place_average, place_optimal,
